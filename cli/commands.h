@@ -1,0 +1,18 @@
+#pragma once
+// One function per command: it adds flags to the command line and, when the command is chosen, runs it.
+
+#include <CLI/CLI.hpp>
+
+#include "cli/console.h"
+
+namespace isoshift {
+
+void add_inspect_command(CLI::App& app, Console& console, int& exit_status);
+void add_register_command(CLI::App& app, Console& console, int& exit_status);
+void add_drr_command(CLI::App& app, Console& console, int& exit_status);
+void add_phantom_command(CLI::App& app, Console& console, int& exit_status);
+
+// The whole program: parses, runs, and turns every exception into a message and an exit status.
+int run_isoshift(int argc, const char* const* argv, Console& console);
+
+}  // namespace isoshift

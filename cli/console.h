@@ -1,0 +1,44 @@
+#pragma once
+// Where a command writes: results to `out`, progress and warnings to `err`.
+
+#include <chrono>
+#include <cstddef>
+#include <ostream>
+#include <string>
+#include <string_view>
+
+namespace isoshift {
+
+struct Console {
+  std::ostream& out;
+  std::ostream& err;
+  bool err_is_terminal = false;
+};
+
+// Progress of one long piece of work: a bar that redraws itself on a terminal, a line per quarter elsewhere. Work that
+// ends within half a second shows nothing.
+class ProgressBar {
+ public:
+  ProgressBar(Console& console, std::string what);
+  ~ProgressBar();  // ends the bar's line
+  ProgressBar(const ProgressBar&) = delete;
+  ProgressBar& operator=(const ProgressBar&) = delete;
+
+  void update(double share);
+  void update(std::size_t done, std::size_t total) { update(static_cast<double>(done) / static_cast<double>(total)); }
+
+ private:
+  Console& console_;
+  std::string what_;
+  std::chrono::steady_clock::time_point begin_;
+  int shown_percent_ = -1;
+};
+
+// Exit statuses, the same for every command.
+inline constexpr int kExitAccepted = 0;
+inline constexpr int kExitFailed = 1;
+inline constexpr int kExitUsage = 2;
+inline constexpr int kExitReview = 3;
+inline constexpr int kExitRejected = 4;
+
+}  // namespace isoshift

@@ -1,0 +1,72 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <memory>
+
+#include "cli/commands.h"
+#include "cli/study_options.h"
+#include "cli/truth.h"
+#include "geometry/error.h"
+#include "io/image_files.h"
+#include "io/output_folder.h"
+#include "io/report/pictures.h"
+
+namespace isoshift {
+namespace {
+
+struct DrrOptions {
+  StudyOptions study;
+  RenderingOptions rendering;
+  std::filesystem::path output;
+  std::filesystem::path setup_error;  // empty: the planned pose
+  bool overwrite = false;
+};
+
+void run_drr(const DrrOptions& options, Console& console) {
+  OutputFolder output(options.output, options.overwrite);
+  const Eigen::Isometry3d setup_error =
+      options.setup_error.empty() ? Eigen::Isometry3d::Identity() : read_setup_error(options.setup_error);
+  Notes notes;
+  const auto [study, renderer] = load(options.study, options.rendering, notes, console);
+  const std::array pose = {setup_error * study.planned_room_from_patient};
+  for (const std::string& warning : notes.warnings) console.err << "warning: " << warning << "\n";
+
+  std::string listing;
+  for (std::size_t n = 0; n < study.xrays.size(); ++n) {
+    const XrayView& view = study.xrays[n].view;
+    const RenderResult drrs = renderer->render(std::span(&view, 1), pose, PixelSet::all());
+    Image<float> image(view.columns, view.rows);
+    std::ranges::copy(drrs.line_integrals(0, 0), image.pixels.begin());
+    if (std::ranges::all_of(image.pixels, [](float value) { return value == 0.0F; }))
+      throw Error(fmt::format("{}: the DRR is empty: no ray meets anything above {} HU in the CT", study.xrays[n].label,
+                              options.rendering.threshold_hu));
+    const std::string name = fmt::format("drr{}", n + 1);
+    const Eigen::Vector2d spacing_mm = study.rt_images[n].pixel_spacing_mm.value();
+    write_line_integral_png(output.path() / (name + ".png"), image);
+    write_mha(output.path() / (name + ".mha"), image, {spacing_mm.y(), spacing_mm.x()});
+    listing += fmt::format("{}.png {}.mha  {}: {} x {} pixels, line integrals up to {:.3f}\n", name, name,
+                           study.xrays[n].label, view.columns, view.rows, *std::ranges::max_element(image.pixels));
+  }
+  output.commit();
+  console.out << listing;
+}
+
+}  // namespace
+
+void add_drr_command(CLI::App& app, Console& console, int&) {
+  auto options = std::make_shared<DrrOptions>();
+  CLI::App* command = app.add_subcommand("drr", "Render what the X-rays of a study should have shown");
+  command->footer(
+      "\nExample:\n  isoshift drr exported/ -o drr                               # patient as planned\n"
+      "  isoshift drr exported/ -o drr --setup-error out/result.json  # patient as found\n\n"
+      "Writes a picture (PNG) and the line integrals (MetaImage) per X-ray of the study.");
+  add_study_options(*command, options->study);
+  command->add_option("-o,--output", options->output, "Folder for the images")->required()->type_name("FOLDER");
+  command->add_option("--setup-error", options->setup_error, "result.json or truth.json: how the patient lies")
+      ->type_name("FILE");
+  command->add_flag("--overwrite", options->overwrite, "Replace what the output folder holds");
+  add_rendering_options(*command, options->rendering);
+  command->callback([options, &console] { run_drr(*options, console); });
+}
+
+}  // namespace isoshift

@@ -1,0 +1,56 @@
+#include <fmt/format.h>
+
+#include <exception>
+
+#include "cli/commands.h"
+#include "geometry/error.h"
+#include "io/version.h"
+
+namespace isoshift {
+namespace {
+
+constexpr const char* kDescription =
+    "isoshift compares the planning CT with the X-rays taken in the treatment room, finds how far the patient lies off\n"
+    "plan, and says how the couch must move. Not for clinical use unless validated by the site.\n\n"
+    "Example:\n"
+    "  isoshift inspect exported/            # what is in the folder, and what is missing\n"
+    "  isoshift register exported/ -o out    # finds the shift; writes out/report.txt, result.json, ...\n";
+
+constexpr const char* kFooter =
+    "\nExit status: 0 accepted (or done), 1 failed, 2 usage, 3 review, 4 rejected.";
+
+int say(Console& console, const std::exception& error, int status) {
+  console.err << "error: " << error.what() << "\n";
+  return status;
+}
+
+}  // namespace
+
+int run_isoshift(int argc, const char* const* argv, Console& console) {
+  int exit_status = kExitAccepted;
+  CLI::App app(kDescription, "isoshift");
+  app.footer(kFooter);
+  app.require_subcommand(1);
+  app.set_version_flag("--version", fmt::format("isoshift {} ({})", kVersion, kCommit));
+  app.get_formatter()->column_width(34);
+  add_inspect_command(app, console, exit_status);
+  add_register_command(app, console, exit_status);
+  add_drr_command(app, console, exit_status);
+  add_phantom_command(app, console, exit_status);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    const int code = app.exit(error, console.out, console.err);
+    return code == 0 ? kExitAccepted : kExitUsage;
+  } catch (const UsageError& error) {
+    return say(console, error, kExitUsage);
+  } catch (const std::bad_alloc&) {
+    console.err << "error: out of memory\n";
+    return kExitFailed;
+  } catch (const std::exception& error) {
+    return say(console, error, kExitFailed);
+  }
+  return exit_status;
+}
+
+}  // namespace isoshift

@@ -1,0 +1,183 @@
+#include "cli/register_command.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <chrono>
+#include <memory>
+
+#include "cli/commands.h"
+#include "cli/truth.h"
+#include "geometry/error.h"
+#include "io/output_folder.h"
+#include "io/report/pictures.h"
+#include "io/report/setup_report.h"
+#include "io/spatial_registration.h"
+
+namespace isoshift {
+namespace {
+
+constexpr const char* kRegistrationFile = "spatial_registration.dcm";
+
+class Stopwatch {
+ public:
+  double seconds() const { return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin_).count(); }
+
+ private:
+  std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();
+};
+
+int exit_status_of(Verdict verdict) {
+  switch (verdict) {
+    case Verdict::kAccepted: return kExitAccepted;
+    case Verdict::kReview: return kExitReview;
+    case Verdict::kRejected: return kExitRejected;
+  }
+  return kExitFailed;
+}
+
+SetupReport make_report(const RegisterOptions& options, const Study& study, const Renderer& renderer,
+                        const RegistrationResult& result) {
+  SetupReport report;
+  report.verdict = result.verdict;
+  report.reasons = result.reasons;
+  report.patient_id = study.ct.identity.patient_id;
+  report.patient_name = study.ct.identity.patient_name;
+  report.plan_label = study.plan ? study.plan->label : "";
+  report.patient_position = to_string(study.patient_position);
+  report.isocenter_patient_mm = study.isocenter_patient_mm;
+  report.table = study.table;
+  report.setup_error = setup_error_from_poses(study.planned_room_from_patient, result.actual_room_from_patient);
+  report.unobservable_room = result.unobservable_room;
+  report.translation_only = options.registration.dof == Dof::kTranslation;
+  for (std::size_t n = 0; n < study.rt_images.size(); ++n)
+    report.views.push_back({.label = study.rt_images[n].label,
+                            .sop_instance_uid = study.rt_images[n].sop_instance_uid,
+                            .gantry_deg = study.rt_images[n].gantry_angle_deg.value(),
+                            .similarity_start = result.views[n].similarity_start,
+                            .similarity_final = result.views[n].similarity_final});
+  for (const StageReport& stage : result.stages)
+    report.stages.push_back({.name = stage.name,
+                             .similarity = stage.similarity,
+                             .evaluations = stage.evaluations,
+                             .seconds = stage.seconds,
+                             .termination = stage.termination});
+  report.seed = options.registration.seed;
+  report.attenuation = options.rendering.attenuation;
+  report.threshold_hu = options.rendering.threshold_hu;
+  report.renderer = to_string(renderer.kind());
+  report.device = renderer.device();
+  report.seconds_register = result.seconds;
+  report.ct_series_uid = study.ct.series_instance_uid;
+  report.plan_uid = study.plan ? study.plan->sop_instance_uid : "";
+  return report;
+}
+
+// Accepted results are written; those for review only on request, and never along a direction nobody measured.
+bool may_write_registration(const RegisterOptions& options, const RegistrationResult& result) {
+  if (!result.unobservable_room.empty()) return false;
+  return result.verdict == Verdict::kAccepted ||
+         (result.verdict == Verdict::kReview && options.write_reg_for_review);
+}
+
+SpatialRegistrationLabel label_of(Verdict verdict) {
+  if (verdict == Verdict::kAccepted) return {};
+  return {.content_label = "SETUP_REVIEW", .content_description = "NOT ACCEPTED: REVIEW"};
+}
+
+Image<float> as_image(const XrayView& view, std::span<const float> line_integrals) {
+  Image<float> image(view.columns, view.rows);
+  std::ranges::copy(line_integrals, image.pixels.begin());
+  return image;
+}
+
+// One picture per view. Throws Error for a view in which the CT does not appear at all.
+void write_pictures(const Study& study, Renderer& renderer, const Eigen::Isometry3d& actual_room_from_patient,
+                    const std::filesystem::path& folder) {
+  const std::array poses = {study.planned_room_from_patient, actual_room_from_patient};
+  for (std::size_t n = 0; n < study.xrays.size(); ++n) {
+    const XrayImage& xray = study.xrays[n];
+    const RenderResult drrs = renderer.render(std::span(&xray.view, 1), poses, PixelSet::all());
+    const Image<float> line_integral = prepare(xray).line_integral;
+    const Image<float> planned = as_image(xray.view, drrs.line_integrals(0, 0));
+    const Image<float> found = as_image(xray.view, drrs.line_integrals(1, 0));
+    write_comparison_png(folder / fmt::format("view{}.png", n + 1),
+                         {.label = xray.label,
+                          .xray = line_integral,
+                          .drr_planned = planned,
+                          .drr_found = found,
+                          .isocenter_px = xray.view.project(Eigen::Vector3d::Zero()).value()});
+  }
+}
+
+}  // namespace
+
+int run_register(const RegisterOptions& given, Console& console) {
+  RegisterOptions options = given;
+  options.registration.dof = options.dof == "rigid" ? Dof::kRigid : Dof::kTranslation;
+  const Stopwatch total;
+  OutputFolder output(options.output, options.overwrite, {"result.json", "report.txt", kRegistrationFile});
+  std::optional<Eigen::Isometry3d> truth;
+  if (!options.truth.empty()) truth = read_setup_error(options.truth);
+
+  Notes notes;
+  const auto [study, renderer] = load(options.study, options.rendering, notes, console);
+  const double seconds_load = total.seconds();
+  RegistrationResult result;
+  {
+    ProgressBar bar(console, "Registering");
+    result = register_views(*renderer, study.xrays, study.planned_room_from_patient, options.registration,
+                            [&](double share) { bar.update(share); });
+  }
+
+  SetupReport report = make_report(options, study, *renderer, result);
+  if (may_write_registration(options, result))
+    report.spatial_registration_uid =
+        write_spatial_registration(study, result.actual_room_from_patient, label_of(result.verdict),
+                                   output.path() / kRegistrationFile, notes);
+  write_pictures(study, *renderer, result.actual_room_from_patient, output.path());
+  report.overrides = notes.overrides;
+  report.warnings = notes.warnings;
+  report.warnings.insert(report.warnings.end(), result.warnings.begin(), result.warnings.end());
+  report.seconds_load = seconds_load;
+  report.seconds_total = total.seconds();
+  const std::string json = json_report(report);
+  const std::string text = text_report(report);
+  write_text(output.path() / "result.json", json);
+  write_text(output.path() / "report.txt", text);
+  output.commit();
+
+  for (const std::string& warning : report.warnings) console.err << "warning: " << warning << "\n";
+  console.out << (options.json ? json : text);
+  if (!options.json) {
+    if (truth) console.out << "\n" << compared_with_truth(report.setup_error, *truth);
+    console.out << fmt::format("\nWritten to {}\n", output.destination().string());
+  }
+  return exit_status_of(result.verdict);
+}
+
+void add_register_command(CLI::App& app, Console& console, int& exit_status) {
+  auto options = std::make_shared<RegisterOptions>();
+  CLI::App* command = app.add_subcommand("register", "Find the setup shift of an exported study");
+  command->footer(
+      "\nExample:\n  isoshift register exported/ -o result\n"
+      "  isoshift register images/ --ct planning_ct/ --plan RTPLAN.dcm -o result --couch-angle 0\n\n"
+      "Writes report.txt, result.json, a picture per view and, for an accepted result, spatial_registration.dcm.\n"
+      "Exit status: 0 accepted, 1 failed, 2 usage, 3 review, 4 rejected.");
+  add_study_options(*command, options->study);
+  command->add_option("-o,--output", options->output, "Folder for the results")->required()->type_name("FOLDER");
+  command->add_option("--dof", options->dof, "Degrees of freedom: six, or the three translations")
+      ->check(CLI::IsMember({"rigid", "translation"}))->capture_default_str();
+  command->add_option("--seed", options->registration.seed, "Of the pixels drawn; the only randomness")
+      ->capture_default_str();
+  command->add_option("--truth", options->truth, "truth.json of a phantom study: print the result beside it")
+      ->type_name("FILE");
+  command->add_flag("--write-reg-for-review", options->write_reg_for_review,
+                    "Write the registration object for a result that needs review, too, marked as not accepted");
+  command->add_flag("--overwrite", options->overwrite, "Replace what the output folder holds");
+  command->add_flag("--json", options->json, "Print result.json instead of the report");
+  add_rendering_options(*command, options->rendering);
+  command->callback([options, &console, &exit_status] { exit_status = run_register(*options, console); });
+}
+
+}  // namespace isoshift

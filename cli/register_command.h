@@ -1,0 +1,29 @@
+#pragma once
+// isoshift register: from an exported study to a setup shift.
+
+#include <filesystem>
+#include <optional>
+#include <string>
+
+#include "cli/console.h"
+#include "cli/study_options.h"
+#include "registration/register_views.h"
+
+namespace isoshift {
+
+struct RegisterOptions {
+  StudyOptions study;
+  RenderingOptions rendering;
+  RegistrationOptions registration;
+  std::string dof = "rigid";
+  std::filesystem::path output;
+  std::filesystem::path truth;  // empty: unknown
+  bool overwrite = false;
+  bool json = false;
+  bool write_reg_for_review = false;
+};
+
+// Returns the exit status that the verdict asks for.
+int run_register(const RegisterOptions& options, Console& console);
+
+}  // namespace isoshift

@@ -1,0 +1,143 @@
+#include "cli/study_options.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+
+#include "geometry/error.h"
+
+namespace isoshift {
+namespace {
+
+// "KEY=VALUE" at its first "=".
+std::pair<std::string, std::string> key_and_value(const std::string& text, std::string_view flag) {
+  const auto equals = text.find('=');
+  if (equals == std::string::npos || equals == 0 || equals + 1 == text.size())
+    throw UsageError(fmt::format("{} {}: expected two parts joined by =", flag, text));
+  return {text.substr(0, equals), text.substr(equals + 1)};
+}
+
+double number_from(const std::string& text, std::string_view flag) {
+  double value = 0.0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc() || end != text.data() + text.size())
+    throw UsageError(fmt::format("{}: \"{}\" is no number", flag, text));
+  return value;
+}
+
+std::string allow_keys_help() {
+  std::string help = "Allow what a check forbids, with the reason. KEY is one of";
+  for (const AllowKey& key : kAllowKeys) help += fmt::format("\n{}: {}", key.key, key.meaning);
+  return help;
+}
+
+}  // namespace
+
+StudyRequest StudyOptions::request() const {
+  StudyRequest request;
+  request.study = study;
+  request.ct = ct;
+  request.images = images;
+  if (!plan.empty()) request.plan = plan;
+  if (!isocenter.empty()) request.isocenter_patient_mm = Eigen::Vector3d(isocenter.data());
+  for (const std::string& text : gantry_angles) {
+    const auto [label, angle] = key_and_value(text, "--gantry-angle");
+    request.switches.gantry_angle_deg[label] = number_from(angle, "--gantry-angle");
+  }
+  request.switches.couch_angle_deg = couch_angle_deg;
+  request.switches.sad_mm = sad_mm;
+  request.switches.sid_mm = sid_mm;
+  if (!rt_image_position.empty()) request.switches.position_mm = Eigen::Vector2d(rt_image_position.data());
+  request.switches.assume_centered = assume_centered;
+  if (!intensity.empty()) request.switches.intensity = pixel_intensity_from(intensity);
+  if (!beam.empty()) request.switches.beam = beam == "kv" ? Beam::kKilovoltage : Beam::kMegavoltage;
+  if (!patient_position.empty()) request.switches.patient_position = patient_position_from(patient_position);
+  for (const std::string& text : allow) {
+    const auto [key, reason] = key_and_value(text, "--allow");
+    if (std::ranges::find(kAllowKeys, key, &AllowKey::key) == std::end(kAllowKeys))
+      throw UsageError(fmt::format("--allow {}: no check has this key", key));
+    request.allowed[key] = reason;
+  }
+  return request;
+}
+
+void add_study_options(CLI::App& command, StudyOptions& options) {
+  command.add_option("study", options.study, "Folder of the exported study; its parts are found by what they are")
+      ->type_name("FOLDER");
+  const char* parts = "Parts of the study";
+  command.add_option("--ct", options.ct, "Folder or files of the planning CT")->type_name("PATH")->group(parts);
+  command.add_option("--image", options.images, "RT Images (X-rays), files or folders")->type_name("PATH")->group(parts);
+  command.add_option("--plan", options.plan, "RT Plan")->type_name("FILE")->group(parts);
+
+  const char* lacking = "What the files lack (never guessed; each use is written into the result)";
+  command.add_option("--isocenter", options.isocenter, "Planned isocenter in patient coordinates of the CT, mm")
+      ->delimiter(',')->expected(3)->type_name("X,Y,Z")->group(lacking);
+  command.add_option("--patient-position", options.patient_position, "How the patient lies on the table")
+      ->check(CLI::IsMember({"HFS", "HFP", "FFS", "FFP", "HFDR", "HFDL", "FFDR", "FFDL"}))->group(lacking);
+  command.add_option("--couch-angle", options.couch_angle_deg, "Patient support angle at imaging, IEC 61217")
+      ->type_name("DEG")->group(lacking);
+  command.add_option("--gantry-angle", options.gantry_angles, "Gantry angle of the image with this label, IEC 61217")
+      ->type_name("LABEL=DEG")->group(lacking);
+  command.add_option("--sad", options.sad_mm, "Source to axis distance")->type_name("MM")->group(lacking);
+  command.add_option("--sid", options.sid_mm, "Source to image plane distance")->type_name("MM")->group(lacking);
+  command.add_option("--rt-image-position", options.rt_image_position, "Center of the first pixel on the receptor, mm")
+      ->delimiter(',')->expected(2)->type_name("X,Y")->group(lacking);
+  command.add_flag("--assume-centered", options.assume_centered, "Images without RT Image Position are centered")
+      ->group(lacking);
+  command.add_option("--intensity", options.intensity,
+                     "Pixel intensity relationship, and its sign for stored values: + higher stored value, more X-ray")
+      ->check(CLI::IsMember({"LIN+", "LIN-", "LOG+", "LOG-"}))->group(lacking);
+  command.add_option("--beam", options.beam, "Beam quality of all images")
+      ->check(CLI::IsMember({"kv", "mv"}))->group(lacking);
+  command.add_option("--allow", options.allow, allow_keys_help())->type_name("KEY=REASON")->group(lacking);
+}
+
+RendererKind RenderingOptions::kind() const {
+  if (renderer == "auto") return RendererKind::kCpu;
+  return renderer_kind_from(renderer).value();
+}
+
+AttenuationModel RenderingOptions::model() const {
+  AttenuationModel model;
+  model.kind = attenuation == "physical" ? AttenuationModel::Kind::kPhysical : AttenuationModel::Kind::kWindowed;
+  model.threshold_hu = threshold_hu;
+  if (!window.empty()) {
+    model.window_low_hu = window[0];
+    model.window_high_hu = window[1];
+  }
+  model.check();
+  return model;
+}
+
+void add_rendering_options(CLI::App& command, RenderingOptions& options) {
+  const char* group = "Rendering";
+  std::vector<std::string> names = {"auto"};
+  for (const RendererKind kind : kRendererKinds) names.emplace_back(to_string(kind));
+  command.add_option("--renderer", options.renderer, "What renders the DRRs; siddon and trilinear are slow references")
+      ->check(CLI::IsMember(names))->capture_default_str()->group(group);
+  command.add_option("--attenuation", options.attenuation, "From HU to attenuation: a physical curve, or the HU window")
+      ->check(CLI::IsMember({"physical", "windowed"}))->capture_default_str()->group(group);
+  command.add_option("--threshold-hu", options.threshold_hu, "Voxels below count as nothing")
+      ->type_name("HU")->capture_default_str()->group(group);
+  command.add_option("--window", options.window, "HU window of --attenuation windowed [-540,1500]")
+      ->delimiter(',')->expected(2)->type_name("LOW,HIGH")->group(group);
+}
+
+LoadedStudy load(const StudyOptions& study_options, const RenderingOptions& rendering, Notes& notes,
+                 Console& console) {
+  const StudyRequest request = study_options.request();
+  const AttenuationModel model = rendering.model();
+  LoadedStudy loaded;
+  {
+    ProgressBar bar(console, "Reading CT");
+    loaded.study = load_study(request, notes, [&](std::size_t done, std::size_t total) { bar.update(done, total); });
+  }
+  std::vector<Beam> beams;
+  for (const XrayImage& xray : loaded.study.xrays)
+    if (std::ranges::find(beams, xray.view.beam) == beams.end()) beams.push_back(xray.view.beam);
+  loaded.renderer = make_renderer(rendering.kind(), loaded.study.ct.hu, model, beams);
+  return loaded;
+}
+
+}  // namespace isoshift

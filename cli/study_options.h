@@ -1,0 +1,48 @@
+#pragma once
+// The flags that name a study's parts, supply what its files lack and allow what checks forbid: the same for every
+// command that reads a study.
+
+#include <CLI/CLI.hpp>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "cli/console.h"
+#include "drr/renderer.h"
+#include "io/study.h"
+
+namespace isoshift {
+
+struct StudyOptions {
+  std::filesystem::path study, plan;
+  std::vector<std::filesystem::path> ct, images;
+  std::vector<double> isocenter, rt_image_position;
+  std::vector<std::string> gantry_angles, allow;
+  std::string patient_position, intensity, beam;
+  std::optional<double> couch_angle_deg, sad_mm, sid_mm;
+  bool assume_centered = false;
+
+  // Throws UsageError for a word that is none of those allowed.
+  StudyRequest request() const;
+};
+void add_study_options(CLI::App& command, StudyOptions& options);
+
+struct RenderingOptions {
+  std::string renderer = "auto";
+  std::string attenuation = "physical";
+  double threshold_hu = AttenuationModel{}.threshold_hu;
+  std::vector<double> window;
+
+  RendererKind kind() const;
+  AttenuationModel model() const;
+};
+void add_rendering_options(CLI::App& command, RenderingOptions& options);
+
+// Loads the study behind a progress bar and makes its renderer.
+struct LoadedStudy {
+  Study study;
+  std::unique_ptr<Renderer> renderer;
+};
+LoadedStudy load(const StudyOptions& study, const RenderingOptions& rendering, Notes& notes, Console& console);
+
+}  // namespace isoshift

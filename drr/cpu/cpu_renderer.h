@@ -1,0 +1,42 @@
+#pragma once
+// What all renderers on the CPU share: poses, views and pixels become rays in voxel coordinates, spread over the cores.
+
+#include <optional>
+#include <vector>
+
+#include "drr/renderer.h"
+
+namespace isoshift {
+
+// A ray in continuous voxel indices; the length of the whole way is kept in mm.
+struct VoxelRay {
+  Eigen::Vector3d source;  // at t = 0
+  Eigen::Vector3d way;     // source + way is the pixel, at t = 1
+  double length_mm = 0.0;
+};
+
+class CpuRenderer : public Renderer {
+ public:
+  RenderResult render(std::span<const XrayView> views, std::span<const Eigen::Isometry3d> room_from_patient,
+                      const PixelSet& pixels) final;
+  std::string device() const final;
+
+ protected:
+  explicit CpuRenderer(const Volume<float>& ct_hu) : voxel_from_patient_(ct_hu.patient_from_voxel.inverse()) {}
+
+  // Line integral of attenuation along one ray; called from many threads.
+  virtual double integrate(const VoxelRay& ray, Beam beam) const = 0;
+
+ private:
+  Eigen::Affine3d voxel_from_patient_;
+  std::vector<float> line_integrals_;
+};
+
+// The part of a ray inside an axis-aligned box, as an interval of t within [0, 1]; nothing where it misses.
+struct RaySegment {
+  double begin;
+  double end;
+};
+std::optional<RaySegment> clip_to_box(const VoxelRay& ray, const Eigen::Vector3d& low, const Eigen::Vector3d& high);
+
+}  // namespace isoshift

@@ -1,0 +1,24 @@
+#include "drr/cpu/siddon.h"
+
+#include "drr/cpu/cell_walk.h"
+
+namespace isoshift {
+
+SiddonRenderer::SiddonRenderer(const Volume<float>& ct_hu, const AttenuationModel& model, std::span<const Beam> beams)
+    : CpuRenderer(ct_hu) {
+  for (const Beam beam : beams) attenuation_per_mm_.emplace(beam, attenuation_volume(ct_hu, model, beam));
+}
+
+double SiddonRenderer::integrate(const VoxelRay& ray, Beam beam) const {
+  const Volume<float>& volume = attenuation_per_mm_.at(beam);
+  // Voxel i covers [i - 1/2, i + 1/2] around its center.
+  VoxelRay cell_ray = ray;
+  cell_ray.source.array() += 0.5;
+  double sum = 0.0;
+  walk_cells(cell_ray, volume.size, [&](const Eigen::Vector3i& cell, double begin, double end) {
+    sum += volume.at(cell.x(), cell.y(), cell.z()) * (end - begin);
+  });
+  return sum * ray.length_mm;
+}
+
+}  // namespace isoshift

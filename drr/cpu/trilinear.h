@@ -1,0 +1,24 @@
+#pragma once
+// The oracle of trilinear interpolation: exact line integrals, in double. Between eight neighboring voxel centers the
+// interpolated value along a straight line is a cubic polynomial, which two Gauss-Legendre points integrate exactly: no
+// step size, no step error. Outside the outermost voxel centers the value falls linearly to 0 one voxel further out, as
+// a texture with a border of zeros does, so that the volume's total attenuation equals that of the Siddon oracle.
+
+#include <map>
+
+#include "drr/cpu/cpu_renderer.h"
+
+namespace isoshift {
+
+class TrilinearRenderer final : public CpuRenderer {
+ public:
+  TrilinearRenderer(const Volume<float>& ct_hu, const AttenuationModel& model, std::span<const Beam> beams);
+  RendererKind kind() const override { return RendererKind::kTrilinear; }
+
+ private:
+  double integrate(const VoxelRay& ray, Beam beam) const override;
+
+  std::map<Beam, Volume<float>> attenuation_per_mm_;
+};
+
+}  // namespace isoshift

@@ -1,0 +1,40 @@
+#include "drr/renderer.h"
+
+#include "drr/cpu/raycast.h"
+#include "drr/cpu/siddon.h"
+#include "drr/cpu/trilinear.h"
+
+namespace isoshift {
+
+std::string_view to_string(RendererKind kind) {
+  switch (kind) {
+    case RendererKind::kSiddon: return "siddon";
+    case RendererKind::kTrilinear: return "trilinear";
+    case RendererKind::kCpu: return "cpu";
+  }
+  return "";
+}
+
+std::optional<RendererKind> renderer_kind_from(std::string_view name) {
+  for (const RendererKind kind : kRendererKinds)
+    if (to_string(kind) == name) return kind;
+  return std::nullopt;
+}
+
+std::size_t PixelSet::count(std::span<const XrayView> views, std::size_t view) const {
+  if (!of_view.empty()) return of_view[view].size();
+  return static_cast<std::size_t>(views[view].columns) * views[view].rows;
+}
+
+std::unique_ptr<Renderer> make_renderer(RendererKind kind, const Volume<float>& ct_hu, const AttenuationModel& model,
+                                        std::span<const Beam> beams) {
+  model.check();
+  switch (kind) {
+    case RendererKind::kSiddon: return std::make_unique<SiddonRenderer>(ct_hu, model, beams);
+    case RendererKind::kTrilinear: return std::make_unique<TrilinearRenderer>(ct_hu, model, beams);
+    case RendererKind::kCpu: return std::make_unique<RaycastRenderer>(ct_hu, model, beams);
+  }
+  return nullptr;
+}
+
+}  // namespace isoshift

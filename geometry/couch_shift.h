@@ -1,0 +1,27 @@
+#pragma once
+// From the setup error to the couch motion that undoes it. One sign rule: docs/conventions.md.
+
+#include <Eigen/Geometry>
+
+#include "geometry/patient_setup.h"
+#include "geometry/rotation.h"
+
+namespace isoshift {
+
+// Where the patient is: anatomy planned at x (mm from the isocenter, IEC 61217 fixed) is found at setup_error * x.
+Eigen::Isometry3d setup_error_from_poses(const Eigen::Isometry3d& planned_room_from_patient,
+                                         const Eigen::Isometry3d& actual_room_from_patient);
+
+// What the couch must do about it: translate, then rotate about the isocenter. IEC 61217 table-top axes at imaging:
+// lateral + to the viewer's right facing the gantry, longitudinal + toward the gantry, vertical + up.
+struct CouchShift {
+  Eigen::Vector3d translation_mm = Eigen::Vector3d::Zero();  // lateral, longitudinal, vertical
+  ZxyAngles change;  // yaw (z), pitch (x), roll (y): target angles minus the read-outs at imaging
+  ZxyAngles target;  // the resulting IEC table angles, each within (-pi, pi]
+};
+
+// The shift that undoes `setup_error` for a table standing at `table` at imaging. The target angles come from
+// R_new = R^T Rz Rx Ry: negated angles would leave an error of second order, since rotations do not commute.
+CouchShift couch_shift_for(const Eigen::Isometry3d& setup_error, const TableAngles& table);
+
+}  // namespace isoshift

@@ -1,0 +1,31 @@
+#pragma once
+// Right-handed rotations and the one angle order of isoshift, Rz * Rx * Ry (IEC 61217 table: support, pitch, roll).
+
+#include <Eigen/Core>
+#include <numbers>
+
+namespace isoshift {
+
+constexpr double rad_from_deg(double deg) { return deg * std::numbers::pi / 180.0; }
+constexpr double deg_from_rad(double rad) { return rad * 180.0 / std::numbers::pi; }
+
+// The same angle in (-pi, pi].
+double wrapped_rad(double angle_rad);
+
+Eigen::Matrix3d rotation_x(double angle_rad);
+Eigen::Matrix3d rotation_y(double angle_rad);
+Eigen::Matrix3d rotation_z(double angle_rad);
+
+// Angles of R = Rz(z_rad) * Rx(x_rad) * Ry(y_rad). For a couch: z is yaw, x is pitch, y is roll.
+struct ZxyAngles {
+  double z_rad = 0.0;
+  double x_rad = 0.0;
+  double y_rad = 0.0;
+};
+
+Eigen::Matrix3d rotation_from_zxy(const ZxyAngles& angles);
+
+// The inverse of rotation_from_zxy(): x within [-pi/2, pi/2], z and y within (-pi, pi].
+ZxyAngles zxy_from_rotation(const Eigen::Matrix3d& rotation);
+
+}  // namespace isoshift

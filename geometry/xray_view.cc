@@ -1,0 +1,61 @@
+#include "geometry/xray_view.h"
+
+#include "geometry/rotation.h"
+
+namespace isoshift {
+
+std::optional<Eigen::Vector2d> XrayView::project(const Eigen::Vector3d& point_room_mm) const {
+  const Eigen::Vector3d h = pixel_from_room * point_room_mm.homogeneous();
+  if (h.z() <= 0.0) return std::nullopt;
+  return Eigen::Vector2d(h.hnormalized());
+}
+
+Ray XrayView::ray(double column, double row) const {
+  // By its scaling, the matrix maps a receptor point to (column, row, 1) exactly.
+  const Eigen::Vector3d pixel_from_source =
+      pixel_from_room.leftCols<3>().partialPivLu().solve(Eigen::Vector3d(column, row, 1.0));
+  return {.source_room_mm = source_room_mm, .pixel_room_mm = source_room_mm + pixel_from_source};
+}
+
+XrayView XrayView::downscaled(int factor) const {
+  Eigen::Matrix3d block_from_pixel = Eigen::Matrix3d::Identity();
+  block_from_pixel.diagonal().head<2>().setConstant(1.0 / factor);
+  block_from_pixel.col(2).head<2>().setConstant(-0.5 * (factor - 1) / factor);
+  XrayView view = *this;
+  view.pixel_from_room = block_from_pixel * pixel_from_room;
+  view.columns = columns / factor;
+  view.rows = rows / factor;
+  return view;
+}
+
+XrayView make_xray_view(const CarmGeometry& geometry, Beam beam) {
+  const Eigen::Vector3d& u = geometry.row_direction;
+  const Eigen::Vector3d& v = geometry.column_direction;
+  // The position of a tilted plane is given before its tilt (PS3.3 C.8.8.2.7): turn it with the plane.
+  Eigen::Vector3d first_pixel_receptor(geometry.position_mm.x(), geometry.position_mm.y(), 0.0);
+  if (!geometry.normal_plane) {
+    Eigen::Matrix3d tilt;
+    tilt << u, -v, u.cross(-v);
+    first_pixel_receptor = tilt * first_pixel_receptor;
+  }
+
+  // Pixel (c, r) lies at c U + r V + O in gantry coordinates, the source at (0, 0, SAD).
+  const Eigen::Matrix3d gantry_from_receptor_axes = rotation_z(geometry.receptor_angle_rad);
+  const Eigen::Vector3d source_gantry(0.0, 0.0, geometry.sad_mm);
+  Eigen::Matrix3d gantry_from_pixel;
+  gantry_from_pixel << gantry_from_receptor_axes * u * geometry.column_spacing_mm,
+      gantry_from_receptor_axes * v * geometry.row_spacing_mm,
+      gantry_from_receptor_axes * first_pixel_receptor + geometry.receptor_translation_mm - source_gantry;
+
+  const Eigen::Matrix3d room_from_gantry = rotation_y(geometry.gantry_angle_rad);
+  XrayView view;
+  view.source_room_mm = room_from_gantry * source_gantry;
+  view.pixel_from_room.leftCols<3>() = gantry_from_pixel.inverse() * room_from_gantry.transpose();
+  view.pixel_from_room.col(3) = -view.pixel_from_room.leftCols<3>() * view.source_room_mm;
+  view.columns = geometry.columns;
+  view.rows = geometry.rows;
+  view.beam = beam;
+  return view;
+}
+
+}  // namespace isoshift

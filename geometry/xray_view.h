@@ -1,0 +1,58 @@
+#pragma once
+// One X-ray exposure as a pinhole camera in room coordinates.
+
+#include <Eigen/Geometry>
+#include <optional>
+
+namespace isoshift {
+
+// Radiation quality; it chooses the attenuation curve of the DRR (docs/algorithms.md).
+enum class Beam { kKilovoltage, kMegavoltage };
+
+// From the source to the center of a pixel on the receptor, both in mm in the room.
+struct Ray {
+  Eigen::Vector3d source_room_mm;
+  Eigen::Vector3d pixel_room_mm;
+};
+
+// The camera of one X-ray image. Pixel centers lie at integer (column, row). The matrix is scaled so that the third
+// homogeneous coordinate is the fraction of the way from source to receptor plane (0 source, 1 receptor).
+struct XrayView {
+  Eigen::Matrix<double, 3, 4> pixel_from_room = Eigen::Matrix<double, 3, 4>::Zero();
+  Eigen::Vector3d source_room_mm = Eigen::Vector3d::Zero();
+  int columns = 0;
+  int rows = 0;
+  Beam beam = Beam::kKilovoltage;
+
+  // (column, row) of a room point; nothing for a point at or behind the source.
+  std::optional<Eigen::Vector2d> project(const Eigen::Vector3d& point_room_mm) const;
+
+  // The ray that project() maps to (column, row).
+  Ray ray(double column, double row) const;
+
+  // Unit vector from the source through the isocenter (the origin of the room).
+  Eigen::Vector3d central_direction_room() const { return -source_room_mm.normalized(); }
+
+  // The same receptor read out in blocks of factor x factor pixels; an incomplete last block is dropped.
+  XrayView downscaled(int factor) const;
+};
+
+// A linac's imager in the attributes of an RT Image (PS3.3 C.8.8.2), angles in radians, lengths in mm.
+struct CarmGeometry {
+  double sad_mm = 0.0;                                                 // RadiationMachineSAD
+  double gantry_angle_rad = 0.0;                                       // GantryAngle, about fixed y
+  Eigen::Vector3d receptor_translation_mm = Eigen::Vector3d::Zero();   // XRayImageReceptorTranslation, IEC gantry
+  double receptor_angle_rad = 0.0;                                     // XRayImageReceptorAngle, about receptor z
+  Eigen::Vector3d row_direction = Eigen::Vector3d::UnitX();            // RTImageOrientation, first three
+  Eigen::Vector3d column_direction = -Eigen::Vector3d::UnitY();        // RTImageOrientation, last three
+  bool normal_plane = true;                                            // RTImagePlane is NORMAL
+  double column_spacing_mm = 0.0;                                      // ImagePlanePixelSpacing, second value
+  double row_spacing_mm = 0.0;                                         // ImagePlanePixelSpacing, first value
+  Eigen::Vector2d position_mm = Eigen::Vector2d::Zero();               // RTImagePosition: center of the first pixel
+  int columns = 0;
+  int rows = 0;
+};
+
+XrayView make_xray_view(const CarmGeometry& geometry, Beam beam);
+
+}  // namespace isoshift

@@ -1,0 +1,93 @@
+#pragma once
+// DICOM files behind a small interface: the only place of isoshift that sees OFCondition. Every failure becomes an Error
+// that names the file, the attribute by keyword and tag, and what was found.
+
+#include <dcmtk/config/osconfig.h>
+#include <dcmtk/dcmdata/dcdeftag.h>
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+class DcmFileFormat;
+class DcmItem;
+
+namespace isoshift {
+
+// "RTImageSID (3002,0026)".
+std::string described(const DcmTagKey& tag);
+
+// A dataset or an item of a sequence: borrowed from the DicomFile it came from.
+class DicomItem {
+ public:
+  DicomItem(DcmItem& item, std::string where) : item_(&item), where_(std::move(where)) {}
+
+  // The file, and for an item its sequence, as a message names it.
+  const std::string& where() const { return where_; }
+
+  // Reading. Absent and empty are the same: nothing. Values lose their padding; text is UTF-8 where convertible.
+  bool has_value(const DcmTagKey& tag) const;
+  std::optional<std::string> text(const DcmTagKey& tag) const;
+  std::vector<std::string> texts(const DcmTagKey& tag) const;
+  std::optional<double> number(const DcmTagKey& tag) const;
+  std::vector<double> numbers(const DcmTagKey& tag) const;
+  std::vector<DicomItem> items(const DcmTagKey& sequence) const;
+
+  // The same for what must be there; `count` numbers, all finite.
+  std::string required_text(const DcmTagKey& tag) const;
+  double required_number(const DcmTagKey& tag) const;
+  std::vector<double> required_numbers(const DcmTagKey& tag, std::size_t count) const;
+
+  // Writing. The VR comes from the data dictionary; DS values are shortened to 16 bytes, never cut (ds_from).
+  void put(const DcmTagKey& tag, std::string_view text);
+  void put(const DcmTagKey& tag, std::span<const double> numbers);
+  void put(const DcmTagKey& tag, double number) { put(tag, std::span(&number, 1)); }
+  void put_pixels(std::span<const std::uint16_t> stored_values);
+  DicomItem append_item(const DcmTagKey& sequence);
+  void put_empty_sequence(const DcmTagKey& sequence);
+  void erase(const DcmTagKey& tag);
+
+  DcmItem& dcmtk() const { return *item_; }
+
+ private:
+  DcmItem* item_;
+  std::string where_;
+};
+
+class DicomFile {
+ public:
+  enum class Extent { kHeader, kWhole };  // kHeader stops before the pixel data
+
+  DicomFile();  // a new, empty object
+  static DicomFile read(const std::filesystem::path& path, Extent extent);
+  DicomFile(DicomFile&&) noexcept;
+  DicomFile& operator=(DicomFile&&) noexcept;
+  ~DicomFile();
+
+  const std::filesystem::path& path() const { return path_; }
+  DicomItem dataset() const;
+
+  // Explicit little endian, flushed to the disk. The file must not exist.
+  void write(const std::filesystem::path& path);
+
+ private:
+  std::unique_ptr<DcmFileFormat> file_;
+  std::filesystem::path path_;
+};
+
+// Whether the file begins like a DICOM file (PS3.10): 128 bytes, then "DICM". Throws Error if it cannot be read.
+bool has_dicom_magic(const std::filesystem::path& path);
+
+// A DS value: at most 16 bytes, the nearest decimal that fits, 0 for what is smaller than 1e-12.
+std::string ds_from(double number);
+
+// A UID "2.25.<UUID>" (PS3.5 B.2) from 16 random bytes.
+std::string uid_from_random_bytes(std::array<std::uint8_t, 16> bytes);
+std::string new_uid();
+
+}  // namespace isoshift

@@ -1,0 +1,43 @@
+#pragma once
+// What a run must tell its user beside the result: warnings, and overrides of what a file lacks or a check forbids.
+
+#include <map>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace isoshift {
+
+struct Notes {
+  std::vector<std::string> warnings;
+  std::vector<std::string> overrides;
+};
+
+// What a person allows although a check forbids it: key (kAllowKeys) to reason, from --allow KEY=REASON.
+using Allowances = std::map<std::string, std::string, std::less<>>;
+
+struct AllowKey {
+  std::string_view key;
+  std::string_view meaning;
+};
+inline constexpr AllowKey kAllowKeys[] = {
+    {"patient-mismatch", "inputs of different patients"},
+    {"for-mismatch", "plan and CT in different frames of reference"},
+    {"plan-mismatch", "an X-ray that refers to another plan"},
+    {"planned-geometry", "angles that are planned or typed in, not measured (ReportedValuesOrigin)"},
+    {"gaps", "a CT with missing slices or uneven spacing, interpolated"},
+    {"drr", "an RT Image that is itself a DRR"},
+    {"time-span", "views more than 10 minutes apart"},
+    {"table-moved", "a table that moved between the views"},
+};
+
+// A check that failed. Where its key is allowed it becomes an override, else it must stop the run.
+struct Finding {
+  std::string_view key;
+  std::string message;
+};
+
+// Moves allowed findings to notes.overrides; throws one Error with all the others, each naming its --allow switch.
+void settle(const std::vector<Finding>& findings, const Allowances& allowed, Notes& notes);
+
+}  // namespace isoshift

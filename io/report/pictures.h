@@ -1,0 +1,31 @@
+#pragma once
+// Pictures a person judges a registration by.
+
+#include <filesystem>
+#include <optional>
+#include <span>
+#include <string>
+
+#include "geometry/image.h"
+#include "geometry/xray_view.h"
+
+namespace isoshift {
+
+// One view before and after: X-ray, DRR at the planned pose, DRR at the pose found, all as line integrals of the same
+// size.
+struct ViewComparison {
+  std::string label;
+  const Image<float>& xray;
+  const Image<float>& drr_planned;
+  const Image<float>& drr_found;
+  Eigen::Vector2d isocenter_px;
+};
+
+// Two rows (planned, found) of X-ray, DRR and their overlay: X-ray magenta, DRR green, so that what matches is gray, for
+// color-blind eyes too. The cross marks the isocenter.
+void write_comparison_png(const std::filesystem::path& path, const ViewComparison& comparison);
+
+// One image of line integrals as radiographs are looked at: dense is bright.
+void write_line_integral_png(const std::filesystem::path& path, const Image<float>& line_integral);
+
+}  // namespace isoshift

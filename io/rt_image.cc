@@ -1,0 +1,308 @@
+#include "io/rt_image.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "geometry/error.h"
+#include "io/decode.h"
+
+namespace isoshift {
+namespace {
+
+constexpr double kMaxAngleNoiseDeg = 0.01;  // read-outs such as 359.998 mean 0
+
+// The value of the single exposure where it has one, else the top level's.
+std::optional<double> exposure_number(const DicomItem& dataset, const DcmTagKey& tag) {
+  const std::vector<DicomItem> exposures = dataset.items(DCM_ExposureSequence);
+  if (exposures.size() == 1)
+    if (const auto value = exposures.front().number(tag)) return value;
+  return dataset.number(tag);
+}
+
+template <int N>
+std::optional<Eigen::Matrix<double, N, 1>> vector_of(const DicomItem& dataset, const DcmTagKey& tag) {
+  if (!dataset.has_value(tag)) return std::nullopt;
+  return Eigen::Matrix<double, N, 1>(dataset.required_numbers(tag, N).data());
+}
+
+// (lateral, longitudinal, vertical) where all three are there.
+std::optional<Eigen::Vector3d> table_position(const DicomItem& dataset) {
+  const auto lateral = exposure_number(dataset, DCM_TableTopLateralPosition);
+  const auto longitudinal = exposure_number(dataset, DCM_TableTopLongitudinalPosition);
+  const auto vertical = exposure_number(dataset, DCM_TableTopVerticalPosition);
+  if (!lateral || !longitudinal || !vertical) return std::nullopt;
+  return Eigen::Vector3d(*lateral, *longitudinal, *vertical);
+}
+
+void expect_range(const RtImage& image, const DcmTagKey& tag, double value, double low, double high) {
+  if (!(value > low && value < high))
+    throw Error(fmt::format("{}: {} is {}, expected between {} and {}", image.path.string(), described(tag), value, low,
+                            high));
+}
+
+template <class T>
+void replace(std::optional<T>& value, const T& by, const std::string& what, const std::string& switch_name,
+             Notes& notes) {
+  notes.overrides.push_back(
+      fmt::format("{}: {} by {}", what, value ? "replaced" : "supplied", switch_name));
+  value = by;
+}
+
+}  // namespace
+
+std::optional<PixelIntensity> pixel_intensity_from(std::string_view word) {
+  using enum PixelIntensity::Relationship;
+  if (word == "LIN+") return PixelIntensity{kLin, 1};
+  if (word == "LIN-") return PixelIntensity{kLin, -1};
+  if (word == "LOG+") return PixelIntensity{kLog, 1};
+  if (word == "LOG-") return PixelIntensity{kLog, -1};
+  return std::nullopt;
+}
+
+std::string to_string(const PixelIntensity& intensity) {
+  return fmt::format("{}{}", intensity.relationship == PixelIntensity::Relationship::kLin ? "LIN" : "LOG",
+                     intensity.sign > 0 ? '+' : '-');
+}
+
+RtImage read_rt_image_header(const std::filesystem::path& path) {
+  const DicomFile file = DicomFile::read(path, DicomFile::Extent::kHeader);
+  const DicomItem d = file.dataset();
+  RtImage image;
+  image.path = path;
+  image.identity = read_identity(d);
+  image.sop_class_uid = d.required_text(DCM_SOPClassUID);
+  image.sop_instance_uid = d.required_text(DCM_SOPInstanceUID);
+  image.series_instance_uid = d.text(DCM_SeriesInstanceUID).value_or("");
+  image.frame_of_reference_uid = d.text(DCM_FrameOfReferenceUID);
+  image.label = d.text(DCM_RTImageLabel).value_or(path.stem().string());
+  if (const auto type = d.texts(DCM_ImageType); type.size() > 2) image.image_type = type[2];
+  image.reported_values_origin = d.text(DCM_ReportedValuesOrigin);
+  image.patient_position = d.text(DCM_PatientPosition);
+  for (const DicomItem& plan : d.items(DCM_ReferencedRTPlanSequence))
+    image.plan_sop_instance_uid = plan.text(DCM_ReferencedSOPInstanceUID);
+  if (const auto number = d.number(DCM_ReferencedBeamNumber)) image.beam_number = static_cast<int>(*number);
+  image.acquisition_date = d.text(DCM_AcquisitionDate);
+  if (!image.acquisition_date) image.acquisition_date = d.text(DCM_ContentDate);
+  image.acquisition_time = d.text(DCM_AcquisitionTime);
+  if (!image.acquisition_time) image.acquisition_time = d.text(DCM_ContentTime);
+  image.kvp = exposure_number(d, DCM_KVP);
+
+  image.plane = d.text(DCM_RTImagePlane);
+  image.sad_mm = d.number(DCM_RadiationMachineSAD);
+  image.sid_mm = d.number(DCM_RTImageSID);
+  image.receptor_translation_mm = vector_of<3>(d, DCM_XRayImageReceptorTranslation);
+  image.receptor_angle_deg = d.number(DCM_XRayImageReceptorAngle);
+  if (d.has_value(DCM_RTImageOrientation)) image.orientation = d.required_numbers(DCM_RTImageOrientation, 6);
+  image.pixel_spacing_mm = vector_of<2>(d, DCM_ImagePlanePixelSpacing);
+  image.position_mm = vector_of<2>(d, DCM_RTImagePosition);
+  image.gantry_angle_deg = exposure_number(d, DCM_GantryAngle);
+  image.gantry_pitch_angle_deg = exposure_number(d, DCM_GantryPitchAngle);
+  image.collimator_angle_deg = exposure_number(d, DCM_BeamLimitingDeviceAngle);
+  image.support_angle_deg = exposure_number(d, DCM_PatientSupportAngle);
+  image.eccentric_angle_deg = exposure_number(d, DCM_TableTopEccentricAngle);
+  image.table_pitch_deg = exposure_number(d, DCM_TableTopPitchAngle);
+  image.table_roll_deg = exposure_number(d, DCM_TableTopRollAngle);
+  image.table_position_mm = table_position(d);
+  image.isocenter_mm = vector_of<3>(d, DCM_IsocenterPosition);
+
+  const PixelFormat format = pixel_format(d);
+  image.columns = format.columns;
+  image.rows = format.rows;
+  image.intensity_relationship = d.text(DCM_PixelIntensityRelationship);
+  if (const auto sign = d.number(DCM_PixelIntensityRelationshipSign); sign && (*sign == 1 || *sign == -1))
+    image.intensity_sign = static_cast<int>(*sign);
+  image.photometric_interpretation = d.text(DCM_PhotometricInterpretation).value_or("");
+  return image;
+}
+
+RtImage with_switches(RtImage image, const RtImageSwitches& switches, Notes& notes) {
+  const auto named = [&](const DcmTagKey& tag) { return fmt::format("{}: {}", image.label, described(tag)); };
+  if (const auto angle = switches.gantry_angle_deg.find(image.label); angle != switches.gantry_angle_deg.end())
+    replace(image.gantry_angle_deg, angle->second, named(DCM_GantryAngle),
+            fmt::format("--gantry-angle {}={}", image.label, angle->second), notes);
+  if (switches.couch_angle_deg)
+    replace(image.support_angle_deg, *switches.couch_angle_deg, named(DCM_PatientSupportAngle),
+            fmt::format("--couch-angle {}", *switches.couch_angle_deg), notes);
+  if (switches.sad_mm)
+    replace(image.sad_mm, *switches.sad_mm, named(DCM_RadiationMachineSAD), fmt::format("--sad {}", *switches.sad_mm),
+            notes);
+  if (switches.sid_mm)
+    replace(image.sid_mm, *switches.sid_mm, named(DCM_RTImageSID), fmt::format("--sid {}", *switches.sid_mm), notes);
+  if (switches.position_mm)
+    replace(image.position_mm, *switches.position_mm, named(DCM_RTImagePosition),
+            fmt::format("--rt-image-position {},{}", switches.position_mm->x(), switches.position_mm->y()), notes);
+  if (switches.assume_centered && !image.position_mm && image.pixel_spacing_mm)
+    replace(image.position_mm,
+            Eigen::Vector2d(-0.5 * (image.columns - 1) * image.pixel_spacing_mm->y(),
+                            0.5 * (image.rows - 1) * image.pixel_spacing_mm->x()),
+            named(DCM_RTImagePosition), "--assume-centered", notes);
+  if (switches.intensity) {
+    const bool is_linear = switches.intensity->relationship == PixelIntensity::Relationship::kLin;
+    replace(image.intensity_relationship, std::string(is_linear ? "LIN" : "LOG"),
+            named(DCM_PixelIntensityRelationship), fmt::format("--intensity {}", to_string(*switches.intensity)), notes);
+    image.intensity_sign = switches.intensity->sign;
+  }
+  if (switches.beam) {
+    const bool is_kv = *switches.beam == Beam::kKilovoltage;
+    replace(image.kvp, is_kv ? 100.0 : 6000.0, named(DCM_KVP), fmt::format("--beam {}", is_kv ? "kv" : "mv"), notes);
+  }
+  if (switches.patient_position)
+    replace(image.patient_position, std::string(to_string(*switches.patient_position)), named(DCM_PatientPosition),
+            fmt::format("--patient-position {}", to_string(*switches.patient_position)), notes);
+  return image;
+}
+
+std::vector<MissingAttribute> missing_attributes(const RtImage& image) {
+  std::vector<MissingAttribute> missing;
+  const auto need = [&](bool there, const DcmTagKey& tag, std::string supplied_by) {
+    if (!there) missing.push_back({tag, std::move(supplied_by)});
+  };
+  need(image.plane.has_value(), DCM_RTImagePlane, "");
+  need(image.pixel_spacing_mm.has_value(), DCM_ImagePlanePixelSpacing, "");
+  need(image.position_mm.has_value(), DCM_RTImagePosition, "--rt-image-position X,Y or --assume-centered");
+  need(image.sad_mm.has_value(), DCM_RadiationMachineSAD, "--sad MM");
+  need(image.sid_mm.has_value(), DCM_RTImageSID, "--sid MM");
+  need(image.gantry_angle_deg.has_value(), DCM_GantryAngle, fmt::format("--gantry-angle {}=DEG", image.label));
+  need(image.support_angle_deg.has_value(), DCM_PatientSupportAngle, "--couch-angle DEG");
+  need(image.patient_position.has_value(), DCM_PatientPosition, "--patient-position HFS");
+  const bool known = image.intensity_relationship == "LIN" || image.intensity_relationship == "LOG";
+  need(known, DCM_PixelIntensityRelationship, "--intensity LIN+|LIN-|LOG+|LOG-");
+  need(!known || image.intensity_sign.has_value(), DCM_PixelIntensityRelationshipSign,
+       "--intensity LIN+|LIN-|LOG+|LOG-");
+  return missing;
+}
+
+std::vector<Finding> rt_image_findings(const RtImage& image) {
+  const std::string where = image.path.string();
+  std::vector<Finding> findings;
+  if (image.image_type == "DRR")
+    findings.push_back({"drr", fmt::format("{}: {} says DRR: this is no X-ray", where, described(DCM_ImageType))});
+  else if (image.image_type != "PORTAL" && image.image_type != "SIMULATOR" && image.image_type != "RADIOGRAPH")
+    throw Error(fmt::format("{}: {} says \"{}\", expected PORTAL, SIMULATOR or RADIOGRAPH as its third value", where,
+                            described(DCM_ImageType), image.image_type));
+  if (image.reported_values_origin && *image.reported_values_origin != "ACTUAL")
+    findings.push_back({"planned-geometry",
+                        fmt::format("{}: {} says {}: its angles were not measured", where,
+                                    described(DCM_ReportedValuesOrigin), *image.reported_values_origin)});
+  if (std::abs(wrapped_rad(rad_from_deg(image.gantry_pitch_angle_deg.value_or(0.0)))) > rad_from_deg(kMaxAngleNoiseDeg))
+    throw Error(fmt::format("{}: {} is {} degrees; a tilted gantry is not supported, since the order of its rotations is "
+                            "not defined",
+                            where, described(DCM_GantryPitchAngle), *image.gantry_pitch_angle_deg));
+  if (image.patient_position && !patient_position_from(*image.patient_position))
+    throw Error(fmt::format("{}: {} is {}; expected HFS, HFP, FFS, FFP, HFDR, HFDL, FFDR or FFDL", where,
+                            described(DCM_PatientPosition), *image.patient_position));
+  return findings;
+}
+
+Beam beam_of(const RtImage& image, Notes& notes) {
+  if (image.kvp) return *image.kvp > 1000.0 ? Beam::kMegavoltage : Beam::kKilovoltage;
+  const bool is_portal = image.image_type == "PORTAL";
+  notes.warnings.push_back(fmt::format("{}: {} is missing; taken as {} from image type {} (--beam kv|mv replaces it)",
+                                       image.label, described(DCM_KVP), is_portal ? "MV" : "kV", image.image_type));
+  return is_portal ? Beam::kMegavoltage : Beam::kKilovoltage;
+}
+
+TableAngles table_angles(const RtImage& image, Notes& notes) {
+  const auto angle = [&](const std::optional<double>& value_deg, const DcmTagKey& tag) {
+    if (!value_deg)
+      notes.warnings.push_back(fmt::format("{}: {} is missing, taken as 0", image.label, described(tag)));
+    return wrapped_rad(rad_from_deg(value_deg.value_or(0.0)));
+  };
+  TableAngles table;
+  table.support_rad = angle(image.support_angle_deg, DCM_PatientSupportAngle);
+  table.pitch_rad = angle(image.table_pitch_deg, DCM_TableTopPitchAngle);
+  table.roll_rad = angle(image.table_roll_deg, DCM_TableTopRollAngle);
+  table.eccentric_rad = wrapped_rad(rad_from_deg(image.eccentric_angle_deg.value_or(0.0)));
+  if (std::abs(table.eccentric_rad) > rad_from_deg(kMaxAngleNoiseDeg))
+    notes.warnings.push_back(fmt::format("{}: {} is {} degrees and was added to the couch angle", image.label,
+                                         described(DCM_TableTopEccentricAngle), *image.eccentric_angle_deg));
+  return table;
+}
+
+CarmGeometry carm_geometry(const RtImage& image, Notes& notes) {
+  const std::string where = image.path.string();
+  CarmGeometry geometry;
+  geometry.sad_mm = image.sad_mm.value();
+  const double sid_mm = image.sid_mm.value();
+  expect_range(image, DCM_RadiationMachineSAD, geometry.sad_mm, 0.0, 5000.0);
+  expect_range(image, DCM_RTImageSID, sid_mm, geometry.sad_mm / 2.0, 5000.0);
+  geometry.gantry_angle_rad = rad_from_deg(image.gantry_angle_deg.value());
+
+  geometry.receptor_translation_mm = Eigen::Vector3d(0.0, 0.0, geometry.sad_mm - sid_mm);
+  if (image.receptor_translation_mm) {
+    geometry.receptor_translation_mm = *image.receptor_translation_mm;
+    if (std::abs(geometry.receptor_translation_mm.z() - (geometry.sad_mm - sid_mm)) > 0.5)
+      throw Error(fmt::format("{}: {} has z = {} mm, expected SAD - SID = {} mm", where,
+                              described(DCM_XRayImageReceptorTranslation), geometry.receptor_translation_mm.z(),
+                              geometry.sad_mm - sid_mm));
+  } else {
+    notes.warnings.push_back(fmt::format("{}: {} is missing, taken as (0, 0, SAD - SID)", image.label,
+                                         described(DCM_XRayImageReceptorTranslation)));
+  }
+  if (sid_mm == geometry.sad_mm)
+    notes.warnings.push_back(fmt::format("{}: {} equals the SAD; its true value may be unknown", image.label,
+                                         described(DCM_RTImageSID)));
+  if (!image.receptor_angle_deg)
+    notes.warnings.push_back(
+        fmt::format("{}: {} is missing, taken as 0", image.label, described(DCM_XRayImageReceptorAngle)));
+  geometry.receptor_angle_rad = rad_from_deg(image.receptor_angle_deg.value_or(0.0));
+
+  geometry.normal_plane = image.plane == "NORMAL";
+  if (!geometry.normal_plane)
+    throw Error(fmt::format("{}: {} is {}; only NORMAL is read by this version", where, described(DCM_RTImagePlane),
+                            *image.plane));
+  if (image.orientation) {
+    geometry.row_direction = Eigen::Vector3d(image.orientation->data());
+    geometry.column_direction = Eigen::Vector3d(image.orientation->data() + 3);
+    const bool is_orthonormal = std::abs(geometry.row_direction.norm() - 1.0) < 1e-4 &&
+                                std::abs(geometry.column_direction.norm() - 1.0) < 1e-4 &&
+                                std::abs(geometry.row_direction.dot(geometry.column_direction)) < 1e-4;
+    const bool is_flat =
+        std::abs(geometry.row_direction.z()) < 1e-4 && std::abs(geometry.column_direction.z()) < 1e-4;
+    if (!is_orthonormal || !is_flat)
+      throw Error(fmt::format("{}: {} is not a pair of perpendicular unit vectors in the receptor's plane, as {} NORMAL "
+                              "needs",
+                              where, described(DCM_RTImageOrientation), described(DCM_RTImagePlane)));
+  }
+  geometry.row_spacing_mm = image.pixel_spacing_mm->x();
+  geometry.column_spacing_mm = image.pixel_spacing_mm->y();
+  for (const double spacing_mm : {geometry.row_spacing_mm, geometry.column_spacing_mm})
+    expect_range(image, DCM_ImagePlanePixelSpacing, spacing_mm, 0.05, 6.0);
+  geometry.position_mm = *image.position_mm;
+  geometry.columns = image.columns;
+  geometry.rows = image.rows;
+  return geometry;
+}
+
+XrayImage read_xray_image(const RtImage& image, Beam beam, const CarmGeometry& geometry) {
+  DicomFile file = DicomFile::read(image.path, DicomFile::Extent::kWhole);
+  const PixelFormat format = pixel_format(file.dataset());
+  const std::vector<std::int32_t> stored_values = decode_pixels(file, format);
+  const double slope = file.dataset().number(DCM_RescaleSlope).value_or(1.0);
+  const double intercept = file.dataset().number(DCM_RescaleIntercept).value_or(0.0);
+  if (slope == 0.0) throw Error(fmt::format("{}: {} is 0", image.path.string(), described(DCM_RescaleSlope)));
+
+  XrayImage xray;
+  xray.label = image.label;
+  xray.view = make_xray_view(geometry, beam);
+  xray.values = Image<float>(format.columns, format.rows);
+  xray.collimator_angle_rad = rad_from_deg(image.collimator_angle_deg.value_or(0.0));
+  const bool is_linear = image.intensity_relationship == "LIN";
+  xray.meaning = is_linear ? XrayImage::Meaning::kIntensity : XrayImage::Meaning::kLineIntegral;
+
+  // The sign speaks of stored values (C.8.11.3.1.2). Where rescaled values rise with the intensity they are it (LIN) or
+  // its logarithm (LOG). Where they fall, LIN counts from the value that stands for no intensity, the largest or
+  // smallest one that can be stored.
+  const bool rises = *image.intensity_sign * slope > 0.0;
+  const double dark = *image.intensity_sign > 0 ? 0.0 : format.max_stored_value();
+  std::ranges::transform(stored_values, xray.values.pixels.begin(), [&](std::int32_t stored) {
+    const double rescaled = slope * stored + intercept;
+    if (!is_linear) return static_cast<float>(rises ? -rescaled : rescaled);
+    return static_cast<float>(rises ? rescaled : std::abs(slope) * std::abs(stored - dark));
+  });
+  return xray;
+}
+
+}  // namespace isoshift

@@ -1,0 +1,107 @@
+#pragma once
+// RT Images (PS3.3 A.17, C.8.8.2): what the file says, what it lacks, and the X-ray view that follows from it.
+
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "geometry/patient_setup.h"
+#include "geometry/xray_image.h"
+#include "io/identity.h"
+#include "io/notes.h"
+
+namespace isoshift {
+
+// PixelIntensityRelationship (0028,1040) and its sign (0028,1041), which speaks about stored values: +1, lower stored
+// value means less X-ray intensity.
+struct PixelIntensity {
+  enum class Relationship { kLin, kLog };
+  Relationship relationship = Relationship::kLin;
+  int sign = 1;
+};
+
+// "LIN+", "LIN-", "LOG+", "LOG-"; nothing for any other word.
+std::optional<PixelIntensity> pixel_intensity_from(std::string_view word);
+std::string to_string(const PixelIntensity& intensity);
+
+// The attributes of one RT Image as written; an optional without value is absent or empty in the file. Where the
+// Exposure Sequence has a value it wins over the top level. Angles in degrees, lengths in mm.
+struct RtImage {
+  std::filesystem::path path;
+  Identity identity;
+  std::string sop_class_uid;
+  std::string sop_instance_uid;
+  std::string series_instance_uid;
+  std::optional<std::string> frame_of_reference_uid;
+  std::string label;                           // RTImageLabel, else the file's name without extension
+  std::string image_type;                      // ImageType, third value
+  std::optional<std::string> reported_values_origin;
+  std::optional<std::string> patient_position;
+  std::optional<std::string> plan_sop_instance_uid;
+  std::optional<int> beam_number;
+  std::optional<std::string> acquisition_date;
+  std::optional<std::string> acquisition_time;  // AcquisitionTime, else ContentTime
+  std::optional<double> kvp;
+
+  std::optional<std::string> plane;
+  std::optional<double> sad_mm, sid_mm;
+  std::optional<Eigen::Vector3d> receptor_translation_mm;
+  std::optional<double> receptor_angle_deg;
+  std::optional<std::vector<double>> orientation;
+  std::optional<Eigen::Vector2d> pixel_spacing_mm;  // row spacing, column spacing
+  std::optional<Eigen::Vector2d> position_mm;
+  std::optional<double> gantry_angle_deg, gantry_pitch_angle_deg, collimator_angle_deg;
+  std::optional<double> support_angle_deg, eccentric_angle_deg, table_pitch_deg, table_roll_deg;
+  std::optional<Eigen::Vector3d> table_position_mm;  // lateral, longitudinal, vertical
+  std::optional<Eigen::Vector3d> isocenter_mm;       // IsocenterPosition, in this image's own frame of reference
+
+  int columns = 0, rows = 0;
+  std::optional<std::string> intensity_relationship;
+  std::optional<int> intensity_sign;
+  std::string photometric_interpretation;
+};
+
+RtImage read_rt_image_header(const std::filesystem::path& path);
+
+// What a person supplies for what the files lack; a value given here replaces a file's too, and that is noted.
+struct RtImageSwitches {
+  std::map<std::string, double> gantry_angle_deg;  // by label
+  std::optional<double> couch_angle_deg, sad_mm, sid_mm;
+  std::optional<Eigen::Vector2d> position_mm;
+  bool assume_centered = false;
+  std::optional<PixelIntensity> intensity;
+  std::optional<Beam> beam;
+  std::optional<PatientPosition> patient_position;
+};
+
+// The image with the switches applied, each noted as an override.
+RtImage with_switches(RtImage image, const RtImageSwitches& switches, Notes& notes);
+
+// A required attribute without value: what it is for, and the switch that supplies it (empty: none does).
+struct MissingAttribute {
+  DcmTagKey tag;
+  std::string supplied_by;
+};
+
+// Everything that registration needs and `image` lacks, all at once.
+std::vector<MissingAttribute> missing_attributes(const RtImage& image);
+
+// Findings about image type and origin of its angles; throws Error for what no one can allow (BLANK, FLUENCE, a tilted
+// gantry, values out of range).
+std::vector<Finding> rt_image_findings(const RtImage& image);
+
+// The beam quality: KVP above 1000 is MV; without KVP by image type (PORTAL is MV), with a warning.
+Beam beam_of(const RtImage& image, Notes& notes);
+
+// Table read-outs at imaging. Precondition: nothing missing. Warns of angles assumed to be 0.
+TableAngles table_angles(const RtImage& image, Notes& notes);
+
+// The imager's geometry in IEC terms. Precondition: nothing missing. Throws Error where values contradict each other.
+CarmGeometry carm_geometry(const RtImage& image, Notes& notes);
+
+// Reads the pixels and turns them into intensity or line integrals as the image declares (docs/conventions.md).
+XrayImage read_xray_image(const RtImage& image, Beam beam, const CarmGeometry& geometry);
+
+}  // namespace isoshift

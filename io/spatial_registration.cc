@@ -1,0 +1,220 @@
+#include "io/spatial_registration.h"
+
+#include <dcmtk/dcmdata/dcuid.h>
+#include <fmt/chrono.h>
+#include <fmt/format.h>
+
+#include <chrono>
+#include <map>
+#include <optional>
+
+#include "geometry/error.h"
+#include "io/version.h"
+
+namespace isoshift {
+namespace {
+
+// The frame of reference of item 2, and its origin in treatment coordinates (docs/dicom.md, table of 4.4).
+struct SourceFrame {
+  std::string uid;
+  Eigen::Vector3d isocenter_mm = Eigen::Vector3d::Zero();  // the machine's isocenter in that frame
+  bool lists_images = false;                               // the RT Images are in it
+};
+
+SourceFrame source_frame(const Study& study, Notes& notes) {
+  const RtImage& first = study.rt_images.front();
+  for (const RtImage& image : study.rt_images) {
+    if (!image.frame_of_reference_uid || !image.isocenter_mm ||
+        image.frame_of_reference_uid != first.frame_of_reference_uid || *image.isocenter_mm != *first.isocenter_mm ||
+        image.frame_of_reference_uid == study.ct.frame_of_reference_uid) {
+      if (image.frame_of_reference_uid == study.ct.frame_of_reference_uid)
+        notes.warnings.push_back(
+            fmt::format("{}: shares the CT's {}, which would claim a perfect setup; the registration object uses a new one",
+                        image.label, described(DCM_FrameOfReferenceUID)));
+      return {.uid = new_uid()};
+    }
+  }
+  return {.uid = *first.frame_of_reference_uid, .isocenter_mm = *first.isocenter_mm, .lists_images = true};
+}
+
+void put_reference(DicomItem item, const std::string& sop_class_uid, const std::string& sop_instance_uid) {
+  item.put(DCM_ReferencedSOPClassUID, sop_class_uid);
+  item.put(DCM_ReferencedSOPInstanceUID, sop_instance_uid);
+}
+
+void put_code(DicomItem item, const char* value, const char* meaning) {
+  item.put(DCM_CodeValue, value);
+  item.put(DCM_CodingSchemeDesignator, "DCM");
+  item.put(DCM_CodeMeaning, meaning);
+}
+
+void put_matrix(DicomItem item, const Eigen::Isometry3d& matrix, const char* code, const char* meaning,
+                const char* comment) {
+  DicomItem registration = item.append_item(DCM_MatrixRegistrationSequence);
+  registration.put(DCM_FrameOfReferenceTransformationComment, comment);
+  put_code(registration.append_item(DCM_RegistrationTypeCodeSequence), code, meaning);
+  DicomItem matrix_item = registration.append_item(DCM_MatrixSequence);
+  const Eigen::Matrix<double, 4, 4, Eigen::RowMajor> rows = matrix.matrix();
+  matrix_item.put(DCM_FrameOfReferenceTransformationMatrix, std::span(rows.data(), 16));
+  matrix_item.put(DCM_FrameOfReferenceTransformationMatrixType, "RIGID");
+}
+
+void put_ct_references(DicomItem item, const CtSeries& ct) {
+  for (const std::string& uid : ct.sop_instance_uids)
+    put_reference(item.append_item(DCM_ReferencedImageSequence), ct.sop_class_uid, uid);
+}
+
+// Common Instance Reference (C.12.2): every referenced instance, those of the CT's study and those of others.
+void put_common_instance_references(DicomItem dataset, const Study& study) {
+  DicomItem ct_series = dataset.append_item(DCM_ReferencedSeriesSequence);
+  ct_series.put(DCM_SeriesInstanceUID, study.ct.series_instance_uid);
+  for (const std::string& uid : study.ct.sop_instance_uids)
+    put_reference(ct_series.append_item(DCM_ReferencedInstanceSequence), study.ct.sop_class_uid, uid);
+
+  std::map<std::string, std::map<std::string, std::vector<const RtImage*>>> by_study_and_series;
+  for (const RtImage& image : study.rt_images)
+    by_study_and_series[image.identity.study_instance_uid][image.series_instance_uid].push_back(&image);
+  for (const auto& [study_uid, by_series] : by_study_and_series) {
+    std::optional<DicomItem> other_study;
+    if (study_uid != study.ct.identity.study_instance_uid) {
+      other_study = dataset.append_item(DCM_StudiesContainingOtherReferencedInstancesSequence);
+      other_study->put(DCM_StudyInstanceUID, study_uid);
+    }
+    for (const auto& [series_uid, images] : by_series) {
+      DicomItem series = (other_study ? *other_study : dataset).append_item(DCM_ReferencedSeriesSequence);
+      series.put(DCM_SeriesInstanceUID, series_uid);
+      for (const RtImage* image : images)
+        put_reference(series.append_item(DCM_ReferencedInstanceSequence), image->sop_class_uid,
+                      image->sop_instance_uid);
+    }
+  }
+}
+
+void put_series_and_equipment(DicomItem dataset, const Study& study, const std::string& sop_instance_uid,
+                              const SpatialRegistrationLabel& label) {
+  const std::time_t now = std::chrono::system_clock::to_time_t(std::chrono::system_clock::now());
+  const std::tm local = fmt::localtime(now);
+  put_identity(dataset, study.ct.identity);
+  dataset.put(DCM_SOPClassUID, UID_SpatialRegistrationStorage);
+  dataset.put(DCM_SOPInstanceUID, sop_instance_uid);
+  dataset.put(DCM_ContentDate, fmt::format("{:%Y%m%d}", local));
+  dataset.put(DCM_ContentTime, fmt::format("{:%H%M%S}", local));
+  dataset.put(DCM_TimezoneOffsetFromUTC, fmt::format("{:%z}", local));
+  dataset.put(DCM_Modality, "REG");
+  dataset.put(DCM_SeriesInstanceUID, new_uid());
+  dataset.put(DCM_SeriesNumber, "9001");
+  dataset.put(DCM_SeriesDescription, "2D/3D setup registration");
+  if (!study.ct.body_part_examined.empty())
+    dataset.put(DCM_BodyPartExamined, study.ct.body_part_examined);
+  else
+    dataset.put(DCM_Laterality, "");  // type 2C: required, possibly empty, where the body part is unknown
+  dataset.put(DCM_Manufacturer, "isoshift");
+  dataset.put(DCM_ManufacturerModelName, "isoshift");
+  dataset.put(DCM_SoftwareVersions, kVersion);
+  dataset.put(DCM_FrameOfReferenceUID, study.ct.frame_of_reference_uid);
+  dataset.put(DCM_PositionReferenceIndicator, "");
+  dataset.put(DCM_InstanceNumber, "1");
+  dataset.put(DCM_ContentLabel, label.content_label);
+  dataset.put(DCM_ContentDescription, label.content_description);
+  dataset.put(DCM_ContentCreatorName, "");
+}
+
+DicomFile registration_object(const Study& study, const SourceFrame& source, const Eigen::Isometry3d& ct_from_source,
+                              const std::string& sop_instance_uid, const SpatialRegistrationLabel& label) {
+  DicomFile file;
+  DicomItem dataset = file.dataset();
+  put_series_and_equipment(dataset, study, sop_instance_uid, label);
+
+  DicomItem ct_item = dataset.append_item(DCM_RegistrationSequence);
+  ct_item.put(DCM_FrameOfReferenceUID, study.ct.frame_of_reference_uid);
+  put_ct_references(ct_item, study.ct);
+  put_matrix(ct_item, Eigen::Isometry3d::Identity(), "125021", "Frame of Reference Identity", "planning CT");
+
+  DicomItem treatment_item = dataset.append_item(DCM_RegistrationSequence);
+  treatment_item.put(DCM_FrameOfReferenceUID, source.uid);
+  if (source.lists_images)
+    for (const RtImage& image : study.rt_images)
+      put_reference(treatment_item.append_item(DCM_ReferencedImageSequence), image.sop_class_uid,
+                    image.sop_instance_uid);
+  put_matrix(treatment_item, ct_from_source, "125024", "Image Content-based Alignment", "treatment room to planning CT");
+
+  // General Reference (C.12.4), where the images cannot stand in item 2.
+  if (!source.lists_images)
+    for (const RtImage& image : study.rt_images) {
+      DicomItem reference = dataset.append_item(DCM_ReferencedImageSequence);
+      put_reference(reference, image.sop_class_uid, image.sop_instance_uid);
+      put_code(reference.append_item(DCM_PurposeOfReferenceCodeSequence), "129203",
+               "Image Acquired during Treatment");
+    }
+  put_common_instance_references(dataset, study);
+  return file;
+}
+
+// The standard's composition: the first matrix is applied first (C.20.2.1.1).
+Eigen::Isometry3d composed_matrix(const DicomItem& item) {
+  Eigen::Isometry3d composed = Eigen::Isometry3d::Identity();
+  for (const DicomItem& registration : item.items(DCM_MatrixRegistrationSequence))
+    for (const DicomItem& matrix_item : registration.items(DCM_MatrixSequence)) {
+      const std::vector<double> values = matrix_item.required_numbers(DCM_FrameOfReferenceTransformationMatrix, 16);
+      const std::string type = matrix_item.required_text(DCM_FrameOfReferenceTransformationMatrixType);
+      Eigen::Isometry3d matrix;
+      matrix.matrix() = Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(values.data());
+      const Eigen::Matrix3d r = matrix.linear();
+      const bool is_rigid = (r.transpose() * r - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff() < 1e-4 &&
+                            r.determinant() > 0.0 && matrix.matrix().row(3) == Eigen::RowVector4d(0, 0, 0, 1);
+      if (type != "RIGID" || !is_rigid)
+        throw Error(fmt::format("{}: {} is not a rigid motion", matrix_item.where(),
+                                described(DCM_FrameOfReferenceTransformationMatrix)));
+      composed = matrix * composed;
+    }
+  return composed;
+}
+
+void check_read_back(const std::filesystem::path& path, const Eigen::Isometry3d& ct_from_source) {
+  const SpatialRegistration read = read_spatial_registration(path);
+  const auto largest_difference = [&](std::size_t item, const Eigen::Isometry3d& written) {
+    return (read.items[item].registered_from_source.matrix() - written.matrix()).cwiseAbs().maxCoeff();
+  };
+  if (read.items.size() != 2 || largest_difference(0, Eigen::Isometry3d::Identity()) != 0.0 ||
+      largest_difference(1, ct_from_source) > 1e-6)
+    throw Error(fmt::format("{}: reads back differently from what was written", path.string()));
+}
+
+}  // namespace
+
+Eigen::Isometry3d ct_from_treatment(const Eigen::Isometry3d& planned_room_from_patient,
+                                    const Eigen::Isometry3d& actual_room_from_patient) {
+  Eigen::Isometry3d room_from_treatment = Eigen::Isometry3d::Identity();
+  room_from_treatment.linear() = planned_room_from_patient.linear();
+  return actual_room_from_patient.inverse() * room_from_treatment;
+}
+
+std::string write_spatial_registration(const Study& study, const Eigen::Isometry3d& actual_room_from_patient,
+                                       const SpatialRegistrationLabel& label, const std::filesystem::path& path,
+                                       Notes& notes) {
+  const SourceFrame source = source_frame(study, notes);
+  Eigen::Isometry3d ct_from_source = ct_from_treatment(study.planned_room_from_patient, actual_room_from_patient);
+  ct_from_source.translate(-source.isocenter_mm);
+  const std::string sop_instance_uid = new_uid();
+  DicomFile file = registration_object(study, source, ct_from_source, sop_instance_uid, label);
+  file.write(path);
+  check_read_back(path, ct_from_source);
+  return sop_instance_uid;
+}
+
+SpatialRegistration read_spatial_registration(const std::filesystem::path& path) {
+  const DicomFile file = DicomFile::read(path, DicomFile::Extent::kWhole);
+  const DicomItem dataset = file.dataset();
+  if (const std::string sop_class = dataset.required_text(DCM_SOPClassUID); sop_class != UID_SpatialRegistrationStorage)
+    throw Error(fmt::format("{}: {} is {}, expected Spatial Registration Storage", path.string(),
+                            described(DCM_SOPClassUID), sop_class));
+  SpatialRegistration registration;
+  registration.sop_instance_uid = dataset.required_text(DCM_SOPInstanceUID);
+  registration.frame_of_reference_uid = dataset.required_text(DCM_FrameOfReferenceUID);
+  for (const DicomItem& item : dataset.items(DCM_RegistrationSequence))
+    registration.items.push_back({.frame_of_reference_uid = item.required_text(DCM_FrameOfReferenceUID),
+                                  .registered_from_source = composed_matrix(item)});
+  return registration;
+}
+
+}  // namespace isoshift

@@ -1,0 +1,32 @@
+#pragma once
+// From X-ray pixels to what a DRR can be compared with. The only part of isoshift that uses OpenCV.
+
+#include <cstdint>
+#include <vector>
+
+#include "geometry/image.h"
+#include "geometry/xray_image.h"
+
+namespace isoshift {
+
+// Line integrals -ln(I / I_max) of an intensity image, or the values of an image that holds line integrals already.
+Image<float> line_integrals(const XrayImage& xray);
+
+// Where the receptor was irradiated: 1 inside the field, 0 behind the collimator and at the panel's rim. The collimator
+// is looked for as straight edges, parallel to the image's or turned by the collimator angle, across which the intensity
+// changes by more than a factor of 2.5; a side without such an edge reaches to the rim.
+Image<std::uint8_t> irradiated_field(const XrayImage& xray, const Image<float>& line_integral);
+
+// One level of the pyramid: blocks of factor x factor pixels averaged over the field, and the blocks that lie wholly in
+// it.
+struct FixedImage {
+  XrayView view;
+  Image<float> line_integral;
+  Image<std::uint8_t> field;
+};
+FixedImage reduced(const FixedImage& image, int factor);
+
+// The whole way for one X-ray, at full resolution.
+FixedImage prepare(const XrayImage& xray);
+
+}  // namespace isoshift

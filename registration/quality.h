@@ -1,0 +1,17 @@
+#pragma once
+// Whether the numbers of a registration can be trusted.
+
+#include <span>
+
+#include "registration/register_views.h"
+
+namespace isoshift {
+
+// Directions (unit vectors in the room) along which no view measures: the common viewing direction where all central
+// rays lie within 30 degrees of each other, as with a single view.
+std::vector<Eigen::Vector3d> unobservable_directions(std::span<const XrayView> views);
+
+// Sets verdict, reasons and warnings from the parameters found (in the order of Stage) and the views' similarities.
+void judge(std::span<const double> parameters, const RegistrationOptions& options, RegistrationResult& result);
+
+}  // namespace isoshift
