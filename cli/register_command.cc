@@ -13,6 +13,7 @@
 #include "io/report/pictures.h"
 #include "io/report/setup_report.h"
 #include "io/spatial_registration.h"
+#include "registration/preprocess/preprocess.h"
 
 namespace isoshift {
 namespace {

@@ -52,8 +52,8 @@ void judge(std::span<const double> parameters, const RegistrationOptions& option
       demote(Verdict::kReview, fmt::format("view {} matches worse than at the planned pose (similarity {:.4f}, was {:.4f})",
                                            n + 1, view.similarity_final, view.similarity_start));
   }
-  if (mean < options.min_similarity)
-    demote(Verdict::kReview, fmt::format("the final similarity {:.3f} is below {:.3f}", mean, options.min_similarity));
+  if (mean < options.min_ncc)
+    demote(Verdict::kReview, fmt::format("the final normalized cross correlation {:.3f} is below {:.2f}", mean, options.min_ncc));
   if (!result.unobservable_room.empty())
     demote(Verdict::kReview, "all views look along nearly the same direction, along which nothing was measured");
   if (result.verdict == Verdict::kAccepted)

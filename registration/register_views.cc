@@ -10,6 +10,7 @@
 #include "geometry/error.h"
 #include "registration/objective.h"
 #include "registration/optimizer.h"
+#include "registration/preprocess/preprocess.h"
 #include "registration/quality.h"
 
 namespace isoshift {
@@ -75,8 +76,8 @@ std::vector<Stage> RegistrationOptions::default_stages() {
   return {
       {.name = "coarse", .pixel_mm = 5.0, .initial_step_mm = 8.0, .initial_step_rad = 0.06, .relative_tolerance = 0.02},
       {.name = "medium", .pixel_mm = 2.5, .initial_step_mm = 1.5, .initial_step_rad = 0.015, .relative_tolerance = 0.02},
-      {.name = "fine", .pixel_mm = 1.2, .pixel_fraction = 0.3, .initial_step_mm = 0.4, .initial_step_rad = 0.004,
-       .relative_tolerance = 0.02},
+      {.name = "fine", .similarity = SimilarityKind::kGradientCorrelation, .pixel_mm = 1.2, .initial_step_mm = 0.6,
+       .initial_step_rad = 0.006, .relative_tolerance = 0.01},
   };
 }
 
@@ -104,7 +105,8 @@ RegistrationResult register_views(Renderer& renderer, std::span<const XrayImage>
   for (std::size_t n = 0; n < options.stages.size(); ++n) {
     const Stage& stage = options.stages[n];
     const auto stage_begin = std::chrono::steady_clock::now();
-    Objective objective(renderer, reduced_to(images, stage.pixel_mm), stage.pixel_fraction, options.seed);
+    Objective objective(renderer, reduced_to(images, stage.pixel_mm),
+                        {.similarity = stage.similarity, .pixel_fraction = stage.pixel_fraction, .seed = options.seed});
     const OptimizerResult found = maximize(
         [&](std::span<const double> x) {
           const std::array pose = {setup_error_from_parameters(x) * planned_room_from_patient};
@@ -113,16 +115,15 @@ RegistrationResult register_views(Renderer& renderer, std::span<const XrayImage>
         optimizer_options(stage, options, parameters));
     parameters = found.best;
     result.stages.push_back({.name = stage.name,
-                             .similarity = "ncc",
+                             .similarity = std::string(to_string(stage.similarity)),
                              .evaluations = found.evaluations,
                              .seconds = seconds_since(stage_begin),
                              .termination = found.termination});
     if (progress) progress(static_cast<double>(n + 1) / static_cast<double>(options.stages.size()));
-    if (n + 1 == options.stages.size()) {
-      result.actual_room_from_patient = setup_error_from_parameters(parameters) * planned_room_from_patient;
-      report_views(objective, planned_room_from_patient, result);
-    }
   }
+  result.actual_room_from_patient = setup_error_from_parameters(parameters) * planned_room_from_patient;
+  Objective ncc(renderer, reduced_to(images, options.stages.back().pixel_mm), {.similarity = SimilarityKind::kNcc});
+  report_views(ncc, planned_room_from_patient, result);
 
   std::vector<XrayView> views;
   for (const XrayImage& xray : xrays) views.push_back(xray.view);

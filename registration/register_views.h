@@ -14,7 +14,7 @@
 #include "drr/renderer.h"
 #include "geometry/verdict.h"
 #include "geometry/xray_image.h"
-#include "registration/preprocess/preprocess.h"
+#include "registration/similarity/similarity.h"
 
 namespace isoshift {
 
@@ -24,6 +24,7 @@ enum class Dof { kRigid, kTranslation };
 // setup error about the isocenter, in IEC 61217 fixed.
 struct Stage {
   std::string name;
+  SimilarityKind similarity = SimilarityKind::kNcc;
   double pixel_mm = 4.0;          // the stage's pixels, at the isocenter: the image is reduced to at least this size
   double pixel_fraction = 1.0;    // share of the field's pixels compared
   double initial_step_mm = 5.0;   // first trust-region radius of the translations
@@ -36,7 +37,7 @@ struct RegistrationOptions {
   Dof dof = Dof::kRigid;
   double bound_mm = 50.0;   // the search box about the planned pose
   double bound_rad = 0.35;  // the same for rotations, about 20 degrees
-  double min_similarity = 0.8;  // a final mean similarity below this is at most `review`
+  double min_ncc = 0.8;     // a final mean NCC below this is at most `review`
   std::uint64_t seed = 1;   // the only source of randomness: same seed, same pose
   std::vector<Stage> stages = default_stages();
 
@@ -54,6 +55,7 @@ struct StageReport {
   std::string termination = "not run";
 };
 
+// Normalized cross correlation of one view over its whole field, at the resolution of the last stage.
 struct ViewReport {
   double similarity_start = -1.0;
   double similarity_final = -1.0;

@@ -13,7 +13,8 @@ namespace {
 constexpr double kRimMm = 2.0;             // left out at the panel's rim and along the collimator's penumbra, at the isocenter
 constexpr double kPenumbraMm = 1.7;        // half the distance over which an edge must rise, at the isocenter
 constexpr double kMinEdgeMm = 12.0;        // the shortest edge that counts, at the isocenter
-constexpr float kMinEdgeContrast = 0.916F; // ln 2.5
+constexpr float kMinEdgeContrast = 0.916F;  // ln 2.5, of an intensity image
+constexpr float kMinEdgeShare = 0.15F;      // of the image's range, where line integrals come without a scale
 
 // Pixels per mm at the isocenter.
 double pixels_per_mm(const XrayView& view) {
@@ -26,70 +27,94 @@ cv::Mat as_mat(const Image<float>& image) {
   return {image.rows, image.columns, CV_32F, const_cast<float*>(image.pixels.data())};
 }
 
-// For every column x: the length of the longest run of rows, gaps of two pixels allowed, in which the line integral falls
-// from x - reach to x + reach by the contrast of a collimator edge (it is dark left of x and bright right of it).
-std::vector<int> edge_runs(const cv::Mat& line_integral, int reach) {
-  std::vector<int> runs(line_integral.cols, 0);
-  for (int x = reach; x + reach < line_integral.cols; ++x) {
-    int run = 0, gap = 0;
-    for (int y = 0; y < line_integral.rows; ++y) {
-      const auto* row = line_integral.ptr<float>(y);
-      if (row[x - reach] - row[x + reach] > kMinEdgeContrast) {
-        run += gap + 1;
-        gap = 0;
-      } else if (++gap > 2) {
-        run = gap = 0;
-      }
-      if (gap == 0) runs[x] = std::max(runs[x], run);
+// A straight run of rows along a column, across which the image brightens from left to right.
+struct Edge {
+  int column = 0;
+  int first_row = 0;
+  int rows = 0;
+};
+
+// The longest edge at a column: rows in which the line integral falls by `contrast` from x - reach to x + reach, gaps of
+// two rows allowed.
+Edge longest_edge_at(const cv::Mat& line_integral, int x, int reach, float contrast) {
+  Edge longest{.column = x};
+  int first_row = 0, gap = 0;
+  bool running = false;
+  for (int y = 0; y < line_integral.rows; ++y) {
+    const auto* row = line_integral.ptr<float>(y);
+    if (row[x - reach] - row[x + reach] > contrast) {
+      if (!running) first_row = y;
+      running = true;
+      gap = 0;
+      if (y + 1 - first_row > longest.rows) longest = {x, first_row, y + 1 - first_row};
+    } else if (running && ++gap > 2) {
+      running = false;
     }
   }
-  return runs;
+  return longest;
 }
 
-double median_of(cv::Mat part) {
+float median_of(const cv::Mat& part) {
   std::vector<float> values;
   values.reserve(part.total());
   for (int y = 0; y < part.rows; ++y) values.insert(values.end(), part.ptr<float>(y), part.ptr<float>(y) + part.cols);
-  std::ranges::nth_element(values, values.begin() + values.size() / 2);
+  std::ranges::nth_element(values, values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2));
   return values[values.size() / 2];
 }
 
-// The field's left side: the column of the longest edge, if the collimator shades all that lies left of it. A metal rod
-// has such edges too, but is bright again on its other side.
-int left_side(const cv::Mat& line_integral, double pixels_per_mm) {
-  const int reach = std::max(1, static_cast<int>(std::lround(kPenumbraMm * pixels_per_mm)));
-  const std::vector<int> runs = edge_runs(line_integral, reach);
-  const auto longest = std::ranges::max_element(runs);
-  if (*longest < kMinEdgeMm * pixels_per_mm) return 0;
-  // The edge fills the reach on both sides of its middle; take the middle of the columns that see nearly all of it.
-  const auto first = std::ranges::find_if(runs, [&](int run) { return run >= 0.9 * *longest; });
-  const auto last = std::find_if(runs.rbegin(), runs.rend(), [&](int run) { return run >= 0.9 * *longest; });
-  const int begin = static_cast<int>(first - runs.begin());
-  const int end = static_cast<int>(runs.rend() - last) - 1;
-  if (end - begin > 4 * reach) return 0;  // edges far apart: not one straight edge
-  const int side = (begin + end) / 2;
-  if (side - reach < 1) return 0;
-  const double outside = median_of(line_integral.colRange(0, side - reach));
-  const double inside = median_of(line_integral.colRange(side + reach, std::min(line_integral.cols, side + 8 * reach)));
-  return outside - inside > kMinEdgeContrast ? side : 0;
+// What edges are looked for, in pixels and in the units of the line integral.
+struct EdgeSearch {
+  int reach;      // half the penumbra
+  int min_rows;   // the shortest edge that counts
+  float contrast;
+};
+
+// The field's left side: the longest edge left of the isocenter, if the collimator shades all that lies beyond it. The
+// patient's outline is bright on its outer side, and a metal rod is bright again on its other one. 0 where there is none.
+int left_side(const cv::Mat& line_integral, double isocenter_column, const EdgeSearch& search) {
+  const int end = std::min(static_cast<int>(isocenter_column), line_integral.cols - search.reach);
+  std::vector<Edge> edges;
+  for (int x = search.reach; x < end; ++x)
+    edges.push_back(longest_edge_at(line_integral, x, search.reach, search.contrast));
+  const auto longest = std::ranges::max_element(edges, {}, &Edge::rows);
+  if (longest == edges.end() || longest->rows < search.min_rows) return 0;
+
+  // Every column within the reach sees the same edge: its place is their middle.
+  const auto sees_it = [&](const Edge& edge) { return edge.rows >= 0.9 * longest->rows; };
+  auto first = longest, last = longest;
+  while (first != edges.begin() && sees_it(*(first - 1))) --first;
+  while (last + 1 != edges.end() && sees_it(*(last + 1))) ++last;
+  const int side = (first->column + last->column) / 2;
+  if (side - search.reach < 1) return 0;
+  const cv::Mat rows = line_integral.rowRange(longest->first_row, longest->first_row + longest->rows);
+  const float outside = median_of(rows.colRange(0, side - search.reach));
+  const float inside = median_of(rows.colRange(side + search.reach, std::min(rows.cols, side + 8 * search.reach)));
+  return outside - inside > search.contrast ? side : 0;
 }
 
-// The four sides, each found as the left side of a turned or mirrored image.
-cv::Rect field_rectangle(const cv::Mat& line_integral, double pixels_per_mm) {
-  const auto side_of = [&](auto&& turn) {
-    cv::Mat turned;
-    turn(turned);
-    return left_side(turned, pixels_per_mm);
-  };
-  const int left = left_side(line_integral, pixels_per_mm);
-  const int right = side_of([&](cv::Mat& out) { cv::flip(line_integral, out, 1); });
-  const int top = side_of([&](cv::Mat& out) { cv::transpose(line_integral, out); });
-  const int bottom = side_of([&](cv::Mat& out) {
-    cv::Mat upside_down;
-    cv::flip(line_integral, upside_down, 0);
-    cv::transpose(upside_down, out);
-  });
-  return {left, top, std::max(0, line_integral.cols - left - right), std::max(0, line_integral.rows - top - bottom)};
+// The four sides, each found as the left side of the image mirrored or turned.
+cv::Rect field_rectangle(const cv::Mat& line_integral, const cv::Point2d& isocenter, const EdgeSearch& search) {
+  const int columns = line_integral.cols, rows = line_integral.rows;
+  cv::Mat mirrored, turned, turned_and_mirrored;
+  cv::flip(line_integral, mirrored, 1);
+  cv::transpose(line_integral, turned);
+  cv::flip(turned, turned_and_mirrored, 1);
+  const int left = left_side(line_integral, isocenter.x, search);
+  const int right = left_side(mirrored, columns - 1 - isocenter.x, search);
+  const int top = left_side(turned, isocenter.y, search);
+  const int bottom = left_side(turned_and_mirrored, rows - 1 - isocenter.y, search);
+  return {left, top, columns - left - right, rows - top - bottom};
+}
+
+// The innermost field: behind the leaves there may be jaws, with an edge of their own.
+cv::Rect innermost_field(const cv::Mat& line_integral, const cv::Point2d& isocenter, const EdgeSearch& search) {
+  cv::Rect field(0, 0, line_integral.cols, line_integral.rows);
+  for (;;) {
+    const cv::Point2d offset(field.x, field.y);
+    const cv::Rect inner = field_rectangle(line_integral(field), isocenter - offset, search);
+    if (inner.size() == field.size()) return field;
+    field = inner + field.tl();
+  }
 }
 
 }  // namespace
@@ -111,6 +136,12 @@ Image<std::uint8_t> irradiated_field(const XrayImage& xray, const Image<float>& 
   const double scale = pixels_per_mm(xray.view);
   cv::Mat smooth;
   cv::medianBlur(as_mat(line_integral), smooth, 5);
+  const auto [darkest, brightest] = std::ranges::minmax(line_integral.pixels);
+  const EdgeSearch search{
+      .reach = std::max(1, static_cast<int>(std::lround(kPenumbraMm * scale))),
+      .min_rows = std::max(3, static_cast<int>(std::lround(kMinEdgeMm * scale))),
+      .contrast = xray.meaning == XrayImage::Meaning::kIntensity ? kMinEdgeContrast
+                                                                 : kMinEdgeShare * (brightest - darkest)};
 
   // Turn the image so that the collimator's edges are upright, find them, and turn the rectangle back.
   const double turn_deg = deg_from_rad(std::remainder(xray.collimator_angle_rad, std::numbers::pi / 2.0));
@@ -122,7 +153,9 @@ Image<std::uint8_t> irradiated_field(const XrayImage& xray, const Image<float>& 
     upright_from_image = cv::getRotationMatrix2D(center, turn_deg, 1.0);
     cv::warpAffine(smooth, upright, upright_from_image, size, cv::INTER_LINEAR, cv::BORDER_REPLICATE);
   }
-  const cv::Rect field = field_rectangle(upright, scale);
+  const Eigen::Vector2d isocenter = xray.view.project(Eigen::Vector3d::Zero()).value();
+  const cv::Vec2d upright_isocenter = upright_from_image * cv::Vec3d(isocenter.x(), isocenter.y(), 1.0);
+  const cv::Rect field = innermost_field(upright, {upright_isocenter[0], upright_isocenter[1]}, search);
   const double rim = std::max(1.0, kRimMm * scale);
 
   Image<std::uint8_t> mask(line_integral.columns, line_integral.rows, 0);

@@ -12,9 +12,9 @@ namespace isoshift {
 // Line integrals -ln(I / I_max) of an intensity image, or the values of an image that holds line integrals already.
 Image<float> line_integrals(const XrayImage& xray);
 
-// Where the receptor was irradiated: 1 inside the field, 0 behind the collimator and at the panel's rim. The collimator
-// is looked for as straight edges, parallel to the image's or turned by the collimator angle, across which the intensity
-// changes by more than a factor of 2.5; a side without such an edge reaches to the rim.
+// Where the receptor was irradiated: 1 inside the field, 0 behind the collimator and at the panel's rim. The field is a
+// rectangle around the isocenter, parallel to the image or turned by the collimator angle. Each side is looked for as a
+// straight edge beyond which the intensity is less by a factor of 2.5; a side without such an edge reaches to the rim.
 Image<std::uint8_t> irradiated_field(const XrayImage& xray, const Image<float>& line_integral);
 
 // One level of the pyramid: blocks of factor x factor pixels averaged over the field, and the blocks that lie wholly in
