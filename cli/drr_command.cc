@@ -37,9 +37,7 @@ void run_drr(const DrrOptions& options, Console& console) {
     const RenderResult drrs = renderer->render(std::span(&view, 1), pose, PixelSet::all());
     Image<float> image(view.columns, view.rows);
     std::ranges::copy(drrs.line_integrals(0, 0), image.pixels.begin());
-    if (std::ranges::all_of(image.pixels, [](float value) { return value == 0.0F; }))
-      throw Error(fmt::format("{}: the DRR is empty: no ray meets anything above {} HU in the CT", study.xrays[n].label,
-                              options.rendering.threshold_hu));
+    require_not_empty(image.pixels, study.xrays[n].label);
     const std::string name = fmt::format("drr{}", n + 1);
     const Eigen::Vector2d spacing_mm = study.rt_images[n].pixel_spacing_mm.value();
     write_line_integral_png(output.path() / (name + ".png"), image);

@@ -1,8 +1,13 @@
 #include "drr/renderer.h"
 
+#include <fmt/format.h>
+
+#include <algorithm>
+
 #include "drr/cpu/raycast.h"
 #include "drr/cpu/siddon.h"
 #include "drr/cpu/trilinear.h"
+#include "geometry/error.h"
 
 namespace isoshift {
 
@@ -35,6 +40,11 @@ std::unique_ptr<Renderer> make_renderer(RendererKind kind, const Volume<float>& 
     case RendererKind::kCpu: return std::make_unique<RaycastRenderer>(ct_hu, model, beams);
   }
   return nullptr;
+}
+
+void require_not_empty(std::span<const float> line_integrals, std::string_view label) {
+  if (std::ranges::any_of(line_integrals, [](float value) { return value != 0.0F; })) return;
+  throw Error(fmt::format("{}: the DRR is empty: no ray meets anything above the threshold in the CT", label));
 }
 
 }  // namespace isoshift

@@ -77,4 +77,7 @@ class Renderer {
 std::unique_ptr<Renderer> make_renderer(RendererKind kind, const Volume<float>& ct_hu, const AttenuationModel& model,
                                         std::span<const Beam> beams);
 
+// Throws Error if a DRR of a whole image is zero everywhere: a blank picture is never a result.
+void require_not_empty(std::span<const float> line_integrals, std::string_view label);
+
 }  // namespace isoshift

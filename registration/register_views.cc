@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <functional>
 #include <numeric>
 
 #include "geometry/error.h"
@@ -34,17 +35,19 @@ Eigen::Isometry3d setup_error_from_parameters(std::span<const double> parameters
   return setup_error;
 }
 
-// The largest reduction that keeps pixels at the isocenter within the stage's size.
-int reduction(const XrayView& view, double pixel_mm) {
-  const Eigen::Vector2d origin = view.project(Eigen::Vector3d::Zero()).value();
-  const double pixels_per_mm =
-      (view.project(view.central_direction_room().unitOrthogonal()).value() - origin).norm();
-  return std::clamp(static_cast<int>(pixel_mm * pixels_per_mm), 1, std::min(view.columns, view.rows) / 8);
+// The largest reduction that keeps pixels at the isocenter within the stage's size, and enough of them in a small field.
+int reduction(const FixedImage& image, double pixel_mm) {
+  constexpr double kMinFieldPixels = 900.0;
+  const Eigen::Vector2d origin = image.view.project(Eigen::Vector3d::Zero()).value();
+  const Eigen::Vector3d across = image.view.central_direction_room().unitOrthogonal();
+  const double pixels_per_mm = (image.view.project(across).value() - origin).norm();
+  const auto field_pixels = static_cast<double>(std::ranges::count_if(image.field.pixels, std::identity()));
+  return std::max(1, static_cast<int>(std::min(pixel_mm * pixels_per_mm, std::sqrt(field_pixels / kMinFieldPixels))));
 }
 
 std::vector<FixedImage> reduced_to(std::span<const FixedImage> images, double pixel_mm) {
   std::vector<FixedImage> level;
-  for (const FixedImage& image : images) level.push_back(reduced(image, reduction(image.view, pixel_mm)));
+  for (const FixedImage& image : images) level.push_back(reduced(image, reduction(image, pixel_mm)));
   return level;
 }
 
@@ -61,6 +64,16 @@ OptimizerOptions optimizer_options(const Stage& stage, const RegistrationOptions
     search.initial_step.push_back(n < 3 ? stage.initial_step_mm : stage.initial_step_rad * kLeverMm);
   }
   return search;
+}
+
+// Before anything is searched: the CT must appear in every view as planned.
+void require_visible(Renderer& renderer, std::span<const XrayImage> xrays, std::span<const FixedImage> images,
+                     const Eigen::Isometry3d& planned) {
+  for (std::size_t n = 0; n < images.size(); ++n) {
+    const XrayView view = images[n].view.downscaled(reduction(images[n], 5.0));
+    const RenderResult drr = renderer.render(std::span(&view, 1), std::span(&planned, 1), PixelSet::all());
+    require_not_empty(drr.line_integrals(0, 0), xrays[n].label);
+  }
 }
 
 void report_views(Objective& objective, const Eigen::Isometry3d& planned, RegistrationResult& result) {
@@ -99,6 +112,7 @@ RegistrationResult register_views(Renderer& renderer, std::span<const XrayImage>
   const auto begin = std::chrono::steady_clock::now();
   std::vector<FixedImage> images;
   for (const XrayImage& xray : xrays) images.push_back(prepare(xray));
+  require_visible(renderer, xrays, images, planned_room_from_patient);
 
   RegistrationResult result;
   std::vector<double> parameters(options.dof == Dof::kRigid ? 6 : 3, 0.0);

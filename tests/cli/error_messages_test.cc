@@ -1,0 +1,230 @@
+// What a user reads when something is wrong: exact messages and exit statuses.
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <fstream>
+
+#include "tests/support/command.h"
+#include "tests/support/small_study.h"
+
+namespace isoshift {
+namespace {
+
+using testing::HasSubstr;
+using testing::StartsWith;
+
+class ErrorMessagesTest : public testing::Test {
+ protected:
+  CommandOutcome register_study(std::vector<std::string> more = {}) {
+    std::vector<std::string> arguments = {"register", study_.path().string(), "-o", study_.output().string()};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return run_command(arguments);
+  }
+
+  // Registers, and expects failure with exactly this message, nothing on stdout and no result left behind.
+  void expect_error(const std::string& message, std::vector<std::string> more = {}) {
+    const CommandOutcome outcome = register_study(std::move(more));
+    EXPECT_EQ(outcome.exit_status, 1);
+    EXPECT_EQ(outcome.err, "error: " + message + "\n");
+    EXPECT_EQ(outcome.out, "");
+    EXPECT_FALSE(std::filesystem::exists(study_.output()));
+    for (const auto& entry : std::filesystem::directory_iterator(study_.output().parent_path()))
+      EXPECT_THAT(entry.path().filename().string(), testing::Not(HasSubstr("partial")));
+  }
+
+  std::string where(const std::filesystem::path& path) { return path.string(); }
+
+  SmallStudy study_;
+};
+
+TEST_F(ErrorMessagesTest, NoCt) {
+  std::filesystem::remove_all(study_.path() / "CT");
+  expect_error(fmt::format("no CT series found (searched {}).\n       Name its folder: --ct FOLDER", where(study_.path())));
+}
+
+TEST_F(ErrorMessagesTest, TwoCtSeries) {
+  for (const int k : {0, 1, 2})
+    edit(study_.ct_slice(k), [](DicomItem d) { d.put(DCM_SeriesInstanceUID, "1.2.3"); });
+  const CommandOutcome outcome = register_study();
+  EXPECT_EQ(outcome.exit_status, 1);
+  EXPECT_THAT(outcome.err, StartsWith("error: 2 CT series found, expected one:\n       3 slices, series 1.2.3, first file " +
+                                      where(study_.ct_slice(0)) + "\n"));
+  EXPECT_THAT(outcome.err, testing::EndsWith("\n       Name the planning CT: --ct FOLDER\n"));
+}
+
+TEST_F(ErrorMessagesTest, MissingSlice) {
+  std::string uid;
+  edit(study_.ct_slice(20), [&](DicomItem d) { uid = d.required_text(DCM_SeriesInstanceUID); });
+  std::filesystem::remove(study_.ct_slice(20));
+  expect_error(fmt::format("CT series {}: slices 20 and 21 are 12 mm apart, the others 6 mm (ImagePositionPatient (0020,0032)).\n"
+                           "       A uniform series is needed; a slice is probably missing.\n"
+                           "       If that is known to be right, allow it: --allow gaps=REASON",
+                           uid));
+}
+
+TEST_F(ErrorMessagesTest, UnevenSpacing) {
+  std::string uid;
+  // The upper half moves away by 2.5 mm, as if two scans had been joined.
+  for (int k = 20; std::filesystem::exists(study_.ct_slice(k)); ++k)
+    edit(study_.ct_slice(k), [&](DicomItem d) {
+      uid = d.required_text(DCM_SeriesInstanceUID);
+      auto position = d.numbers(DCM_ImagePositionPatient);
+      position[2] += 2.5;
+      d.put(DCM_ImagePositionPatient, position);
+    });
+  expect_error(fmt::format("CT series {}: slices 20 and 21 are 8.5 mm apart, the others 6 mm (ImagePositionPatient (0020,0032)).\n"
+                           "       A uniform series is needed; this one has uneven spacing.\n"
+                           "       If that is known to be right, allow it: --allow gaps=REASON",
+                           uid));
+}
+
+TEST_F(ErrorMessagesTest, ImageWithoutSadOrSid) {
+  edit(study_.image(0), [](DicomItem d) {
+    d.erase(DCM_RadiationMachineSAD);
+    d.erase(DCM_RTImageSID);
+  });
+  expect_error(fmt::format("{0}: RadiationMachineSAD (3002,0022) is missing.\n       Supply it: --sad MM\n"
+                           "{0}: RTImageSID (3002,0026) is missing.\n       Supply it: --sid MM",
+                           where(study_.image(0))));
+}
+
+TEST_F(ErrorMessagesTest, ImageWithoutPositionGantryAngleAndCouchAngle) {
+  edit(study_.image(1), [](DicomItem d) {
+    d.put(DCM_RTImagePosition, "");
+    d.erase(DCM_GantryAngle);
+    d.erase(DCM_PatientSupportAngle);
+  });
+  expect_error(fmt::format(
+      "{0}: RTImagePosition (3002,0012) is missing.\n       Supply it: --rt-image-position X,Y or --assume-centered\n"
+      "{0}: GantryAngle (300A,011E) is missing.\n       Supply it: --gantry-angle KV_G090=DEG\n"
+      "{0}: PatientSupportAngle (300A,0122) is missing.\n       Supply it: --couch-angle DEG",
+      where(study_.image(1))));
+}
+
+TEST_F(ErrorMessagesTest, DifferentPatients) {
+  edit(study_.image(0), [](DicomItem d) { d.put(DCM_PatientID, "SOMEONE ELSE"); });
+  const std::string message = fmt::format(
+      "{}: PatientID (0010,0020) differs from the CT's: the inputs are of different patients", where(study_.image(0)));
+  expect_error(message + "\n       If that is known to be right, allow it: --allow patient-mismatch=REASON");
+}
+
+TEST_F(ErrorMessagesTest, ImageAndPlanThatDoNotBelongTogether) {
+  std::string plan_uid;
+  edit(study_.plan(), [&](DicomItem d) { plan_uid = d.required_text(DCM_SOPInstanceUID); });
+  edit(study_.image(1), [](DicomItem d) {
+    d.items(DCM_ReferencedRTPlanSequence)[0].put(DCM_ReferencedSOPInstanceUID, "1.2.3");
+  });
+  expect_error(fmt::format("{}: belongs to another plan than {} (ReferencedRTPlanSequence (300C,0002)): it refers to 1.2.3, "
+                           "the plan is {}\n"
+                           "       If that is known to be right, allow it: --allow plan-mismatch=REASON",
+                           where(study_.image(1)), where(study_.plan()), plan_uid));
+}
+
+TEST_F(ErrorMessagesTest, PlanInAnotherFrameOfReference) {
+  edit(study_.plan(), [](DicomItem d) { d.put(DCM_FrameOfReferenceUID, "1.2.3"); });
+  expect_error(fmt::format("{}: FrameOfReferenceUID (0020,0052) is not that of the CT, so the plan's isocenter does not apply to it\n"
+                           "       If that is known to be right, allow it: --allow for-mismatch=REASON",
+                           where(study_.plan())));
+}
+
+TEST_F(ErrorMessagesTest, TableMovedBetweenTheViews) {
+  edit(study_.image(1), [](DicomItem d) { d.put(DCM_PatientSupportAngle, 2.0); });
+  expect_error(fmt::format("{}: the table turned by 2.0 degrees since {} (PatientSupportAngle (300A,0122))\n"
+                           "       If that is known to be right, allow it: --allow table-moved=REASON",
+                           where(study_.image(1)), where(study_.image(0))));
+}
+
+TEST_F(ErrorMessagesTest, ViewsTooFarApartInTime) {
+  edit(study_.image(1), [](DicomItem d) { d.put(DCM_AcquisitionTime, "104500"); });
+  expect_error(fmt::format("{}: taken 30 minutes from {}, expected at most 10 (AcquisitionTime (0008,0032))\n"
+                           "       If that is known to be right, allow it: --allow time-span=REASON",
+                           where(study_.image(1)), where(study_.image(0))));
+}
+
+TEST_F(ErrorMessagesTest, IsocenterOutsideTheCt) {
+  expect_error("the isocenter (500.0, 0.0, 0.0) mm lies outside the CT (IsocenterPosition (300A,012C))",
+               {"--isocenter", "500,0,0"});
+}
+
+TEST_F(ErrorMessagesTest, NoPlan) {
+  std::filesystem::remove(study_.plan());
+  expect_error(fmt::format("no RT Plan found (searched {}), so the planned isocenter is unknown.\n"
+                           "       Name the plan (--plan FILE) or supply the isocenter: --isocenter X,Y,Z",
+                           where(study_.path())));
+}
+
+TEST_F(ErrorMessagesTest, UnreadableFile) {
+  std::filesystem::resize_file(study_.ct_slice(3), 700);
+  const CommandOutcome outcome = register_study();
+  EXPECT_EQ(outcome.exit_status, 1);
+  EXPECT_THAT(outcome.err, StartsWith("error: " + where(study_.ct_slice(3)) + ": cannot be read as a DICOM file: "));
+}
+
+TEST_F(ErrorMessagesTest, TruncatedPixelData) {
+  std::filesystem::resize_file(study_.ct_slice(3), std::filesystem::file_size(study_.ct_slice(3)) - 100);
+  const CommandOutcome outcome = register_study();
+  EXPECT_EQ(outcome.exit_status, 1);
+  EXPECT_THAT(outcome.err, StartsWith("error: " + where(study_.ct_slice(3)) + ": cannot be read as a DICOM file: "));
+}
+
+TEST_F(ErrorMessagesTest, OutputFolderAlreadyHoldingAResult) {
+  std::filesystem::create_directory(study_.output());
+  std::ofstream(study_.output() / "result.json") << "precious";
+  const CommandOutcome outcome = register_study();
+  EXPECT_EQ(outcome.exit_status, 1);
+  EXPECT_EQ(outcome.err, fmt::format("error: {}: the output folder is not empty.\n"
+                                     "       Name another one, or replace what it holds: --overwrite\n",
+                                     where(study_.output())));
+  std::ifstream file(study_.output() / "result.json");
+  std::string content;
+  file >> content;
+  EXPECT_EQ(content, "precious");
+}
+
+TEST_F(ErrorMessagesTest, DiskFull) {
+  const std::filesystem::path disk = study_.output().parent_path() / "disk";
+  std::filesystem::create_directory(disk);
+  if (run_shell(fmt::format("mount -t tmpfs -o size=64k tmpfs {}", disk.string())).exit_status != 0)
+    GTEST_SKIP() << "no tmpfs can be mounted here; needs root";
+  const CommandOutcome outcome =
+      run_command({"register", study_.path().string(), "-o", (disk / "result").string()});
+  int left = 0;
+  for ([[maybe_unused]] const auto& entry : std::filesystem::directory_iterator(disk)) ++left;
+  run_shell(fmt::format("umount {}", disk.string()));
+  EXPECT_EQ(outcome.exit_status, 1);
+  EXPECT_THAT(outcome.err, HasSubstr("cannot be written: No space left on device\n       No result was left behind\n"));
+  EXPECT_EQ(left, 0);
+}
+
+TEST_F(ErrorMessagesTest, UsageErrorsHaveTheirOwnStatus) {
+  EXPECT_EQ(run_command({}).exit_status, 2);
+  EXPECT_EQ(run_command({"registre"}).exit_status, 2);
+  EXPECT_EQ(run_command({"register", where(study_.path())}).exit_status, 2);  // no -o
+  EXPECT_EQ(register_study({"--intensity", "LINEAR"}).exit_status, 2);
+  EXPECT_EQ(register_study({"--allow", "everything=please"}).exit_status, 2);
+  EXPECT_EQ(register_study({"--allow", "gaps"}).exit_status, 2);
+  EXPECT_EQ(register_study({"--gantry-angle", "KV_G000=north"}).exit_status, 2);
+  EXPECT_EQ(register_study({"--gantry-angle", "NOBODY=0"}).exit_status, 2);
+  EXPECT_EQ(register_study({"--attenuation", "windowed", "--window", "100,-100"}).exit_status, 2);
+}
+
+TEST_F(ErrorMessagesTest, AnEmptyDrrIsAnError) {
+  const CommandOutcome outcome = run_command(
+      {"drr", study_.path().string(), "-o", study_.output().string(), "--threshold-hu", "9000"});
+  EXPECT_EQ(outcome.exit_status, 1);
+  EXPECT_EQ(outcome.err, "warning: the plan is not approved (ApprovalStatus (300E,0002) is \"UNAPPROVED\")\n"
+                         "error: KV_G000: the DRR is empty: no ray meets anything above the threshold in the CT\n");
+  EXPECT_FALSE(std::filesystem::exists(study_.output()));
+}
+
+TEST_F(ErrorMessagesTest, RegisteringAnEmptyDrrIsAnErrorToo) {
+  const CommandOutcome outcome = register_study({"--threshold-hu", "9000"});
+  EXPECT_EQ(outcome.exit_status, 1);
+  EXPECT_THAT(outcome.err, HasSubstr("the DRR is empty"));
+}
+
+}  // namespace
+}  // namespace isoshift

@@ -1,0 +1,134 @@
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "cli/truth.h"
+#include "tests/support/command.h"
+#include "tests/support/pose_near.h"
+#include "tests/support/small_study.h"
+
+namespace isoshift {
+namespace {
+
+using testing::HasSubstr;
+
+class RegisterCommandTest : public testing::Test {
+ protected:
+  CommandOutcome register_study(std::vector<std::string> more = {}) {
+    std::vector<std::string> arguments = {"register", study_.path().string(), "-o", study_.output().string()};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return run_command(arguments);
+  }
+
+  nlohmann::json result() {
+    std::ifstream file(study_.output() / "result.json");
+    return nlohmann::json::parse(file);
+  }
+
+  SmallStudy study_;
+};
+
+TEST_F(RegisterCommandTest, FindsTheSetupErrorFromTheFirstFileToTheLast) {
+  const CommandOutcome outcome = register_study({"--truth", study_.truth().string()});
+  EXPECT_EQ(outcome.exit_status, 0) << outcome.err;
+  // Voxels of 4 x 4 x 6 mm and pixels of 2.8 mm at the isocenter.
+  EXPECT_THAT(read_setup_error(study_.output() / "result.json"), PoseNear(read_setup_error(study_.truth()), 0.5, 0.4));
+  for (const char* name : {"report.txt", "result.json", "spatial_registration.dcm", "view1.png", "view2.png"})
+    EXPECT_TRUE(std::filesystem::exists(study_.output() / name)) << name;
+  EXPECT_THAT(outcome.out, HasSubstr("VERDICT      ACCEPTED"));
+  EXPECT_THAT(outcome.out, HasSubstr("SETUP ERROR BESIDE THE TRUTH"));
+  EXPECT_EQ(result()["references"]["images"].size(), 2U);
+}
+
+TEST_F(RegisterCommandTest, ResultFollowsItsSchema) {
+  for (const auto& more : {std::vector<std::string>{}, {"--image", study_.image(0).string()}}) {
+    register_study(more);
+    const CommandOutcome checked =
+        run_shell(fmt::format("/usr/bin/python3 -m jsonschema -i {} {}/docs/result.schema.json",
+                              (study_.output() / "result.json").string(), ISOSHIFT_SOURCE_DIR));
+    EXPECT_EQ(checked.exit_status, 0) << checked.out;
+    std::filesystem::remove_all(study_.output());
+  }
+}
+
+TEST_F(RegisterCommandTest, JsonOnStdoutIsTheResultFile) {
+  const CommandOutcome outcome = register_study({"--json"});
+  EXPECT_EQ(nlohmann::json::parse(outcome.out), result());
+}
+
+TEST_F(RegisterCommandTest, OneViewIsReviewWithoutDepthAndWithoutRegistrationObject) {
+  const CommandOutcome outcome =
+      register_study({"--image", study_.image(0).string(), "--write-reg-for-review"});
+  EXPECT_EQ(outcome.exit_status, 3);
+  EXPECT_EQ(result()["verdict"], "review");
+  EXPECT_TRUE(result()["setup_error"]["translation_mm"][2].is_null());  // gantry 0 looks along z
+  EXPECT_FALSE(result()["setup_error"]["translation_mm"][0].is_null());
+  EXPECT_TRUE(result()["couch_shift"]["vertical_mm"].is_null());
+  EXPECT_FALSE(std::filesystem::exists(study_.output() / "spatial_registration.dcm"));
+}
+
+TEST_F(RegisterCommandTest, AReviewedResultIsWrittenOnlyOnRequestAndMarked) {
+  // The patient of another seed: the skull matches poorly.
+  SmallStudy other([] {
+    PhantomOptions options = small_phantom();
+    options.anatomy = PhantomOptions::Anatomy::kSpine;
+    return options;
+  }());
+  const std::vector<std::string> mismatched = {"--ct", (other.path() / "CT").string(), "--allow", "patient-mismatch=test",
+                                               "--allow", "for-mismatch=test"};
+  EXPECT_EQ(register_study(mismatched).exit_status, 3);
+  EXPECT_FALSE(std::filesystem::exists(study_.output() / "spatial_registration.dcm"));
+  auto on_request = mismatched;
+  on_request.insert(on_request.end(), {"--write-reg-for-review", "--overwrite"});
+  EXPECT_EQ(register_study(on_request).exit_status, 3);
+  const DicomFile file = DicomFile::read(study_.output() / "spatial_registration.dcm", DicomFile::Extent::kWhole);
+  EXPECT_EQ(file.dataset().text(DCM_ContentLabel), "SETUP_REVIEW");
+  EXPECT_EQ(file.dataset().text(DCM_ContentDescription), "NOT ACCEPTED: REVIEW");
+}
+
+TEST_F(RegisterCommandTest, AllowedFindingsAreInTheResult) {
+  edit(study_.image(1), [](DicomItem d) { d.put(DCM_AcquisitionTime, "104500"); });
+  EXPECT_EQ(register_study({"--allow", "time-span=phantom does not move"}).exit_status, 0);
+  EXPECT_THAT(result()["overrides"][0].get<std::string>(), HasSubstr("(allowed by time-span: phantom does not move)"));
+}
+
+TEST_F(RegisterCommandTest, LogsHoldNoPatientName) {
+  const CommandOutcome outcome = register_study();
+  EXPECT_THAT(outcome.err, testing::Not(HasSubstr("Phantom^Digital")));
+  EXPECT_THAT(outcome.err, testing::Not(HasSubstr("PHANTOM1")));
+}
+
+TEST_F(RegisterCommandTest, DrrAtTheFoundPoseLooksLikeTheXray) {
+  EXPECT_EQ(run_command({"drr", study_.path().string(), "-o", study_.output().string(), "--setup-error",
+                         study_.truth().string()}).exit_status, 0);
+  for (const char* name : {"drr1.png", "drr1.mha", "drr2.png", "drr2.mha"})
+    EXPECT_TRUE(std::filesystem::exists(study_.output() / name)) << name;
+  std::ifstream file(study_.output() / "drr1.mha", std::ios::binary);
+  std::string line;
+  std::getline(file, line);
+  EXPECT_EQ(line, "ObjectType = Image");
+}
+
+TEST_F(RegisterCommandTest, InspectSaysWhatIsThereAndWhatIsMissing) {
+  edit(study_.image(0), [](DicomItem d) {
+    d.erase(DCM_RTImageSID);
+    d.put(DCM_RTImagePosition, "");
+  });
+  std::ofstream(study_.path() / "notes.txt") << "not DICOM";
+  const CommandOutcome outcome = run_command({"inspect", study_.path().string()});
+  EXPECT_EQ(outcome.exit_status, 0) << outcome.err;
+  EXPECT_THAT(outcome.out, HasSubstr("RT Plan \"SETUP\""));
+  EXPECT_THAT(outcome.out, HasSubstr("isocenter (-12.5, 38, -410) mm, HFS, couch 0 deg"));
+  EXPECT_THAT(outcome.out, HasSubstr("48 x 58 x 36, spacing (4, 4, 6) mm"));
+  EXPECT_THAT(outcome.out, HasSubstr("  MISSING                  RTImagePosition (3002,0012); supplied by "
+                                     "--rt-image-position X,Y or --assume-centered\n"
+                                     "  MISSING                  RTImageSID (3002,0026); supplied by --sid MM\n"));
+  EXPECT_THAT(outcome.out, HasSubstr("  source, IEC fixed        (1000.00, 0.00, 0.00) mm\n"));
+  EXPECT_THAT(outcome.out, HasSubstr("notes.txt: not a DICOM file"));
+}
+
+}  // namespace
+}  // namespace isoshift

@@ -1,0 +1,66 @@
+#include "tests/drr/test_views.h"
+
+#include <cmath>
+#include <random>
+
+#include "geometry/rotation.h"
+
+namespace isoshift {
+
+XrayView centered_view(double gantry_deg, int pixels, double pixel_mm) {
+  CarmGeometry geometry;
+  geometry.sad_mm = 1000.0;
+  geometry.gantry_angle_rad = rad_from_deg(gantry_deg);
+  geometry.receptor_translation_mm = Eigen::Vector3d(0, 0, -500);
+  geometry.column_spacing_mm = geometry.row_spacing_mm = pixel_mm;
+  geometry.position_mm = 0.5 * (pixels - 1) * pixel_mm * Eigen::Vector2d(-1, 1);
+  geometry.columns = geometry.rows = pixels;
+  return make_xray_view(geometry, Beam::kKilovoltage);
+}
+
+Volume<float> centered_volume(const Eigen::Vector3i& size, const Eigen::Vector3d& spacing_mm, float hu) {
+  Eigen::Affine3d patient_from_voxel = Eigen::Affine3d::Identity();
+  patient_from_voxel.linear() = spacing_mm.asDiagonal();
+  patient_from_voxel.translation() = -0.5 * Eigen::Vector3d((size.array() - 1).cast<double>() * spacing_mm.array());
+  return {size, patient_from_voxel, hu};
+}
+
+Volume<float> textured_volume() {
+  Volume<float> ct = centered_volume({16, 20, 12}, {3.0, 2.5, 4.0}, 0.0F);
+  ct.patient_from_voxel = Eigen::AngleAxisd(0.4, Eigen::Vector3d(1, 2, 3).normalized()) * ct.patient_from_voxel;
+  std::mt19937 random(3);
+  for (float& hu : ct.voxels) hu = std::uniform_real_distribution<float>(-700, 1300)(random);
+  return ct;
+}
+
+Volume<float> phantom_ct_of(const std::vector<Shape>& shapes) {
+  const Volume<float> lattice = centered_volume({95, 115, 72}, {2.0, 2.0, 3.0}, 0.0F);
+  return ct_of_shapes(shapes, lattice.size, lattice.patient_from_voxel);
+}
+
+Volume<float> phantom_ct() { return phantom_ct_of(head_phantom(Eigen::Vector3d::Zero(), 1)); }
+
+std::vector<Eigen::Isometry3d> random_poses(int count) {
+  std::mt19937_64 random(11);
+  std::uniform_real_distribution<double> within(-1.0, 1.0);
+  std::vector<Eigen::Isometry3d> poses;
+  for (int n = 0; n < count; ++n) {
+    Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
+    pose.linear() = rotation_from_zxy({0.17 * within(random), 0.17 * within(random), 0.17 * within(random)});
+    pose.translation() = 10.0 * Eigen::Vector3d(within(random), within(random), within(random));
+    poses.push_back(pose);
+  }
+  return poses;
+}
+
+double relative_error(const std::vector<float>& pixels, const std::vector<float>& oracle) {
+  double difference = 0.0, reference = 0.0;
+  for (std::size_t n = 0; n < oracle.size(); ++n) {
+    if (oracle[n] == 0.0F) continue;
+    difference += std::pow(pixels[n] - oracle[n], 2);
+    reference += std::pow(oracle[n], 2);
+  }
+  return std::sqrt(difference / reference);
+}
+
+}  // namespace isoshift

@@ -1,0 +1,32 @@
+#pragma once
+// Views, volumes and poses that the renderers' tests share.
+
+#include <vector>
+
+#include "drr/renderer.h"
+#include "phantom/shapes.h"
+
+namespace isoshift {
+
+inline constexpr std::array kBothBeams = {Beam::kKilovoltage, Beam::kMegavoltage};
+
+// A square panel at SID 1500 mm (SAD 1000), centered, `pixels` along each edge.
+XrayView centered_view(double gantry_deg, int pixels, double pixel_mm);
+
+// A volume of one value, its center at the origin, its axes those of the room.
+Volume<float> centered_volume(const Eigen::Vector3i& size, const Eigen::Vector3d& spacing_mm, float hu);
+
+// Random HU between -700 and 1300 in 16 x 20 x 12 voxels with oblique axes.
+Volume<float> textured_volume();
+
+// The CT of shapes, and of the head phantom, with voxels of 2 x 2 x 3 mm about the origin.
+Volume<float> phantom_ct_of(const std::vector<Shape>& shapes);
+Volume<float> phantom_ct();
+
+// Poses within 10 mm and 10 degrees, the same in every run.
+std::vector<Eigen::Isometry3d> random_poses(int count);
+
+// rms(difference) / rms(oracle) over the pixels whose oracle value is not 0.
+double relative_error(const std::vector<float>& pixels, const std::vector<float>& oracle);
+
+}  // namespace isoshift

@@ -1,0 +1,38 @@
+#include "geometry/rotation.h"
+
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "tests/support/pose_near.h"
+
+namespace isoshift {
+namespace {
+
+TEST(Rotation, IsRightHandedAboutEveryAxis) {
+  const double quarter = rad_from_deg(90.0);
+  EXPECT_THAT(Eigen::Vector3d(rotation_x(quarter) * Eigen::Vector3d::UnitY()), VectorNear(Eigen::Vector3d(0, 0, 1), 1e-15));
+  EXPECT_THAT(Eigen::Vector3d(rotation_y(quarter) * Eigen::Vector3d::UnitZ()), VectorNear(Eigen::Vector3d(1, 0, 0), 1e-15));
+  EXPECT_THAT(Eigen::Vector3d(rotation_z(quarter) * Eigen::Vector3d::UnitX()), VectorNear(Eigen::Vector3d(0, 1, 0), 1e-15));
+}
+
+TEST(Rotation, ZxyAnglesComposeAndDecompose) {
+  std::mt19937_64 random(1);
+  std::uniform_real_distribution<double> turn(-3.14, 3.14), tilt(-1.57, 1.57);
+  for (int n = 0; n < 1000; ++n) {
+    const ZxyAngles angles{.z_rad = turn(random), .x_rad = tilt(random), .y_rad = turn(random)};
+    const ZxyAngles found = zxy_from_rotation(rotation_from_zxy(angles));
+    ASSERT_NEAR(found.z_rad, angles.z_rad, 1e-11);
+    ASSERT_NEAR(found.x_rad, angles.x_rad, 1e-11);
+    ASSERT_NEAR(found.y_rad, angles.y_rad, 1e-11);
+  }
+}
+
+TEST(Rotation, AnglesWrapToHalfATurn) {
+  EXPECT_DOUBLE_EQ(deg_from_rad(wrapped_rad(rad_from_deg(359.998))), -0.0019999999999953388);
+  EXPECT_DOUBLE_EQ(wrapped_rad(rad_from_deg(540.0)), std::numbers::pi);
+  EXPECT_DOUBLE_EQ(wrapped_rad(rad_from_deg(-180.0)), std::numbers::pi);
+}
+
+}  // namespace
+}  // namespace isoshift

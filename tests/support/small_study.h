@@ -1,0 +1,34 @@
+#pragma once
+// A phantom study small enough to be made, broken and read in every test.
+
+#include <functional>
+
+#include "io/dicom_dataset.h"
+#include "phantom/study_writer.h"
+#include "tests/support/temporary_folder.h"
+
+namespace isoshift {
+
+// 4 mm voxels and 96 x 96 pixels, without noise: quick, and precise enough for what uses it.
+PhantomOptions small_phantom();
+
+// A study folder with one phantom in it. Tests change its files with edit().
+class SmallStudy {
+ public:
+  explicit SmallStudy(const PhantomOptions& options = small_phantom());
+
+  std::filesystem::path path() const { return folder_ / "study"; }
+  std::filesystem::path output() const { return folder_ / "result"; }
+  std::filesystem::path ct_slice(int k) const;
+  std::filesystem::path image(int n) const;  // 0: gantry 0, 1: gantry 90
+  std::filesystem::path plan() const { return path() / "RTPLAN.dcm"; }
+  std::filesystem::path truth() const { return path() / "truth.json"; }
+
+ private:
+  TemporaryFolder folder_;
+};
+
+// Changes a DICOM file in place.
+void edit(const std::filesystem::path& path, const std::function<void(DicomItem)>& change);
+
+}  // namespace isoshift
