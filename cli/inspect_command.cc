@@ -91,17 +91,15 @@ std::string describe_plan(const std::filesystem::path& path) {
 
 std::string describe_ct(const std::string& series_uid, const std::vector<std::filesystem::path>& files,
                         Console& console) {
-  std::string text =
-      fmt::format("CT series {}\n", series_uid) +
-      line("slices", fmt::format("{}, from {}", files.size(), files.front().parent_path().string()));
+  std::string text = fmt::format("CT series {}\n", series_uid) +
+                     line("slices", fmt::format("{}, from {}", files.size(), files.front().parent_path().string()));
   Notes notes;
   try {
     ProgressBar bar(console, "Reading CT");
     const CtSeries ct = read_ct_series(files, {{"gaps", "inspection"}}, notes,
                                        [&](std::size_t done, std::size_t total) { bar.update(done, total); });
     const Eigen::Vector3d first = ct.hu.patient_from_voxel.translation();
-    const Eigen::Vector3d last =
-        ct.hu.patient_from_voxel * Eigen::Vector3d((ct.hu.size.array() - 1).cast<double>());
+    const Eigen::Vector3d last = ct.hu.patient_from_voxel * Eigen::Vector3d((ct.hu.size.array() - 1).cast<double>());
     text += line("voxels", fmt::format("{}, spacing ({:.4g}) mm", fmt::join(ct.hu.size, " x "),
                                        fmt::join(ct.hu.spacing_mm(), ", "))) +
             line("first voxel, patient", fmt::format("({:.2f}) mm", fmt::join(first, ", "))) +

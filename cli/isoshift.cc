@@ -10,14 +10,14 @@ namespace isoshift {
 namespace {
 
 constexpr const char* kDescription =
-    "isoshift compares the planning CT with the X-rays taken in the treatment room, finds how far the patient lies off\n"
+    "isoshift compares the planning CT with the X-rays taken in the treatment room, finds how far the patient lies "
+    "off\n"
     "plan, and says how the couch must move. Not for clinical use unless validated by the site.\n\n"
     "Example:\n"
     "  isoshift inspect exported/            # what is in the folder, and what is missing\n"
     "  isoshift register exported/ -o out    # finds the shift; writes out/report.txt, result.json, ...\n";
 
-constexpr const char* kFooter =
-    "\nExit status: 0 accepted (or done), 1 failed, 2 usage, 3 review, 4 rejected.";
+constexpr const char* kFooter = "\nExit status: 0 accepted (or done), 1 failed, 2 usage, 3 review, 4 rejected.";
 
 int say(Console& console, const std::exception& error, int status) {
   console.err << "error: " << error.what() << "\n";

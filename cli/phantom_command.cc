@@ -31,9 +31,10 @@ void run_phantom(PhantomCommandOptions options, Console& console) {
     write_phantom_study(phantom, output.path(), [&](std::size_t done, std::size_t total) { bar.update(done, total); });
   }
   output.commit();
-  console.out << fmt::format("{}: {} phantom study, seed {}; off plan by ({:.2f}) mm and ({:.2f}) degrees about x, y, z\n",
-                             options.output.string(), options.anatomy, phantom.seed,
-                             fmt::join(options.translation_mm, ", "), fmt::join(options.rotation_deg, ", "));
+  console.out << fmt::format(
+      "{}: {} phantom study, seed {}; off plan by ({:.2f}) mm and ({:.2f}) degrees about x, y, z\n",
+      options.output.string(), options.anatomy, phantom.seed, fmt::join(options.translation_mm, ", "),
+      fmt::join(options.rotation_deg, ", "));
 }
 
 }  // namespace
@@ -46,19 +47,32 @@ void add_phantom_command(CLI::App& app, Console& console, int&) {
       "  isoshift register study -o result --truth study/truth.json");
   command->add_option("-o,--output", options->output, "Folder to make")->required()->type_name("FOLDER");
   command->add_option("--anatomy", options->anatomy, "What the body is")
-      ->check(CLI::IsMember({"head", "spine"}))->capture_default_str();
+      ->check(CLI::IsMember({"head", "spine"}))
+      ->capture_default_str();
   command->add_option("--translation", options->translation_mm, "Setup error, mm, IEC 61217 fixed")
-      ->delimiter(',')->expected(3)->type_name("X,Y,Z")->capture_default_str();
+      ->delimiter(',')
+      ->expected(3)
+      ->type_name("X,Y,Z")
+      ->capture_default_str();
   command->add_option("--rotation", options->rotation_deg, "Setup error about x, y, z in degrees, R = Rz Rx Ry")
-      ->delimiter(',')->expected(3)->type_name("RX,RY,RZ")->capture_default_str();
+      ->delimiter(',')
+      ->expected(3)
+      ->type_name("RX,RY,RZ")
+      ->capture_default_str();
   command->add_option("--patient-position", options->phantom.placement.patient_position, "How the patient lies")
-      ->check(CLI::IsMember({"HFS", "HFP", "FFS", "FFP", "HFDR", "HFDL", "FFDR", "FFDL"}))->capture_default_str();
+      ->check(CLI::IsMember({"HFS", "HFP", "FFS", "FFP", "HFDR", "HFDL", "FFDR", "FFDL"}))
+      ->capture_default_str();
   command->add_option("--couch-angle", options->phantom.placement.couch_angle_deg, "Patient support angle, IEC 61217")
-      ->type_name("DEG")->capture_default_str();
+      ->type_name("DEG")
+      ->capture_default_str();
   command->add_option("--gantry-angles", options->phantom.gantry_angles_deg, "One X-ray is taken at each")
-      ->delimiter(',')->type_name("DEG,...")->capture_default_str();
-  command->add_option("--voxel-mm", options->phantom.voxel_mm, "Pixel size of the CT; its slices are 1.5 times as thick")
-      ->type_name("MM")->capture_default_str();
+      ->delimiter(',')
+      ->type_name("DEG,...")
+      ->capture_default_str();
+  command
+      ->add_option("--voxel-mm", options->phantom.voxel_mm, "Pixel size of the CT; its slices are 1.5 times as thick")
+      ->type_name("MM")
+      ->capture_default_str();
   command->add_option("--image-pixels", options->phantom.image_pixels, "Pixels along each edge of an X-ray")
       ->capture_default_str();
   command->add_option("--photons", options->phantom.photons, "Photons per open pixel; 0 for no noise")

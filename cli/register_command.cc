@@ -77,8 +77,7 @@ SetupReport make_report(const RegisterOptions& options, const Study& study, cons
 // Accepted results are written; those for review only on request, and never along a direction nobody measured.
 bool may_write_registration(const RegisterOptions& options, const RegistrationResult& result) {
   if (!result.unobservable_room.empty()) return false;
-  return result.verdict == Verdict::kAccepted ||
-         (result.verdict == Verdict::kReview && options.write_reg_for_review);
+  return result.verdict == Verdict::kAccepted || (result.verdict == Verdict::kReview && options.write_reg_for_review);
 }
 
 SpatialRegistrationLabel label_of(Verdict verdict) {
@@ -99,12 +98,13 @@ void write_pictures(const Study& study, Renderer& renderer, const Eigen::Isometr
   for (std::size_t n = 0; n < study.xrays.size(); ++n) {
     const XrayImage& xray = study.xrays[n];
     const RenderResult drrs = renderer.render(std::span(&xray.view, 1), poses, PixelSet::all());
-    const Image<float> line_integral = prepare(xray).line_integral;
+    const FixedImage compared = prepare(xray);
     const Image<float> planned = as_image(xray.view, drrs.line_integrals(0, 0));
     const Image<float> found = as_image(xray.view, drrs.line_integrals(1, 0));
     write_comparison_png(folder / fmt::format("view{}.png", n + 1),
                          {.label = xray.label,
-                          .xray = line_integral,
+                          .xray = compared.line_integral,
+                          .field = compared.field,
                           .drr_planned = planned,
                           .drr_found = found,
                           .isocenter_px = xray.view.project(Eigen::Vector3d::Zero()).value()});
@@ -133,9 +133,8 @@ int run_register(const RegisterOptions& given, Console& console) {
 
   SetupReport report = make_report(options, study, *renderer, result);
   if (may_write_registration(options, result))
-    report.spatial_registration_uid =
-        write_spatial_registration(study, result.actual_room_from_patient, label_of(result.verdict),
-                                   output.path() / kRegistrationFile, notes);
+    report.spatial_registration_uid = write_spatial_registration(
+        study, result.actual_room_from_patient, label_of(result.verdict), output.path() / kRegistrationFile, notes);
   write_pictures(study, *renderer, result.actual_room_from_patient, output.path());
   report.overrides = notes.overrides;
   report.warnings = notes.warnings;
@@ -168,7 +167,8 @@ void add_register_command(CLI::App& app, Console& console, int& exit_status) {
   add_study_options(*command, options->study);
   command->add_option("-o,--output", options->output, "Folder for the results")->required()->type_name("FOLDER");
   command->add_option("--dof", options->dof, "Degrees of freedom: six, or the three translations")
-      ->check(CLI::IsMember({"rigid", "translation"}))->capture_default_str();
+      ->check(CLI::IsMember({"rigid", "translation"}))
+      ->capture_default_str();
   command->add_option("--seed", options->registration.seed, "Of the pixels drawn; the only randomness")
       ->capture_default_str();
   command->add_option("--truth", options->truth, "truth.json of a phantom study: print the result beside it")

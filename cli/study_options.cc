@@ -67,29 +67,43 @@ void add_study_options(CLI::App& command, StudyOptions& options) {
       ->type_name("FOLDER");
   const char* parts = "Parts of the study";
   command.add_option("--ct", options.ct, "Folder or files of the planning CT")->type_name("PATH")->group(parts);
-  command.add_option("--image", options.images, "RT Images (X-rays), files or folders")->type_name("PATH")->group(parts);
+  command.add_option("--image", options.images, "RT Images (X-rays), files or folders")
+      ->type_name("PATH")
+      ->group(parts);
   command.add_option("--plan", options.plan, "RT Plan")->type_name("FILE")->group(parts);
 
   const char* lacking = "What the files lack (never guessed; each use is written into the result)";
   command.add_option("--isocenter", options.isocenter, "Planned isocenter in patient coordinates of the CT, mm")
-      ->delimiter(',')->expected(3)->type_name("X,Y,Z")->group(lacking);
+      ->delimiter(',')
+      ->expected(3)
+      ->type_name("X,Y,Z")
+      ->group(lacking);
   command.add_option("--patient-position", options.patient_position, "How the patient lies on the table")
-      ->check(CLI::IsMember({"HFS", "HFP", "FFS", "FFP", "HFDR", "HFDL", "FFDR", "FFDL"}))->group(lacking);
+      ->check(CLI::IsMember({"HFS", "HFP", "FFS", "FFP", "HFDR", "HFDL", "FFDR", "FFDL"}))
+      ->group(lacking);
   command.add_option("--couch-angle", options.couch_angle_deg, "Patient support angle at imaging, IEC 61217")
-      ->type_name("DEG")->group(lacking);
+      ->type_name("DEG")
+      ->group(lacking);
   command.add_option("--gantry-angle", options.gantry_angles, "Gantry angle of the image with this label, IEC 61217")
-      ->type_name("LABEL=DEG")->group(lacking);
+      ->type_name("LABEL=DEG")
+      ->group(lacking);
   command.add_option("--sad", options.sad_mm, "Source to axis distance")->type_name("MM")->group(lacking);
   command.add_option("--sid", options.sid_mm, "Source to image plane distance")->type_name("MM")->group(lacking);
   command.add_option("--rt-image-position", options.rt_image_position, "Center of the first pixel on the receptor, mm")
-      ->delimiter(',')->expected(2)->type_name("X,Y")->group(lacking);
+      ->delimiter(',')
+      ->expected(2)
+      ->type_name("X,Y")
+      ->group(lacking);
   command.add_flag("--assume-centered", options.assume_centered, "Images without RT Image Position are centered")
       ->group(lacking);
-  command.add_option("--intensity", options.intensity,
-                     "Pixel intensity relationship, and its sign for stored values: + higher stored value, more X-ray")
-      ->check(CLI::IsMember({"LIN+", "LIN-", "LOG+", "LOG-"}))->group(lacking);
+  command
+      .add_option("--intensity", options.intensity,
+                  "Pixel intensity relationship, and its sign for stored values: + higher stored value, more X-ray")
+      ->check(CLI::IsMember({"LIN+", "LIN-", "LOG+", "LOG-"}))
+      ->group(lacking);
   command.add_option("--beam", options.beam, "Beam quality of all images")
-      ->check(CLI::IsMember({"kv", "mv"}))->group(lacking);
+      ->check(CLI::IsMember({"kv", "mv"}))
+      ->group(lacking);
   command.add_option("--allow", options.allow, allow_keys_help())->type_name("KEY=REASON")->group(lacking);
 }
 
@@ -115,17 +129,26 @@ void add_rendering_options(CLI::App& command, RenderingOptions& options) {
   std::vector<std::string> names = {"auto"};
   for (const RendererKind kind : kRendererKinds) names.emplace_back(to_string(kind));
   command.add_option("--renderer", options.renderer, "What renders the DRRs; siddon and trilinear are slow references")
-      ->check(CLI::IsMember(names))->capture_default_str()->group(group);
-  command.add_option("--attenuation", options.attenuation, "From HU to attenuation: a physical curve, or the HU window")
-      ->check(CLI::IsMember({"physical", "windowed"}))->capture_default_str()->group(group);
+      ->check(CLI::IsMember(names))
+      ->capture_default_str()
+      ->group(group);
+  command
+      .add_option("--attenuation", options.attenuation, "From HU to attenuation: a physical curve, or the HU window")
+      ->check(CLI::IsMember({"physical", "windowed"}))
+      ->capture_default_str()
+      ->group(group);
   command.add_option("--threshold-hu", options.threshold_hu, "Voxels below count as nothing")
-      ->type_name("HU")->capture_default_str()->group(group);
+      ->type_name("HU")
+      ->capture_default_str()
+      ->group(group);
   command.add_option("--window", options.window, "HU window of --attenuation windowed [-540,1500]")
-      ->delimiter(',')->expected(2)->type_name("LOW,HIGH")->group(group);
+      ->delimiter(',')
+      ->expected(2)
+      ->type_name("LOW,HIGH")
+      ->group(group);
 }
 
-LoadedStudy load(const StudyOptions& study_options, const RenderingOptions& rendering, Notes& notes,
-                 Console& console) {
+LoadedStudy load(const StudyOptions& study_options, const RenderingOptions& rendering, Notes& notes, Console& console) {
   const StudyRequest request = study_options.request();
   const AttenuationModel model = rendering.model();
   LoadedStudy loaded;

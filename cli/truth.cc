@@ -54,8 +54,8 @@ std::string compared_with_truth(const Eigen::Isometry3d& found_error, const Eige
   }
   for (int axis = 0; axis < 3; ++axis) {
     const double found = angles_deg(found_error)[axis], known = angles_deg(true_error)[axis];
-    table += fmt::format("  {:<14} {:>11.2f} {:>9.2f} {:>9.2f} deg\n", fmt::format("about {}", kAxes[axis]), found, known,
-                         found - known);
+    table += fmt::format("  {:<14} {:>11.2f} {:>9.2f} {:>9.2f} deg\n", fmt::format("about {}", kAxes[axis]), found,
+                         known, found - known);
   }
   table += fmt::format("  mean target registration error, 27 points within 50 mm: {:.2f} mm\n",
                        mean_target_registration_error_mm(found_error, true_error));

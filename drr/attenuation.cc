@@ -18,9 +18,7 @@ struct BeamCurve {
   double bone_slope;
 };
 
-BeamCurve curve_of(Beam beam) {
-  return beam == Beam::kKilovoltage ? BeamCurve{0.0205, 1.6} : BeamCurve{0.0050, 0.95};
-}
+BeamCurve curve_of(Beam beam) { return beam == Beam::kKilovoltage ? BeamCurve{0.0205, 1.6} : BeamCurve{0.0050, 0.95}; }
 
 }  // namespace
 

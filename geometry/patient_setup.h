@@ -25,7 +25,7 @@ Eigen::Matrix3d table_from_patient_axes(PatientPosition position);
 
 // Table read-outs at imaging, IEC 61217 (PS3.3 C.8.8.25.6): fixed <- support <- eccentric <- pitched, rolled table top.
 struct TableAngles {
-  double support_rad = 0.0;    // Patient Support Angle (300A,0122), about fixed z, positive counter-clockwise from above
+  double support_rad = 0.0;  // Patient Support Angle (300A,0122), about fixed z, positive counter-clockwise from above
   double eccentric_rad = 0.0;  // Table Top Eccentric Angle (300A,0125), about the eccentric axis, which is vertical too
   double pitch_rad = 0.0;      // Table Top Pitch Angle (300A,0140), about table x
   double roll_rad = 0.0;       // Table Top Roll Angle (300A,0144), about the pitched table y

@@ -19,9 +19,7 @@ struct Volume {
   Volume(const Eigen::Vector3i& voxel_counts, const Eigen::Affine3d& lattice, T fill = T{})
       : size(voxel_counts), patient_from_voxel(lattice), voxels(voxel_counts.cast<std::size_t>().prod(), fill) {}
 
-  std::size_t index(int i, int j, int k) const {
-    return (static_cast<std::size_t>(k) * size.y() + j) * size.x() + i;
-  }
+  std::size_t index(int i, int j, int k) const { return (static_cast<std::size_t>(k) * size.y() + j) * size.x() + i; }
   T& at(int i, int j, int k) { return voxels[index(i, j, k)]; }
   const T& at(int i, int j, int k) const { return voxels[index(i, j, k)]; }
 

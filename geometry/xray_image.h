@@ -18,7 +18,7 @@ struct XrayImage {
   XrayView view;
   Image<float> values;
   Meaning meaning = Meaning::kIntensity;
-  double collimator_angle_rad = 0.0;  // BeamLimitingDeviceAngle: how the field's edges are turned against the receptor
+  double collimator_angle_rad = 0.0;  // how the field's edges are turned in the image, counter-clockwise as displayed
 };
 
 }  // namespace isoshift

@@ -39,16 +39,16 @@ struct XrayView {
 
 // A linac's imager in the attributes of an RT Image (PS3.3 C.8.8.2), angles in radians, lengths in mm.
 struct CarmGeometry {
-  double sad_mm = 0.0;                                                 // RadiationMachineSAD
-  double gantry_angle_rad = 0.0;                                       // GantryAngle, about fixed y
-  Eigen::Vector3d receptor_translation_mm = Eigen::Vector3d::Zero();   // XRayImageReceptorTranslation, IEC gantry
-  double receptor_angle_rad = 0.0;                                     // XRayImageReceptorAngle, about receptor z
-  Eigen::Vector3d row_direction = Eigen::Vector3d::UnitX();            // RTImageOrientation, first three
-  Eigen::Vector3d column_direction = -Eigen::Vector3d::UnitY();        // RTImageOrientation, last three
-  bool normal_plane = true;                                            // RTImagePlane is NORMAL
-  double column_spacing_mm = 0.0;                                      // ImagePlanePixelSpacing, second value
-  double row_spacing_mm = 0.0;                                         // ImagePlanePixelSpacing, first value
-  Eigen::Vector2d position_mm = Eigen::Vector2d::Zero();               // RTImagePosition: center of the first pixel
+  double sad_mm = 0.0;                                                // RadiationMachineSAD
+  double gantry_angle_rad = 0.0;                                      // GantryAngle, about fixed y
+  Eigen::Vector3d receptor_translation_mm = Eigen::Vector3d::Zero();  // XRayImageReceptorTranslation, IEC gantry
+  double receptor_angle_rad = 0.0;                                    // XRayImageReceptorAngle, about receptor z
+  Eigen::Vector3d row_direction = Eigen::Vector3d::UnitX();           // RTImageOrientation, first three
+  Eigen::Vector3d column_direction = -Eigen::Vector3d::UnitY();       // RTImageOrientation, last three
+  bool normal_plane = true;                                           // RTImagePlane is NORMAL
+  double column_spacing_mm = 0.0;                                     // ImagePlanePixelSpacing, second value
+  double row_spacing_mm = 0.0;                                        // ImagePlanePixelSpacing, first value
+  Eigen::Vector2d position_mm = Eigen::Vector2d::Zero();              // RTImagePosition: center of the first pixel
   int columns = 0;
   int rows = 0;
 };

@@ -19,10 +19,10 @@ constexpr float kAirHu = -1000.0F;
 
 struct Slice {
   std::string where;
-  Eigen::Vector3d position_mm;                // ImagePositionPatient: center of the first voxel
-  Eigen::Vector3d row_direction;              // ImageOrientationPatient, first three
-  Eigen::Vector3d column_direction;           // ImageOrientationPatient, last three
-  double row_spacing_mm, column_spacing_mm;   // PixelSpacing: between rows, between columns
+  Eigen::Vector3d position_mm;               // ImagePositionPatient: center of the first voxel
+  Eigen::Vector3d row_direction;             // ImageOrientationPatient, first three
+  Eigen::Vector3d column_direction;          // ImageOrientationPatient, last three
+  double row_spacing_mm, column_spacing_mm;  // PixelSpacing: between rows, between columns
   PixelFormat format;
   std::string sop_instance_uid;
   std::string frame_of_reference_uid;
@@ -107,8 +107,8 @@ Eigen::Matrix3d orthonormal_axes(const Slice& slice) {
 void check_same_lattice(const std::vector<Slice>& slices) {
   const Slice& first = slices.front();
   const auto differs = [&](const Slice& slice, const DcmTagKey& tag) {
-    throw Error(fmt::format("{}: {} differs from that of {}\n       One CT series must be one regular volume", slice.where,
-                            described(tag), first.where));
+    throw Error(fmt::format("{}: {} differs from that of {}\n       One CT series must be one regular volume",
+                            slice.where, described(tag), first.where));
   };
   for (const Slice& slice : slices) {
     if (slice.frame_of_reference_uid != first.frame_of_reference_uid) differs(slice, DCM_FrameOfReferenceUID);
@@ -129,9 +129,10 @@ void drop_duplicates(std::vector<Slice>& sorted, const Eigen::Vector3d& normal, 
     if (!kept.empty() && (slice.position_mm - kept.back().position_mm).dot(normal) < kMinPositionDifferenceMm) {
       const bool same = slice.sop_instance_uid == kept.back().sop_instance_uid && slice.hu == kept.back().hu;
       if (!same)
-        throw Error(fmt::format("{}: lies where {} lies ({})\n       One series must hold one slice per position; select one "
-                                "acquisition or phase",
-                                slice.where, kept.back().where, described(DCM_ImagePositionPatient)));
+        throw Error(
+            fmt::format("{}: lies where {} lies ({})\n       One series must hold one slice per position; select one "
+                        "acquisition or phase",
+                        slice.where, kept.back().where, described(DCM_ImagePositionPatient)));
       notes.warnings.push_back(fmt::format("{}: the same slice as {}, counted once", slice.where, kept.back().where));
       continue;
     }
@@ -151,11 +152,10 @@ std::vector<Finding> spacing_findings(const std::vector<double>& positions_mm, d
     const double multiple = std::round(distance_mm / median_mm);
     const bool missing = multiple >= 2.0 && std::abs(distance_mm - multiple * median_mm) <= multiple * tolerance_mm;
     findings.push_back(
-        {"gaps",
-         fmt::format("CT series {}: slices {} and {} are {:.3g} mm apart, the others {:.3g} mm ({}).\n"
-                     "       A uniform series is needed; {}",
-                     series, k + 1, k + 2, distance_mm, median_mm, described(DCM_ImagePositionPatient),
-                     missing ? "a slice is probably missing." : "this one has uneven spacing.")});
+        {"gaps", fmt::format("CT series {}: slices {} and {} are {:.3g} mm apart, the others {:.3g} mm ({}).\n"
+                             "       A uniform series is needed; {}",
+                             series, k + 1, k + 2, distance_mm, median_mm, described(DCM_ImagePositionPatient),
+                             missing ? "a slice is probably missing." : "this one has uneven spacing.")});
     break;  // one is enough to act on
   }
   return findings;
@@ -220,8 +220,7 @@ Volume<float> assembled(std::vector<Slice>& slices, const Eigen::Matrix3d& axes,
 
 CtSeries read_ct_series(std::span<const std::filesystem::path> files, const Allowances& allowed, Notes& notes,
                         const Progress& progress) {
-  if (files.size() < 2)
-    throw Error(fmt::format("a CT series needs at least 2 slices, found {}", files.size()));
+  if (files.size() < 2) throw Error(fmt::format("a CT series needs at least 2 slices, found {}", files.size()));
   const DicomFile file = DicomFile::read(files.front(), DicomFile::Extent::kHeader);
   const DicomItem header = file.dataset();
   CtSeries series;

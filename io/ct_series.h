@@ -27,8 +27,8 @@ struct CtSeries {
 using Progress = std::function<void(std::size_t done, std::size_t total)>;
 
 // Reads and decodes the slices on all cores. Throws Error for anything that would put voxels in the wrong place or give
-// them a wrong value; a missing slice or uneven spacing is a finding that `allowed` may permit (key gaps): the volume is
-// then interpolated linearly onto the smallest spacing.
+// them a wrong value; a missing slice or uneven spacing is a finding that `allowed` may permit (key gaps): the volume
+// is then interpolated linearly onto the smallest spacing.
 CtSeries read_ct_series(std::span<const std::filesystem::path> files, const Allowances& allowed, Notes& notes,
                         const Progress& progress);
 

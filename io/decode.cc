@@ -52,11 +52,12 @@ PixelFormat pixel_format(const DicomItem& dataset) {
   expect(dataset, DCM_SamplesPerPixel, 1);
   const double allocated = dataset.required_number(DCM_BitsAllocated);
   if (allocated != 8 && allocated != 16)
-    throw Error(fmt::format("{}: {} is {}, expected 8 or 16", dataset.where(), described(DCM_BitsAllocated), allocated));
+    throw Error(
+        fmt::format("{}: {} is {}, expected 8 or 16", dataset.where(), described(DCM_BitsAllocated), allocated));
   const double stored = dataset.required_number(DCM_BitsStored);
   if (stored < 8 || stored > allocated)
-    throw Error(fmt::format("{}: {} is {}, expected 8 to {}", dataset.where(), described(DCM_BitsStored), stored,
-                            allocated));
+    throw Error(
+        fmt::format("{}: {} is {}, expected 8 to {}", dataset.where(), described(DCM_BitsStored), stored, allocated));
   format.bits_stored = static_cast<int>(stored);
   expect(dataset, DCM_HighBit, stored - 1);
   format.is_signed = dataset.required_number(DCM_PixelRepresentation) != 0;

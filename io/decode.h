@@ -21,8 +21,8 @@ struct PixelFormat {
 // Reads and checks the format: 8 or 16 bits allocated, one sample, HighBit = BitsStored - 1, at most 8192 x 8192.
 PixelFormat pixel_format(const DicomItem& dataset);
 
-// Stored values, row-major: masked to BitsStored and sign-extended, before any rescale. Decompresses in place: RLE, JPEG
-// baseline and lossless, JPEG-LS. Throws Error naming the transfer syntax and the way around for any other.
+// Stored values, row-major: masked to BitsStored and sign-extended, before any rescale. Decompresses in place: RLE,
+// JPEG baseline and lossless, JPEG-LS. Throws Error naming the transfer syntax and the way around for any other.
 std::vector<std::int32_t> decode_pixels(DicomFile& file, const PixelFormat& format);
 
 }  // namespace isoshift

@@ -55,8 +55,7 @@ std::vector<std::string> DicomItem::texts(const DcmTagKey& tag) const {
   DcmElement* element = nullptr;
   if (!has_value(tag) || item_->findAndGetElement(tag, element).bad()) return {};
   OFString whole;
-  if (element->getOFStringArray(whole).bad())
-    throw Error(fmt::format("{}: {} is no text", where_, described(tag)));
+  if (element->getOFStringArray(whole).bad()) throw Error(fmt::format("{}: {} is no text", where_, described(tag)));
   std::vector<std::string> values;
   std::string_view rest = whole;
   for (;;) {
@@ -72,8 +71,7 @@ std::optional<std::string> DicomItem::text(const DcmTagKey& tag) const {
   DcmElement* element = nullptr;
   if (!has_value(tag) || item_->findAndGetElement(tag, element).bad()) return std::nullopt;
   OFString whole;
-  if (element->getOFStringArray(whole).bad())
-    throw Error(fmt::format("{}: {} is no text", where_, described(tag)));
+  if (element->getOFStringArray(whole).bad()) throw Error(fmt::format("{}: {} is no text", where_, described(tag)));
   const std::string_view value = trimmed(whole);
   if (value.empty()) return std::nullopt;
   return std::string(value);
@@ -102,13 +100,20 @@ std::vector<double> DicomItem::numbers(const DcmTagKey& tag) const {
     Sint32 whole_signed = 0;
     Uint16 small = 0;
     Sint16 small_signed = 0;
-    if (element->getFloat64(wide, n).good()) values.push_back(wide);
-    else if (element->getFloat32(narrow, n).good()) values.push_back(narrow);
-    else if (element->getUint16(small, n).good()) values.push_back(small);
-    else if (element->getSint16(small_signed, n).good()) values.push_back(small_signed);
-    else if (element->getUint32(whole, n).good()) values.push_back(whole);
-    else if (element->getSint32(whole_signed, n).good()) values.push_back(whole_signed);
-    else throw Error(fmt::format("{}: {} is no number", where_, described(tag)));
+    if (element->getFloat64(wide, n).good())
+      values.push_back(wide);
+    else if (element->getFloat32(narrow, n).good())
+      values.push_back(narrow);
+    else if (element->getUint16(small, n).good())
+      values.push_back(small);
+    else if (element->getSint16(small_signed, n).good())
+      values.push_back(small_signed);
+    else if (element->getUint32(whole, n).good())
+      values.push_back(whole);
+    else if (element->getSint32(whole_signed, n).good())
+      values.push_back(whole_signed);
+    else
+      throw Error(fmt::format("{}: {} is no number", where_, described(tag)));
     if (!std::isfinite(values.back()))
       throw Error(fmt::format("{}: {} is not a finite number", where_, described(tag)));
   }
@@ -162,6 +167,7 @@ void DicomItem::put(const DcmTagKey& key, std::span<const double> numbers) {
     const double number = numbers[n];
     OFCondition done;
     switch (vr) {
+      case EVR_xs:  // US or SS by PixelRepresentation
       case EVR_US: done = item_->putAndInsertUint16(key, static_cast<Uint16>(number), n); break;
       case EVR_SS: done = item_->putAndInsertSint16(key, static_cast<Sint16>(number), n); break;
       case EVR_FL: done = item_->putAndInsertFloat32(key, static_cast<Float32>(number), n); break;
@@ -202,13 +208,11 @@ DicomFile::~DicomFile() = default;
 DicomFile DicomFile::read(const std::filesystem::path& path, Extent extent) {
   DicomFile file;
   file.path_ = path;
-  const OFCondition loaded =
-      extent == Extent::kWhole
-          ? file.file_->loadFile(path.c_str())
-          : file.file_->loadFileUntilTag(path.c_str(), EXS_Unknown, EGL_noChange, DCM_MaxReadLength, ERM_autoDetect,
-                                         DCM_PixelData);
-  if (loaded.bad())
-    throw Error(fmt::format("{}: cannot be read as a DICOM file: {}", path.string(), loaded.text()));
+  const OFCondition loaded = extent == Extent::kWhole
+                                 ? file.file_->loadFile(path.c_str())
+                                 : file.file_->loadFileUntilTag(path.c_str(), EXS_Unknown, EGL_noChange,
+                                                                DCM_MaxReadLength, ERM_autoDetect, DCM_PixelData);
+  if (loaded.bad()) throw Error(fmt::format("{}: cannot be read as a DICOM file: {}", path.string(), loaded.text()));
   // Where the character set is unknown to the converter, the bytes stay as they are, together with their set.
   (void)file.file_->getDataset()->convertToUTF8();
   return file;

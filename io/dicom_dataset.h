@@ -1,6 +1,6 @@
 #pragma once
-// DICOM files behind a small interface: the only place of isoshift that sees OFCondition. Every failure becomes an Error
-// that names the file, the attribute by keyword and tag, and what was found.
+// DICOM files behind a small interface: the only place of isoshift that sees OFCondition. Every failure becomes an
+// Error that names the file, the attribute by keyword and tag, and what was found.
 
 #include <dcmtk/config/osconfig.h>
 #include <dcmtk/dcmdata/dcdeftag.h>

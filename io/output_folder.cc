@@ -45,13 +45,16 @@ OutputFolder::OutputFolder(fs::path destination, bool overwrite, std::vector<std
   if (destination_.filename().empty()) destination_ = destination_.parent_path();  // "out/" is "out"
   std::error_code error;
   if (fs::exists(destination_, error)) {
-    if (!fs::is_directory(destination_)) throw Error(fmt::format("{}: is a file, expected a folder", destination_.string()));
+    if (!fs::is_directory(destination_))
+      throw Error(fmt::format("{}: is a file, expected a folder", destination_.string()));
     if (!overwrite && !fs::is_empty(destination_))
-      throw Error(fmt::format("{}: the output folder is not empty.\n       Name another one, or replace what it holds: "
-                              "--overwrite",
-                              destination_.string()));
+      throw Error(
+          fmt::format("{}: the output folder is not empty.\n       Name another one, or replace what it holds: "
+                      "--overwrite",
+                      destination_.string()));
   }
-  std::string staging = (existing_parent(destination_) / (destination_.filename().string() + ".partial-XXXXXX")).string();
+  std::string staging =
+      (existing_parent(destination_) / (destination_.filename().string() + ".partial-XXXXXX")).string();
   if (::mkdtemp(staging.data()) == nullptr) fail(staging, std::strerror(errno));
   staging_ = staging;
 }

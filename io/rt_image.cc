@@ -38,15 +38,14 @@ std::optional<Eigen::Vector3d> table_position(const DicomItem& dataset) {
 
 void expect_range(const RtImage& image, const DcmTagKey& tag, double value, double low, double high) {
   if (!(value > low && value < high))
-    throw Error(fmt::format("{}: {} is {}, expected between {} and {}", image.path.string(), described(tag), value, low,
-                            high));
+    throw Error(
+        fmt::format("{}: {} is {}, expected between {} and {}", image.path.string(), described(tag), value, low, high));
 }
 
 template <class T>
 void replace(std::optional<T>& value, const T& by, const std::string& what, const std::string& switch_name,
              Notes& notes) {
-  notes.overrides.push_back(
-      fmt::format("{}: {} by {}", what, value ? "replaced" : "supplied", switch_name));
+  notes.overrides.push_back(fmt::format("{}: {} by {}", what, value ? "replaced" : "supplied", switch_name));
   value = by;
 }
 
@@ -140,8 +139,8 @@ RtImage with_switches(RtImage image, const RtImageSwitches& switches, Notes& not
             named(DCM_RTImagePosition), "--assume-centered", notes);
   if (switches.intensity) {
     const bool is_linear = switches.intensity->relationship == PixelIntensity::Relationship::kLin;
-    replace(image.intensity_relationship, std::string(is_linear ? "LIN" : "LOG"),
-            named(DCM_PixelIntensityRelationship), fmt::format("--intensity {}", to_string(*switches.intensity)), notes);
+    replace(image.intensity_relationship, std::string(is_linear ? "LIN" : "LOG"), named(DCM_PixelIntensityRelationship),
+            fmt::format("--intensity {}", to_string(*switches.intensity)), notes);
     image.intensity_sign = switches.intensity->sign;
   }
   if (switches.beam) {
@@ -183,13 +182,14 @@ std::vector<Finding> rt_image_findings(const RtImage& image) {
     throw Error(fmt::format("{}: {} says \"{}\", expected PORTAL, SIMULATOR or RADIOGRAPH as its third value", where,
                             described(DCM_ImageType), image.image_type));
   if (image.reported_values_origin && *image.reported_values_origin != "ACTUAL")
-    findings.push_back({"planned-geometry",
-                        fmt::format("{}: {} says {}: its angles were not measured", where,
-                                    described(DCM_ReportedValuesOrigin), *image.reported_values_origin)});
+    findings.push_back(
+        {"planned-geometry", fmt::format("{}: {} says {}: its angles were not measured", where,
+                                         described(DCM_ReportedValuesOrigin), *image.reported_values_origin)});
   if (std::abs(wrapped_rad(rad_from_deg(image.gantry_pitch_angle_deg.value_or(0.0)))) > rad_from_deg(kMaxAngleNoiseDeg))
-    throw Error(fmt::format("{}: {} is {} degrees; a tilted gantry is not supported, since the order of its rotations is "
-                            "not defined",
-                            where, described(DCM_GantryPitchAngle), *image.gantry_pitch_angle_deg));
+    throw Error(
+        fmt::format("{}: {} is {} degrees; a tilted gantry is not supported, since the order of its rotations is "
+                    "not defined",
+                    where, described(DCM_GantryPitchAngle), *image.gantry_pitch_angle_deg));
   if (image.patient_position && !patient_position_from(*image.patient_position))
     throw Error(fmt::format("{}: {} is {}; expected HFS, HFP, FFS, FFP, HFDR, HFDL, FFDR or FFDL", where,
                             described(DCM_PatientPosition), *image.patient_position));
@@ -206,8 +206,7 @@ Beam beam_of(const RtImage& image, Notes& notes) {
 
 TableAngles table_angles(const RtImage& image, Notes& notes) {
   const auto angle = [&](const std::optional<double>& value_deg, const DcmTagKey& tag) {
-    if (!value_deg)
-      notes.warnings.push_back(fmt::format("{}: {} is missing, taken as 0", image.label, described(tag)));
+    if (!value_deg) notes.warnings.push_back(fmt::format("{}: {} is missing, taken as 0", image.label, described(tag)));
     return wrapped_rad(rad_from_deg(value_deg.value_or(0.0)));
   };
   TableAngles table;
@@ -242,8 +241,8 @@ CarmGeometry carm_geometry(const RtImage& image, Notes& notes) {
                                          described(DCM_XRayImageReceptorTranslation)));
   }
   if (sid_mm == geometry.sad_mm)
-    notes.warnings.push_back(fmt::format("{}: {} equals the SAD; its true value may be unknown", image.label,
-                                         described(DCM_RTImageSID)));
+    notes.warnings.push_back(
+        fmt::format("{}: {} equals the SAD; its true value may be unknown", image.label, described(DCM_RTImageSID)));
   if (!image.receptor_angle_deg)
     notes.warnings.push_back(
         fmt::format("{}: {} is missing, taken as 0", image.label, described(DCM_XRayImageReceptorAngle)));
@@ -259,12 +258,12 @@ CarmGeometry carm_geometry(const RtImage& image, Notes& notes) {
     const bool is_orthonormal = std::abs(geometry.row_direction.norm() - 1.0) < 1e-4 &&
                                 std::abs(geometry.column_direction.norm() - 1.0) < 1e-4 &&
                                 std::abs(geometry.row_direction.dot(geometry.column_direction)) < 1e-4;
-    const bool is_flat =
-        std::abs(geometry.row_direction.z()) < 1e-4 && std::abs(geometry.column_direction.z()) < 1e-4;
+    const bool is_flat = std::abs(geometry.row_direction.z()) < 1e-4 && std::abs(geometry.column_direction.z()) < 1e-4;
     if (!is_orthonormal || !is_flat)
-      throw Error(fmt::format("{}: {} is not a pair of perpendicular unit vectors in the receptor's plane, as {} NORMAL "
-                              "needs",
-                              where, described(DCM_RTImageOrientation), described(DCM_RTImagePlane)));
+      throw Error(
+          fmt::format("{}: {} is not a pair of perpendicular unit vectors in the receptor's plane, as {} NORMAL "
+                      "needs",
+                      where, described(DCM_RTImageOrientation), described(DCM_RTImagePlane)));
   }
   geometry.row_spacing_mm = image.pixel_spacing_mm->x();
   geometry.column_spacing_mm = image.pixel_spacing_mm->y();
@@ -288,7 +287,9 @@ XrayImage read_xray_image(const RtImage& image, Beam beam, const CarmGeometry& g
   xray.label = image.label;
   xray.view = make_xray_view(geometry, beam);
   xray.values = Image<float>(format.columns, format.rows);
-  xray.collimator_angle_rad = rad_from_deg(image.collimator_angle_deg.value_or(0.0));
+  // Both angles turn counter-clockwise seen from the source, which is how the image is displayed (PS3.3 C.8.8.2.7).
+  xray.collimator_angle_rad =
+      rad_from_deg(image.collimator_angle_deg.value_or(0.0) - image.receptor_angle_deg.value_or(0.0));
   const bool is_linear = image.intensity_relationship == "LIN";
   xray.meaning = is_linear ? XrayImage::Meaning::kIntensity : XrayImage::Meaning::kLineIntegral;
 

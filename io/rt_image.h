@@ -35,8 +35,8 @@ struct RtImage {
   std::string sop_instance_uid;
   std::string series_instance_uid;
   std::optional<std::string> frame_of_reference_uid;
-  std::string label;                           // RTImageLabel, else the file's name without extension
-  std::string image_type;                      // ImageType, third value
+  std::string label;       // RTImageLabel, else the file's name without extension
+  std::string image_type;  // ImageType, third value
   std::optional<std::string> reported_values_origin;
   std::optional<std::string> patient_position;
   std::optional<std::string> plan_sop_instance_uid;

@@ -17,8 +17,7 @@ RtPlan::Beam read_beam(const DicomItem& beam_item, const DcmTagKey& control_poin
   beam.name = beam_item.text(DCM_BeamName).value_or("");
   if (const auto points = beam_item.items(control_points); !points.empty()) {
     if (points.front().has_value(DCM_IsocenterPosition))
-      beam.isocenter_patient_mm =
-          Eigen::Vector3d(points.front().required_numbers(DCM_IsocenterPosition, 3).data());
+      beam.isocenter_patient_mm = Eigen::Vector3d(points.front().required_numbers(DCM_IsocenterPosition, 3).data());
     beam.support_angle_deg = points.front().number(DCM_PatientSupportAngle);
   }
   const auto setup_number = beam_item.number(DCM_ReferencedPatientSetupNumber);
@@ -46,8 +45,7 @@ RtPlan read_rt_plan(const std::filesystem::path& path) {
   for (const DicomItem& beam : dataset.items(is_ion ? DCM_IonBeamSequence : DCM_BeamSequence)) {
     if (is_ion && beam.text(DCM_PatientSupportType) == "CHAIR")
       throw Error(fmt::format("{}: {} is CHAIR, expected TABLE", beam.where(), described(DCM_PatientSupportType)));
-    plan.beams.push_back(
-        read_beam(beam, is_ion ? DCM_IonControlPointSequence : DCM_ControlPointSequence, dataset));
+    plan.beams.push_back(read_beam(beam, is_ion ? DCM_IonControlPointSequence : DCM_ControlPointSequence, dataset));
   }
   if (plan.beams.empty())
     throw Error(fmt::format("{}: {} is missing or empty", path.string(),
@@ -73,16 +71,18 @@ Eigen::Vector3d common_isocenter(const RtPlan& plan, std::span<const RtPlan::Bea
   for (const RtPlan::Beam& beam : beams) {
     if (!beam.isocenter_patient_mm) continue;
     if (common && (*beam.isocenter_patient_mm - *common).norm() > 0.01)
-      throw Error(fmt::format("{}: beams have different isocenters ({}): ({}) and ({}) mm.\n"
-                              "       Say which one the patient was set up to: --isocenter X,Y,Z",
-                              plan.path.string(), described(DCM_IsocenterPosition), fmt::join(*common, ", "),
-                              fmt::join(*beam.isocenter_patient_mm, ", ")));
+      throw Error(
+          fmt::format("{}: beams have different isocenters ({}): ({}) and ({}) mm.\n"
+                      "       Say which one the patient was set up to: --isocenter X,Y,Z",
+                      plan.path.string(), described(DCM_IsocenterPosition), fmt::join(*common, ", "),
+                      fmt::join(*beam.isocenter_patient_mm, ", ")));
     common = beam.isocenter_patient_mm;
   }
   if (!common)
-    throw Error(fmt::format("{}: {} is missing in the first control point of every beam.\n"
-                            "       Supply it: --isocenter X,Y,Z",
-                            plan.path.string(), described(DCM_IsocenterPosition)));
+    throw Error(
+        fmt::format("{}: {} is missing in the first control point of every beam.\n"
+                    "       Supply it: --isocenter X,Y,Z",
+                    plan.path.string(), described(DCM_IsocenterPosition)));
   return *common;
 }
 

@@ -28,9 +28,9 @@ SourceFrame source_frame(const Study& study, Notes& notes) {
         image.frame_of_reference_uid != first.frame_of_reference_uid || *image.isocenter_mm != *first.isocenter_mm ||
         image.frame_of_reference_uid == study.ct.frame_of_reference_uid) {
       if (image.frame_of_reference_uid == study.ct.frame_of_reference_uid)
-        notes.warnings.push_back(
-            fmt::format("{}: shares the CT's {}, which would claim a perfect setup; the registration object uses a new one",
-                        image.label, described(DCM_FrameOfReferenceUID)));
+        notes.warnings.push_back(fmt::format(
+            "{}: shares the CT's {}, which would claim a perfect setup; the registration object uses a new one",
+            image.label, described(DCM_FrameOfReferenceUID)));
       return {.uid = new_uid()};
     }
   }
@@ -136,15 +136,15 @@ DicomFile registration_object(const Study& study, const SourceFrame& source, con
     for (const RtImage& image : study.rt_images)
       put_reference(treatment_item.append_item(DCM_ReferencedImageSequence), image.sop_class_uid,
                     image.sop_instance_uid);
-  put_matrix(treatment_item, ct_from_source, "125024", "Image Content-based Alignment", "treatment room to planning CT");
+  put_matrix(treatment_item, ct_from_source, "125024", "Image Content-based Alignment",
+             "treatment room to planning CT");
 
   // General Reference (C.12.4), where the images cannot stand in item 2.
   if (!source.lists_images)
     for (const RtImage& image : study.rt_images) {
       DicomItem reference = dataset.append_item(DCM_ReferencedImageSequence);
       put_reference(reference, image.sop_class_uid, image.sop_instance_uid);
-      put_code(reference.append_item(DCM_PurposeOfReferenceCodeSequence), "129203",
-               "Image Acquired during Treatment");
+      put_code(reference.append_item(DCM_PurposeOfReferenceCodeSequence), "129203", "Image Acquired during Treatment");
     }
   put_common_instance_references(dataset, study);
   return file;

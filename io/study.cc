@@ -130,8 +130,9 @@ std::vector<Finding> patient_findings(const Study& study) {
   std::vector<Finding> findings;
   const auto compare = [&](const Identity& other, const std::string& where) {
     if (other.patient_id == reference.patient_id && other.patient_id_issuer == reference.patient_id_issuer) return;
-    findings.push_back({"patient-mismatch", fmt::format("{}: {} differs from the CT's: the inputs are of different patients",
-                                                        where, described(DCM_PatientID))});
+    findings.push_back(
+        {"patient-mismatch", fmt::format("{}: {} differs from the CT's: the inputs are of different patients", where,
+                                         described(DCM_PatientID))});
   };
   if (study.plan) compare(study.plan->identity, study.plan->path.string());
   for (const RtImage& image : study.rt_images) compare(image.identity, image.path.string());
@@ -143,14 +144,16 @@ std::vector<Finding> plan_findings(const Study& study, Notes& notes) {
   if (!study.plan) return findings;
   const RtPlan& plan = *study.plan;
   if (!plan.frame_of_reference_uid)
-    notes.warnings.push_back(fmt::format("the plan has no {}; taken as that of the CT", described(DCM_FrameOfReferenceUID)));
+    notes.warnings.push_back(
+        fmt::format("the plan has no {}; taken as that of the CT", described(DCM_FrameOfReferenceUID)));
   else if (*plan.frame_of_reference_uid != study.ct.frame_of_reference_uid)
-    findings.push_back({"for-mismatch", fmt::format("{}: {} is not that of the CT, so the plan's isocenter does not apply "
-                                                    "to it",
-                                                    plan.path.string(), described(DCM_FrameOfReferenceUID))});
+    findings.push_back(
+        {"for-mismatch", fmt::format("{}: {} is not that of the CT, so the plan's isocenter does not apply "
+                                     "to it",
+                                     plan.path.string(), described(DCM_FrameOfReferenceUID))});
   if (plan.approval_status != "APPROVED")
-    notes.warnings.push_back(fmt::format("the plan is not approved ({} is \"{}\")", described(DCM_ApprovalStatus),
-                                         plan.approval_status));
+    notes.warnings.push_back(
+        fmt::format("the plan is not approved ({} is \"{}\")", described(DCM_ApprovalStatus), plan.approval_status));
   for (const RtImage& image : study.rt_images) {
     if (!image.plan_sop_instance_uid)
       notes.warnings.push_back(fmt::format("{}: does not say to which plan it belongs ({})", image.label,
@@ -183,9 +186,9 @@ std::vector<Finding> session_findings(const Study& study) {
       const double change_deg =
           deg_from_rad(wrapped_rad(rad_from_deg((image.*angle).value_or(0.0) - (first.*angle).value_or(0.0))));
       if (std::abs(change_deg) > kMaxTableTurnDeg)
-        findings.push_back({"table-moved", fmt::format("{}: the table turned by {:.1f} degrees since {} ({})",
-                                                       image.path.string(), change_deg, first.path.string(),
-                                                       described(tag))});
+        findings.push_back(
+            {"table-moved", fmt::format("{}: the table turned by {:.1f} degrees since {} ({})", image.path.string(),
+                                        change_deg, first.path.string(), described(tag))});
     };
     turned(&RtImage::support_angle_deg, DCM_PatientSupportAngle);
     turned(&RtImage::eccentric_angle_deg, DCM_TableTopEccentricAngle);
@@ -214,8 +217,7 @@ void check_nothing_missing(const std::vector<RtImage>& images, std::string refus
 std::vector<RtPlan::Beam> imaged_beams(const Study& study) {
   std::vector<int> numbers;
   for (const RtImage& image : study.rt_images) {
-    if (!image.beam_number || image.plan_sop_instance_uid != study.plan->sop_instance_uid)
-      return study.plan->beams;
+    if (!image.beam_number || image.plan_sop_instance_uid != study.plan->sop_instance_uid) return study.plan->beams;
     numbers.push_back(*image.beam_number);
   }
   return selected_beams(*study.plan, numbers);
@@ -226,9 +228,9 @@ void warn_of_planned_couch_angle(const Study& study, const std::vector<RtPlan::B
     if (!beam.support_angle_deg) continue;
     const double change_rad = wrapped_rad(rad_from_deg(*beam.support_angle_deg) - study.table.support_rad);
     if (std::abs(change_rad) > rad_from_deg(kMaxTableTurnDeg))
-      notes.warnings.push_back(
-          fmt::format("beam {} of the plan has couch angle {:.1f} degrees, the images {:.1f} degrees; the images' counts",
-                      beam.number, *beam.support_angle_deg, deg_from_rad(study.table.support_rad)));
+      notes.warnings.push_back(fmt::format(
+          "beam {} of the plan has couch angle {:.1f} degrees, the images {:.1f} degrees; the images' counts",
+          beam.number, *beam.support_angle_deg, deg_from_rad(study.table.support_rad)));
   }
 }
 
@@ -277,7 +279,8 @@ Study load_study(const StudyRequest& request, Notes& notes, const Progress& prog
   }
   std::string refused;
   std::vector<Finding> findings;
-  for (const RtImage& image : study.rt_images) std::ranges::move(rt_image_findings(image), std::back_inserter(findings));
+  for (const RtImage& image : study.rt_images)
+    std::ranges::move(rt_image_findings(image), std::back_inserter(findings));
   try {
     settle(findings, request.allowed, notes);
   } catch (const Error& error) {
@@ -300,9 +303,10 @@ Study load_study(const StudyRequest& request, Notes& notes, const Progress& prog
   } else if (study.plan) {
     study.isocenter_patient_mm = common_isocenter(*study.plan, beams);
   } else {
-    throw Error(fmt::format("no RT Plan found ({}), so the planned isocenter is unknown.\n"
-                            "       Name the plan (--plan FILE) or supply the isocenter: --isocenter X,Y,Z",
-                            searched(request)));
+    throw Error(
+        fmt::format("no RT Plan found ({}), so the planned isocenter is unknown.\n"
+                    "       Name the plan (--plan FILE) or supply the isocenter: --isocenter X,Y,Z",
+                    searched(request)));
   }
   if (const auto planned = study.plan ? common_patient_position(*study.plan, beams) : std::nullopt;
       planned && *planned != to_string(study.patient_position))

@@ -35,9 +35,9 @@ StudyFiles scan_study(const std::vector<std::filesystem::path>& paths);
 
 // What to register and what a person supplies or allows.
 struct StudyRequest {
-  std::filesystem::path study;                 // a folder (or file) searched for all parts not named below
-  std::vector<std::filesystem::path> ct;       // folders or files of the CT
-  std::vector<std::filesystem::path> images;   // RT Images
+  std::filesystem::path study;                // a folder (or file) searched for all parts not named below
+  std::vector<std::filesystem::path> ct;      // folders or files of the CT
+  std::vector<std::filesystem::path> images;  // RT Images
   std::optional<std::filesystem::path> plan;
   std::optional<Eigen::Vector3d> isocenter_patient_mm;
   RtImageSwitches switches;
@@ -47,10 +47,10 @@ struct StudyRequest {
 struct Study {
   CtSeries ct;
   std::optional<RtPlan> plan;
-  std::vector<RtImage> rt_images;   // headers with switches applied, in order of acquisition
-  std::vector<XrayImage> xrays;     // the same images, ready for registration
+  std::vector<RtImage> rt_images;  // headers with switches applied, in order of acquisition
+  std::vector<XrayImage> xrays;    // the same images, ready for registration
   PatientPosition patient_position = PatientPosition::kHfs;
-  TableAngles table;                // at imaging, the same for all views
+  TableAngles table;  // at imaging, the same for all views
   Eigen::Vector3d isocenter_patient_mm = Eigen::Vector3d::Zero();
   Eigen::Isometry3d planned_room_from_patient = Eigen::Isometry3d::Identity();
 };

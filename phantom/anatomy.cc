@@ -1,7 +1,8 @@
-// The bodies that isoshift phantom makes. Not anatomy lessons: enough bone, air and irregularity that a DRR of them asks
-// of a registration what a patient's does.
+// The bodies that isoshift phantom makes. Not anatomy lessons: enough bone, air and irregularity that a DRR of them
+// asks of a registration what a patient's does.
 
 #include <cmath>
+#include <numbers>
 #include <random>
 
 #include "phantom/shapes.h"
@@ -18,7 +19,7 @@ constexpr Material bone_in_tissue(double share) { return {.water = -share, .bone
 constexpr Material taken_away(const Material& material) { return {.water = -material.water, .bone = -material.bone}; }
 
 Eigen::Matrix3d tilt(double about_x_deg, double about_z_deg = 0.0) {
-  const double rad_per_deg = M_PI / 180.0;
+  const double rad_per_deg = std::numbers::pi / 180.0;
   return (Eigen::AngleAxisd(about_z_deg * rad_per_deg, Vector3d::UnitZ()) *
           Eigen::AngleAxisd(about_x_deg * rad_per_deg, Vector3d::UnitX()))
       .toRotationMatrix();
@@ -46,10 +47,10 @@ class Body {
       Vector3d direction(gauss_(random_), gauss_(random_), gauss_(random_));
       direction.normalize();
       const double depth = on_surface ? 1.0 : std::cbrt(uniform_(random_));
-      const Vector3d grain = Vector3d(2.0 + 3.0 * uniform_(random_), 2.0 + 3.0 * uniform_(random_),
-                                      2.0 + 3.0 * uniform_(random_));
+      const Vector3d grain =
+          Vector3d(2.0 + 3.0 * uniform_(random_), 2.0 + 3.0 * uniform_(random_), 2.0 + 3.0 * uniform_(random_));
       add(Kind::kEllipsoid, at + depth * extent.cwiseProduct(direction), grain,
-          bone_in_tissue(uniform_(random_) < 0.6 ? 0.35 : -0.2));
+          bone_in_tissue(uniform_(random_) < 0.6 ? 0.6 : -0.35));
     }
   }
 
@@ -73,28 +74,29 @@ std::vector<Shape> head_phantom(const Vector3d& center_patient_mm, std::uint64_t
   const Vector3d skull_at(0, 4, 20);
   const Vector3d skull(body.vary(66, 0.06), body.vary(84, 0.06), body.vary(72, 0.06));
   body.add(Kind::kEllipsoid, skull_at, skull.array() + 7.0, kTissue);
-  body.add(Kind::kEllipsoid, {0, -22, -45}, {52, 62, 52}, {.water = 0.55, .bone = 0.0});  // face, over the head's tissue
-  body.add(Kind::kCylinder, {0, 22, -70}, {46, 50, 34}, {.water = 0.5, .bone = 0.0});     // neck
+  body.add(Kind::kEllipsoid, {0, -22, -45}, {52, 62, 52},
+           {.water = 0.55, .bone = 0.0});                                              // face, over the head's tissue
+  body.add(Kind::kCylinder, {0, 22, -70}, {46, 50, 34}, {.water = 0.5, .bone = 0.0});  // neck
   body.add_shell(skull_at, skull, body.vary(6.0, 0.2), 0.8);
-  body.add_grains(70, skull_at, skull.array() - 3.0, true);
+  body.add_grains(110, skull_at, skull.array() - 3.0, true);
 
   for (const double side : {-1.0, 1.0}) {
     body.add(Kind::kEllipsoid, {side * body.vary(31, 0.05), -66, -14}, {17, 17, 15}, {.water = 0.1, .bone = -0.1});
-    body.add_shell({side * 31, -64, -14}, {20, 20, 18}, 2.5, 0.7);                             // orbit
+    body.add_shell({side * 31, -64, -14}, {20, 20, 18}, 2.5, 0.7);                                   // orbit
     body.add(Kind::kEllipsoid, {side * body.vary(26, 0.08), -52, -40}, {13, 14, 15}, kAirInTissue);  // maxillary sinus
     body.add(Kind::kBox, {side * 46, 18, -18}, {14, 9, 8}, bone_in_tissue(0.75), tilt(0, side * 35));  // petrous bone
     body.add(Kind::kBox, {side * body.vary(44, 0.05), -32, -66}, {4, 20, 22}, bone_in_tissue(0.7), tilt(20));  // jaw
-    body.add(Kind::kEllipsoid, {side * 55, 28, -30}, {9, 12, 14}, bone_in_tissue(0.4));        // mastoid
+    body.add(Kind::kEllipsoid, {side * 55, 28, -30}, {9, 12, 14}, bone_in_tissue(0.4));  // mastoid
     body.add(Kind::kEllipsoid, {side * 55, 28, -30}, {4, 6, 7}, {.water = -0.3, .bone = 0});
   }
   body.add(Kind::kEllipsoid, {body.vary(6, 1.0), -74, 10}, {body.vary(20, 0.3), 6, 9}, kAirInTissue);  // frontal sinus
-  body.add(Kind::kEllipsoid, {0, -30, -22}, {11, 12, 9}, kAirInTissue);                              // sphenoid sinus
-  body.add(Kind::kBox, {0, -6, -24}, {20, 24, 4}, bone_in_tissue(0.55), tilt(-12));                  // skull base
-  body.add(Kind::kCylinder, {0, -62, -62}, {22, 20, 5}, bone_in_tissue(0.6));                        // upper teeth
-  body.add(Kind::kCylinder, {0, -60, -76}, {24, 22, 5}, bone_in_tissue(0.65));                       // lower teeth
-  body.add(Kind::kCylinder, {body.vary(15, 0.4), -70, -68}, {3, 3, 6}, bone_in_tissue(0.9));         // a crown
-  body.add(Kind::kCylinder, {0, -22, -78}, {9, 8, 22}, kAirInTissue);                                // airway
-  for (int n = 0; n < 3; ++n) {                                                                      // cervical spine
+  body.add(Kind::kEllipsoid, {0, -30, -22}, {11, 12, 9}, kAirInTissue);                                // sphenoid sinus
+  body.add(Kind::kBox, {0, -6, -24}, {20, 24, 4}, bone_in_tissue(0.55), tilt(-12));                    // skull base
+  body.add(Kind::kCylinder, {0, -62, -62}, {22, 20, 5}, bone_in_tissue(0.6));                          // upper teeth
+  body.add(Kind::kCylinder, {0, -60, -76}, {24, 22, 5}, bone_in_tissue(0.65));                         // lower teeth
+  body.add(Kind::kCylinder, {body.vary(15, 0.4), -70, -68}, {3, 3, 6}, bone_in_tissue(0.9));           // a crown
+  body.add(Kind::kCylinder, {0, -22, -78}, {9, 8, 22}, kAirInTissue);                                  // airway
+  for (int n = 0; n < 3; ++n) {                                                                        // cervical spine
     body.add(Kind::kCylinder, {0, 24, -56.0 - 17 * n}, {11, 9, 7}, bone_in_tissue(0.55));
     body.add(Kind::kBox, {0, 50, -58.0 - 17 * n}, {4, 14, 4}, bone_in_tissue(0.5), tilt(15));
     body.add_grains(6, {0, 24, -56.0 - 17 * n}, {9, 7, 5}, false);
@@ -118,16 +120,16 @@ std::vector<Shape> spine_phantom(const Vector3d& center_patient_mm, std::uint64_
     body.add(Kind::kCylinder, at - Vector3d(0, 0, half.z()), {half.x(), half.y(), 1.2}, bone_in_tissue(0.5));
     body.add_grains(14, at, 0.85 * half, false);
     for (const double side : {-1.0, 1.0}) {
-      body.add(Kind::kBox, at + Vector3d(side * 14, 22, 3), {4, 10, 7}, bone_in_tissue(0.6));            // pedicle
-      body.add(Kind::kEllipsoid, at + Vector3d(side * 17, 33, -8), {8, 7, 12}, bone_in_tissue(0.5));     // facet
+      body.add(Kind::kBox, at + Vector3d(side * 14, 22, 3), {4, 10, 7}, bone_in_tissue(0.6));         // pedicle
+      body.add(Kind::kEllipsoid, at + Vector3d(side * 17, 33, -8), {8, 7, 12}, bone_in_tissue(0.5));  // facet
       body.add(Kind::kBox, at + Vector3d(side * 36, 28, 2), {16, 4, 5}, bone_in_tissue(0.4), tilt(0, side * 12));
     }
-    body.add(Kind::kBox, at + Vector3d(0, 50, -6), {3.5, 15, 10}, bone_in_tissue(0.5), tilt(20));        // spinous
+    body.add(Kind::kBox, at + Vector3d(0, 50, -6), {3.5, 15, 10}, bone_in_tissue(0.5), tilt(20));  // spinous
   }
-  for (const double side : {-1.0, 1.0}) {                                                               // lowest ribs
-    body.add(Kind::kCylinder, {side * body.vary(85, 0.1), 22, 62}, {4, 6, 52}, bone_in_tissue(0.5), tilt(0) *
-        Eigen::AngleAxisd(side * 1.2, Vector3d::UnitY()).toRotationMatrix());
-    body.add(Kind::kEllipsoid, {side * 95, 10, -92}, {48, 14, 34}, bone_in_tissue(0.3));                // iliac wing
+  for (const double side : {-1.0, 1.0}) {  // lowest ribs
+    body.add(Kind::kCylinder, {side * body.vary(85, 0.1), 22, 62}, {4, 6, 52}, bone_in_tissue(0.5),
+             tilt(0) * Eigen::AngleAxisd(side * 1.2, Vector3d::UnitY()).toRotationMatrix());
+    body.add(Kind::kEllipsoid, {side * 95, 10, -92}, {48, 14, 34}, bone_in_tissue(0.3));  // iliac wing
   }
   return body.take();
 }

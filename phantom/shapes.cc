@@ -103,7 +103,8 @@ Volume<float> ct_of_shapes(const std::vector<Shape>& shapes, const Eigen::Vector
         for (int i = low.x(); i <= high.x(); ++i) {
           int inside = 0;
           for (int n = 0; n < 8; ++n) {
-            const Eigen::Vector3d point(i + (n & 1 ? 0.25 : -0.25), j + (n & 2 ? 0.25 : -0.25), k + (n & 4 ? 0.25 : -0.25));
+            const Eigen::Vector3d point(i + (n & 1 ? 0.25 : -0.25), j + (n & 2 ? 0.25 : -0.25),
+                                        k + (n & 4 ? 0.25 : -0.25));
             inside += shape.contains(patient_from_voxel * point);
           }
           ct.at(i, j, k) += static_cast<float>(hu * inside / 8.0);

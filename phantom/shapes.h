@@ -1,5 +1,6 @@
 #pragma once
-// Analytic bodies in patient coordinates: a phantom is a list of them, each adding its material to whatever it overlaps.
+// Analytic bodies in patient coordinates: a phantom is a list of them, each adding its material to whatever it
+// overlaps.
 
 #include <Eigen/Geometry>
 #include <cstdint>
@@ -17,7 +18,11 @@ struct Material {
 };
 
 struct Shape {
-  enum class Kind { kEllipsoid, kCylinder, kBox };  // the unit sphere; the unit circle times [-1, 1]; the cube [-1, 1]^3
+  enum class Kind {
+    kEllipsoid,
+    kCylinder,
+    kBox
+  };  // the unit sphere; the unit circle times [-1, 1]; the cube [-1, 1]^3
 
   Kind kind = Kind::kEllipsoid;
   Eigen::Affine3d unit_from_patient = Eigen::Affine3d::Identity();

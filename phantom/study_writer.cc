@@ -90,10 +90,9 @@ void write_ct(const PhantomOptions& options, const StudyUids& study, Uids& uids,
   const Eigen::Vector3i size = (extent_mm.array() / spacing_mm.array()).round().cast<int>();
   Eigen::Affine3d patient_from_voxel = Eigen::Affine3d::Identity();
   patient_from_voxel.linear() = spacing_mm.asDiagonal();
-  patient_from_voxel.translation() =
-      options.placement.isocenter_patient_mm -
-      0.5 * Eigen::Vector3d((size.array() - 1).cast<double>() * spacing_mm.array()) +
-      (is_head ? Eigen::Vector3d(0, 0, 4) : Eigen::Vector3d(0, -25, 0));
+  patient_from_voxel.translation() = options.placement.isocenter_patient_mm -
+                                     0.5 * Eigen::Vector3d((size.array() - 1).cast<double>() * spacing_mm.array()) +
+                                     (is_head ? Eigen::Vector3d(0, 0, 4) : Eigen::Vector3d(0, -25, 0));
   const Volume<float> ct = ct_of_shapes(phantom_shapes(options), size, patient_from_voxel);
 
   std::filesystem::create_directories(folder);
@@ -108,7 +107,8 @@ void write_ct(const PhantomOptions& options, const StudyUids& study, Uids& uids,
     dataset.put(DCM_KVP, 120.0);
     dataset.put(DCM_AcquisitionNumber, "1");
     dataset.put(DCM_InstanceNumber, fmt::format("{}", k + 1));
-    dataset.put(DCM_ImagePositionPatient, std::span(Eigen::Vector3d(patient_from_voxel * Eigen::Vector3d(0, 0, k)).data(), 3));
+    dataset.put(DCM_ImagePositionPatient,
+                std::span(Eigen::Vector3d(patient_from_voxel * Eigen::Vector3d(0, 0, k)).data(), 3));
     dataset.put(DCM_ImageOrientationPatient, "1\\0\\0\\0\\1\\0");
     dataset.put(DCM_PixelSpacing, std::array{spacing_mm.y(), spacing_mm.x()});
     dataset.put(DCM_SliceThickness, spacing_mm.z());
@@ -166,7 +166,10 @@ void write_plan(const PhantomOptions& options, const StudyUids& study, const std
   dataset.put(DCM_RTPlanDate, "20260228");
   dataset.put(DCM_RTPlanTime, "090000");
   dataset.put(DCM_RTPlanGeometry, "TREATMENT_DEVICE");
-  dataset.put(DCM_ApprovalStatus, "UNAPPROVED");
+  dataset.put(DCM_ApprovalStatus, "APPROVED");
+  dataset.put(DCM_ReviewDate, "20260228");
+  dataset.put(DCM_ReviewTime, "100000");
+  dataset.put(DCM_ReviewerName, "Nobody^Real");
   DicomItem group = dataset.append_item(DCM_FractionGroupSequence);
   group.put(DCM_FractionGroupNumber, 1);
   group.put(DCM_NumberOfFractionsPlanned, 1);
@@ -189,8 +192,8 @@ void write_xray(const PhantomOptions& options, const StudyUids& study, const std
   imager.gantry_angle_deg = options.gantry_angles_deg[number];
   imager.pixels = options.image_pixels;
   imager.pixel_mm = kPanelMm / options.image_pixels;
-  const Image<float> intensity = simulate_xray(phantom_shapes(options), options.placement, imager, options.photons,
-                                               options.seed * 1000 + number);
+  const Image<float> intensity =
+      simulate_xray(phantom_shapes(options), options.placement, imager, options.photons, options.seed * 1000 + number);
   std::vector<std::uint16_t> stored(intensity.pixels.size());
   std::ranges::transform(intensity.pixels, stored.begin(), [](float value) {
     return static_cast<std::uint16_t>(std::clamp(std::lround(kStoredAtOpen * value), 0L, 65535L));
@@ -266,7 +269,8 @@ void PhantomOptions::check() const {
   if (!patient_position_from(placement.patient_position))
     throw UsageError(fmt::format("patient position {} is not one of HFS, HFP, FFS, FFP, HFDR, HFDL, FFDR, FFDL",
                                  placement.patient_position));
-  if (!(voxel_mm >= 0.5 && voxel_mm <= 5.0)) throw UsageError(fmt::format("voxel size {} mm is not within 0.5 to 5", voxel_mm));
+  if (!(voxel_mm >= 0.5 && voxel_mm <= 5.0))
+    throw UsageError(fmt::format("voxel size {} mm is not within 0.5 to 5", voxel_mm));
   if (image_pixels < 64 || image_pixels > 2048)
     throw UsageError(fmt::format("{} image pixels are not within 64 to 2048", image_pixels));
   if (gantry_angles_deg.empty() || gantry_angles_deg.size() > 6) throw UsageError("1 to 6 gantry angles are needed");

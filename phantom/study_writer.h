@@ -14,12 +14,12 @@ namespace isoshift {
 struct PhantomOptions {
   enum class Anatomy { kHead, kSpine };
   Anatomy anatomy = Anatomy::kHead;
-  Placement placement;                                       // how the patient lies, set-up error included
-  std::vector<double> gantry_angles_deg = {0.0, 90.0};       // one X-ray each
-  double voxel_mm = 1.0;                                     // of the CT, in plane; slices are 1.5 times as thick
-  int image_pixels = 512;                                    // along each edge; the panel is 410 mm wide
-  double photons = 20000.0;                                  // per open pixel; fewer mean more noise
-  std::uint64_t seed = 1;                                    // of anatomy, noise and UIDs
+  Placement placement;                                  // how the patient lies, set-up error included
+  std::vector<double> gantry_angles_deg = {0.0, 90.0};  // one X-ray each
+  double voxel_mm = 1.0;                                // of the CT, in plane; slices are 1.5 times as thick
+  int image_pixels = 512;                               // along each edge; the panel is 410 mm wide
+  double photons = 20000.0;                             // per open pixel; fewer mean more noise
+  std::uint64_t seed = 1;                               // of anatomy, noise and UIDs
 
   // Throws UsageError naming the field and its value.
   void check() const;

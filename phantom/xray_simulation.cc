@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numbers>
 #include <random>
 
 #include "geometry/error.h"
@@ -12,8 +13,8 @@
 namespace isoshift {
 namespace {
 
-// 120 kVp tungsten behind 2.5 mm Al in six bins; mass attenuation coefficients of NIST (XCOM; NISTIR 5632) for water and
-// for cortical bone (ICRU 44) times 1.92 g/cm3, here per mm.
+// 120 kVp tungsten behind 2.5 mm Al in six bins; mass attenuation coefficients of NIST (XCOM; NISTIR 5632) for water
+// and for cortical bone (ICRU 44) times 1.92 g/cm3, here per mm.
 struct EnergyBin {
   double share;
   double water_per_mm;
@@ -32,17 +33,20 @@ constexpr double kFocalSpotMm = 0.6;
 constexpr double kScatterShare = 0.12;
 constexpr double kScatterSigmaMm = 60.0;  // on the panel
 
-double cos_deg(double deg) { return std::cos(deg * M_PI / 180.0); }
-double sin_deg(double deg) { return std::sin(deg * M_PI / 180.0); }
+double cos_deg(double deg) { return std::cos(deg * std::numbers::pi / 180.0); }
+double sin_deg(double deg) { return std::sin(deg * std::numbers::pi / 180.0); }
 
 // Columns: where patient left, posterior and superior point in the room at couch angle 0. Fixed x is the right of a
 // viewer facing the gantry, y toward it, z up.
 Eigen::Matrix3d fixed_from_patient_axes(const std::string& position) {
   const Eigen::Vector3d toward_gantry(0, 1, 0), up(0, 0, 1);
   Eigen::Vector3d left, posterior, superior;
-  if (position.starts_with("HF")) superior = toward_gantry;
-  else if (position.starts_with("FF")) superior = -toward_gantry;
-  else throw UsageError("patient position " + position + " is not one of HFS, HFP, FFS, FFP, HFDR, HFDL, FFDR, FFDL");
+  if (position.starts_with("HF"))
+    superior = toward_gantry;
+  else if (position.starts_with("FF"))
+    superior = -toward_gantry;
+  else
+    throw UsageError("patient position " + position + " is not one of HFS, HFP, FFS, FFP, HFDR, HFDL, FFDR, FFDL");
   const std::string lies = position.substr(2);
   if (lies == "S" || lies == "P") {  // on the back, or on the belly
     posterior = lies == "S" ? Eigen::Vector3d(-up) : up;
@@ -96,7 +100,8 @@ Image<float> scatter(const Image<float>& primary, double pixel_mm) {
       double sum = 0.0, weights = 0.0;
       for (int r = 0; r < edge; ++r)
         for (int c = 0; c < edge; ++c) {
-          const double weight = std::exp(-0.5 * ((r - row) * (r - row) + (c - column) * (c - column)) / (sigma * sigma));
+          const double weight =
+              std::exp(-0.5 * ((r - row) * (r - row) + (c - column) * (c - column)) / (sigma * sigma));
           sum += weight * coarse.at(c, r);
           weights += weight;
         }
@@ -110,9 +115,9 @@ Image<float> scatter(const Image<float>& primary, double pixel_mm) {
       const double y = std::clamp((row + 0.5) / kBlock - 0.5, 0.0, edge - 1.001);
       const int i = static_cast<int>(x), j = static_cast<int>(y);
       const double fx = x - i, fy = y - j;
-      result.at(column, row) = static_cast<float>(
-          (1 - fy) * ((1 - fx) * blurred.at(i, j) + fx * blurred.at(i + 1, j)) +
-          fy * ((1 - fx) * blurred.at(i, j + 1) + fx * blurred.at(i + 1, j + 1)));
+      result.at(column, row) =
+          static_cast<float>((1 - fy) * ((1 - fx) * blurred.at(i, j) + fx * blurred.at(i + 1, j)) +
+                             fy * ((1 - fx) * blurred.at(i, j + 1) + fx * blurred.at(i + 1, j + 1)));
     }
   return result;
 }
@@ -130,7 +135,8 @@ Eigen::Matrix3d Placement::rotation() const {
 
 Eigen::Vector3d Placement::patient_from_fixed(const Eigen::Vector3d& point_fixed_mm) const {
   const Eigen::Vector3d planned_mm = rotation().transpose() * (point_fixed_mm - translation_mm);
-  return fixed_from_patient_axes(patient_position).transpose() * (couch_turn(couch_angle_deg).transpose() * planned_mm) +
+  return fixed_from_patient_axes(patient_position).transpose() *
+             (couch_turn(couch_angle_deg).transpose() * planned_mm) +
          isocenter_patient_mm;
 }
 
@@ -155,14 +161,16 @@ Eigen::Vector3d Imager::pixel_fixed_mm(double column, double row) const {
 Image<float> simulate_xray(const std::vector<Shape>& shapes, const Placement& placement, const Imager& imager,
                            double photons, std::uint64_t seed) {
   // Four rays per pixel sample its area and the focal spot together.
-  constexpr std::array<std::array<double, 2>, 4> kPixelOffsets = {{{-0.25, -0.25}, {0.25, -0.25}, {-0.25, 0.25}, {0.25, 0.25}}};
-  constexpr std::array<std::array<double, 2>, 4> kSpotOffsets = {{{0.25, 0.25}, {-0.25, 0.25}, {0.25, -0.25}, {-0.25, -0.25}}};
+  constexpr std::array<std::array<double, 2>, 4> kPixelOffsets = {
+      {{-0.25, -0.25}, {0.25, -0.25}, {-0.25, 0.25}, {0.25, 0.25}}};
+  constexpr std::array<std::array<double, 2>, 4> kSpotOffsets = {
+      {{0.25, 0.25}, {-0.25, 0.25}, {0.25, -0.25}, {-0.25, -0.25}}};
   const Eigen::Vector3d spot_axis(cos_deg(imager.gantry_angle_deg), 0.0, -sin_deg(imager.gantry_angle_deg));
   std::array<Eigen::Vector3d, 4> sources_patient;
   for (int n = 0; n < 4; ++n)
-    sources_patient[n] = placement.patient_from_fixed(imager.source_fixed_mm() +
-                                                      kFocalSpotMm * kSpotOffsets[n][0] * spot_axis +
-                                                      Eigen::Vector3d(0.0, kFocalSpotMm * kSpotOffsets[n][1], 0.0));
+    sources_patient[n] =
+        placement.patient_from_fixed(imager.source_fixed_mm() + kFocalSpotMm * kSpotOffsets[n][0] * spot_axis +
+                                     Eigen::Vector3d(0.0, kFocalSpotMm * kSpotOffsets[n][1], 0.0));
 
   Image<float> intensity(imager.pixels, imager.pixels);
   tbb::parallel_for(0, imager.pixels, [&](int row) {
@@ -170,8 +178,8 @@ Image<float> simulate_xray(const std::vector<Shape>& shapes, const Placement& pl
       double sum = 0.0;
       for (int n = 0; n < 4; ++n)
         sum += primary_intensity(shapes, sources_patient[n],
-                                 placement.patient_from_fixed(imager.pixel_fixed_mm(column + kPixelOffsets[n][0],
-                                                                                    row + kPixelOffsets[n][1])));
+                                 placement.patient_from_fixed(
+                                     imager.pixel_fixed_mm(column + kPixelOffsets[n][0], row + kPixelOffsets[n][1])));
       intensity.at(column, row) = static_cast<float>(0.25 * sum);
     }
   });

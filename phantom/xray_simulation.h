@@ -18,8 +18,8 @@ struct Placement {
   std::string patient_position = "HFS";  // HFS, HFP, FFS, FFP, HFDR, HFDL, FFDR, FFDL
   double couch_angle_deg = 0.0;          // counter-clockwise seen from above
   Eigen::Vector3d isocenter_patient_mm = Eigen::Vector3d::Zero();
-  Eigen::Vector3d translation_mm = Eigen::Vector3d::Zero();   // setup error in IEC 61217 fixed: planned x is found at
-  Eigen::Vector3d rotation_deg = Eigen::Vector3d::Zero();     // R x + t, R = Rz(rz) Rx(rx) Ry(ry), given as (rx, ry, rz)
+  Eigen::Vector3d translation_mm = Eigen::Vector3d::Zero();  // setup error in IEC 61217 fixed: planned x is found at
+  Eigen::Vector3d rotation_deg = Eigen::Vector3d::Zero();    // R x + t, R = Rz(rz) Rx(rx) Ry(ry), given as (rx, ry, rz)
 
   // R of the setup error.
   Eigen::Matrix3d rotation() const;
@@ -33,16 +33,16 @@ struct Imager {
   double gantry_angle_deg = 0.0;  // clockwise seen facing the gantry: 90 puts the source at the viewer's right
   double sad_mm = 1000.0;
   double sid_mm = 1500.0;
-  int pixels = 512;               // along each edge
-  double pixel_mm = 0.8;          // on the panel
+  int pixels = 512;       // along each edge
+  double pixel_mm = 0.8;  // on the panel
 
   Eigen::Vector3d source_fixed_mm() const;
   // Center of a pixel; column 0 at the left and row 0 at the top, seen from the source with the gantry at the top.
   Eigen::Vector3d pixel_fixed_mm(double column, double row) const;
 };
 
-// Intensity at the panel, 1 without a patient: a 120 kVp spectrum through water and bone, a focal spot of 0.6 mm, scatter
-// of 12 % and the noise of `photons` per open pixel (0: none).
+// Intensity at the panel, 1 without a patient: a 120 kVp spectrum through water and bone, a focal spot of 0.6 mm,
+// scatter of 12 % and the noise of `photons` per open pixel (0: none).
 Image<float> simulate_xray(const std::vector<Shape>& shapes, const Placement& placement, const Imager& imager,
                            double photons, std::uint64_t seed);
 

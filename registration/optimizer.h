@@ -10,9 +10,9 @@ namespace isoshift {
 
 struct OptimizerOptions {
   std::vector<double> start;
-  std::vector<double> lower, upper;   // the box; start lies inside
-  std::vector<double> initial_step;   // first trust-region radius per parameter
-  double relative_tolerance = 1e-3;   // stop when steps fall below this share of the initial step
+  std::vector<double> lower, upper;  // the box; start lies inside
+  std::vector<double> initial_step;  // first trust-region radius per parameter
+  double relative_tolerance = 1e-3;  // stop when steps fall below this share of the initial step
   int max_evaluations = 500;
 };
 

@@ -30,7 +30,7 @@ std::vector<Eigen::Vector3d> unobservable_directions(std::span<const XrayView> v
 }
 
 void judge(std::span<const double> parameters, const RegistrationOptions& options, RegistrationResult& result) {
-  static constexpr std::array kNames = {"x translation", "y translation", "z translation",
+  static constexpr std::array kNames = {"x translation",    "y translation",    "z translation",
                                         "rotation about x", "rotation about y", "rotation about z"};
   result.reasons.clear();
   result.verdict = Verdict::kAccepted;
@@ -49,15 +49,18 @@ void judge(std::span<const double> parameters, const RegistrationOptions& option
     const ViewReport& view = result.views[n];
     mean += view.similarity_final / static_cast<double>(result.views.size());
     if (view.similarity_final < view.similarity_start)
-      demote(Verdict::kReview, fmt::format("view {} matches worse than at the planned pose (similarity {:.4f}, was {:.4f})",
-                                           n + 1, view.similarity_final, view.similarity_start));
+      demote(Verdict::kReview,
+             fmt::format("view {} matches worse than at the planned pose (similarity {:.4f}, was {:.4f})", n + 1,
+                         view.similarity_final, view.similarity_start));
   }
   if (mean < options.min_ncc)
-    demote(Verdict::kReview, fmt::format("the final normalized cross correlation {:.3f} is below {:.2f}", mean, options.min_ncc));
+    demote(Verdict::kReview,
+           fmt::format("the final normalized cross correlation {:.3f} is below {:.2f}", mean, options.min_ncc));
   if (!result.unobservable_room.empty())
     demote(Verdict::kReview, "all views look along nearly the same direction, along which nothing was measured");
   if (result.verdict == Verdict::kAccepted)
-    result.warnings.push_back("the quality checks of this version are not complete: look at the pictures before you act");
+    result.warnings.push_back(
+        "the quality checks of this version are not complete: look at the pictures before you act");
 }
 
 }  // namespace isoshift

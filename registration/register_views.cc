@@ -35,7 +35,8 @@ Eigen::Isometry3d setup_error_from_parameters(std::span<const double> parameters
   return setup_error;
 }
 
-// The largest reduction that keeps pixels at the isocenter within the stage's size, and enough of them in a small field.
+// The largest reduction that keeps pixels at the isocenter within the stage's size, and enough of them in a small
+// field.
 int reduction(const FixedImage& image, double pixel_mm) {
   constexpr double kMinFieldPixels = 900.0;
   const Eigen::Vector2d origin = image.view.project(Eigen::Vector3d::Zero()).value();
@@ -88,9 +89,17 @@ void report_views(Objective& objective, const Eigen::Isometry3d& planned, Regist
 std::vector<Stage> RegistrationOptions::default_stages() {
   return {
       {.name = "coarse", .pixel_mm = 5.0, .initial_step_mm = 8.0, .initial_step_rad = 0.06, .relative_tolerance = 0.02},
-      {.name = "medium", .pixel_mm = 2.5, .initial_step_mm = 1.5, .initial_step_rad = 0.015, .relative_tolerance = 0.02},
-      {.name = "fine", .similarity = SimilarityKind::kGradientCorrelation, .pixel_mm = 1.2, .initial_step_mm = 0.6,
-       .initial_step_rad = 0.006, .relative_tolerance = 0.01},
+      {.name = "medium",
+       .pixel_mm = 2.5,
+       .initial_step_mm = 1.5,
+       .initial_step_rad = 0.015,
+       .relative_tolerance = 0.02},
+      {.name = "fine",
+       .similarity = SimilarityKind::kGradientCorrelation,
+       .pixel_mm = 1.2,
+       .initial_step_mm = 0.6,
+       .initial_step_rad = 0.006,
+       .relative_tolerance = 0.01},
   };
 }
 

@@ -25,12 +25,12 @@ enum class Dof { kRigid, kTranslation };
 struct Stage {
   std::string name;
   SimilarityKind similarity = SimilarityKind::kNcc;
-  double pixel_mm = 4.0;          // the stage's pixels, at the isocenter: the image is reduced to at least this size
-  double pixel_fraction = 1.0;    // share of the field's pixels compared
-  double initial_step_mm = 5.0;   // first trust-region radius of the translations
-  double initial_step_rad = 0.05; // the same for the rotations
+  double pixel_mm = 4.0;             // the stage's pixels, at the isocenter: the image is reduced to at least this size
+  double pixel_fraction = 1.0;       // share of the field's pixels compared
+  double initial_step_mm = 5.0;      // first trust-region radius of the translations
+  double initial_step_rad = 0.05;    // the same for the rotations
   double relative_tolerance = 0.01;  // stop when steps fall below this share of the initial ones
-  int max_evaluations = 200;      // one evaluation renders every view once
+  int max_evaluations = 200;         // one evaluation renders every view once
 };
 
 struct RegistrationOptions {

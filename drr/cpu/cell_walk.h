@@ -1,5 +1,6 @@
 #pragma once
-// Siddon's walk: the cells of a unit lattice that a ray passes, in order, with entry and exit (Siddon, Med Phys 12, 1985).
+// Siddon's walk: the cells of a unit lattice that a ray passes, in order, with entry and exit (Siddon, Med Phys 12,
+// 1985).
 
 #include <algorithm>
 #include <cmath>

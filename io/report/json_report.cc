@@ -38,19 +38,16 @@ Json setup_error_json(const SetupReport& report, const ShownShift& shown) {
 
 Json couch_shift_json(const ShownShift& shown) {
   if (shown.withheld) return nullptr;
-  return {{"frame", "IEC 61217 table top at imaging"},
-          {"order", "translate, then rotate about the isocenter"},
-          {"lateral_mm", or_null(shown.couch_mm[0])},
-          {"longitudinal_mm", or_null(shown.couch_mm[1])},
-          {"vertical_mm", or_null(shown.couch_mm[2])},
-          {"yaw_deg", shown.couch_deg[0]},
-          {"pitch_deg", shown.couch_deg[1]},
-          {"roll_deg", shown.couch_deg[2]}};
+  return {{"frame", "IEC 61217 table top at imaging"}, {"order", "translate, then rotate about the isocenter"},
+          {"lateral_mm", or_null(shown.couch_mm[0])},  {"longitudinal_mm", or_null(shown.couch_mm[1])},
+          {"vertical_mm", or_null(shown.couch_mm[2])}, {"yaw_deg", shown.couch_deg[0]},
+          {"pitch_deg", shown.couch_deg[1]},           {"roll_deg", shown.couch_deg[2]}};
 }
 
 Json couch_target_json(const ShownShift& shown) {
   if (shown.withheld) return nullptr;
-  return {{"yaw", shown.couch_target_deg[0]}, {"pitch", shown.couch_target_deg[1]}, {"roll", shown.couch_target_deg[2]}};
+  return {
+      {"yaw", shown.couch_target_deg[0]}, {"pitch", shown.couch_target_deg[1]}, {"roll", shown.couch_target_deg[2]}};
 }
 
 Json unobservable_json(const SetupReport& report) {

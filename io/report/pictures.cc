@@ -18,30 +18,63 @@ constexpr int kTilePx = 380;
 constexpr int kCaptionPx = 22;
 constexpr int kGapPx = 4;
 
-// Gray value 0..1 between the 1st and 99.5th percentile.
-class Scale {
- public:
-  explicit Scale(const Image<float>& image) {
-    std::vector<float> values = image.pixels;
-    const auto at_share = [&](double share) {
-      const auto nth = values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
-      std::ranges::nth_element(values, nth);
-      return *nth;
-    };
-    low_ = at_share(0.01);
-    high_ = std::max(at_share(0.995), low_ + 1e-6F);
-  }
-  double operator()(float value) const { return std::clamp((value - low_) / (high_ - low_), 0.0F, 1.0F); }
-
- private:
-  float low_, high_;
+// Gray value 0..1 of line integrals between the 1st and the 99.5th percentile.
+struct Scale {
+  double low = 0.0, high = 1.0;
+  double operator()(double value) const { return std::clamp((value - low) / (high - low), 0.0, 1.0); }
 };
+
+Scale scale_of(std::vector<float> values) {
+  const auto at_share = [&](double share) {
+    const auto nth = values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
+    std::ranges::nth_element(values, nth);
+    return static_cast<double>(*nth);
+  };
+  const double low = at_share(0.01);
+  return {.low = low, .high = std::max(at_share(0.995), low + 1e-6)};
+}
+
+std::vector<float> pixels_in_field(const Image<float>& image, const Image<std::uint8_t>& field) {
+  std::vector<float> pixels;
+  for (std::size_t n = 0; n < image.pixels.size(); ++n)
+    if (field.pixels[n] != 0) pixels.push_back(image.pixels[n]);
+  return pixels.empty() ? image.pixels : pixels;
+}
+
+// The X-ray's scale in terms of a DRR: slope * drr + offset. X-rays are hardened and scattered, DRRs are not; a
+// straight line is enough for the eye.
+struct Line {
+  double slope, offset;
+};
+
+// Least squares over the field, at the pose found.
+Line fitted_line(const ViewComparison& comparison) {
+  const std::vector<float> x = pixels_in_field(comparison.drr_found, comparison.field);
+  const std::vector<float> y = pixels_in_field(comparison.xray, comparison.field);
+  const auto n = static_cast<double>(x.size());
+  double sum_x = 0.0, sum_y = 0.0, sum_xx = 0.0, sum_xy = 0.0;
+  for (std::size_t i = 0; i < x.size(); ++i) {
+    sum_x += x[i];
+    sum_y += y[i];
+    sum_xx += static_cast<double>(x[i]) * x[i];
+    sum_xy += static_cast<double>(x[i]) * y[i];
+  }
+  const double variance = sum_xx - sum_x * sum_x / n;
+  const double slope = variance > 0.0 ? std::max(0.0, (sum_xy - sum_x * sum_y / n) / variance) : 0.0;
+  return {.slope = slope, .offset = (sum_y - slope * sum_x) / n};
+}
+
+Image<float> brought_to_scale(Image<float> drr, const Line& line) {
+  for (float& pixel : drr.pixels) pixel = static_cast<float>(line.slope * pixel + line.offset);
+  return drr;
+}
 
 std::uint8_t byte(double share) { return static_cast<std::uint8_t>(std::lround(255.0 * share)); }
 
-// Pastes an image, its red and blue from `first` and its green from `second`, scaled to fit a tile.
-void paste(Image<Rgb>& page, int x, int y, const Image<float>& first, const Scale& first_scale,
-           const Image<float>& second, const Scale& second_scale) {
+// Pastes an image, its red and blue from `first` and its green from `second`, zoomed to fit a tile.
+void paste(Image<Rgb>& page, int x, int y, const Image<float>& first, const Image<float>& second, const Scale& scale,
+           const Image<std::uint8_t>& field) {
+  constexpr double kDimmed = 0.35;
   const double zoom = static_cast<double>(std::max(first.columns, first.rows)) / kTilePx;
   const int width = std::min(kTilePx, static_cast<int>(first.columns / zoom));
   const int height = std::min(kTilePx, static_cast<int>(first.rows / zoom));
@@ -49,8 +82,9 @@ void paste(Image<Rgb>& page, int x, int y, const Image<float>& first, const Scal
     for (int column = 0; column < width; ++column) {
       const int c = std::min(first.columns - 1, static_cast<int>((column + 0.5) * zoom));
       const int r = std::min(first.rows - 1, static_cast<int>((row + 0.5) * zoom));
-      const std::uint8_t magenta = byte(first_scale(first.at(c, r)));
-      const std::uint8_t green = byte(second_scale(second.at(c, r)));
+      const double brightness = field.at(c, r) != 0 ? 1.0 : kDimmed;
+      const std::uint8_t magenta = byte(brightness * scale(first.at(c, r)));
+      const std::uint8_t green = byte(brightness * scale(second.at(c, r)));
       page.at(x + column, y + row) = {magenta, green, magenta};
     }
 }
@@ -88,34 +122,40 @@ void write_caption(Image<Rgb>& page, int x, int y, const std::string& text) {
 
 void write_comparison_png(const std::filesystem::path& path, const ViewComparison& comparison) {
   struct Row {
-    const Image<float>& drr;
+    Image<float> drr;
     const char* name;
   };
-  const std::array rows = {Row{comparison.drr_planned, "as planned"}, Row{comparison.drr_found, "as found"}};
+  const Line line = fitted_line(comparison);
+  const std::array rows = {Row{brought_to_scale(comparison.drr_planned, line), "as planned"},
+                           Row{brought_to_scale(comparison.drr_found, line), "as found"}};
+  const Image<float>& xray = comparison.xray;
+  const Scale scale = scale_of(pixels_in_field(xray, comparison.field));
+  const double zoom = static_cast<double>(std::max(xray.columns, xray.rows)) / kTilePx;
   Image<Rgb> page(3 * kTilePx + 2 * kGapPx, 2 * (kTilePx + kCaptionPx) + kGapPx, Rgb{0, 0, 0});
-  const Scale xray_scale(comparison.xray);
-  const double zoom = static_cast<double>(std::max(comparison.xray.columns, comparison.xray.rows)) / kTilePx;
   for (int n = 0; n < 2; ++n) {
-    const Scale drr_scale(rows[n].drr);
-    const int y = n * (kTilePx + kCaptionPx + kGapPx) + kCaptionPx;
-    for (int tile = 0; tile < 3; ++tile) {
-      const int x = tile * (kTilePx + kGapPx);
-      const bool xray_first = tile != 1, xray_second = tile == 0;
-      paste(page, x, y, xray_first ? comparison.xray : rows[n].drr, xray_first ? xray_scale : drr_scale,
-            xray_second ? comparison.xray : rows[n].drr, xray_second ? xray_scale : drr_scale);
+    const Image<float>& drr = rows[n].drr;
+    struct Tile {
+      std::string caption;
+      const Image<float>& first;
+      const Image<float>& second;
+    };
+    const std::array tiles = {Tile{comparison.label + ": X-ray", xray, xray},
+                              Tile{std::string("DRR, patient ") + rows[n].name, drr, drr},
+                              Tile{std::string("overlay, ") + rows[n].name + " (gray where they match)", xray, drr}};
+    for (int t = 0; t < 3; ++t) {
+      const int x = t * (kTilePx + kGapPx);
+      const int y = n * (kTilePx + kCaptionPx + kGapPx) + kCaptionPx;
+      paste(page, x, y, tiles[t].first, tiles[t].second, scale, comparison.field);
       mark(page, x + static_cast<int>((comparison.isocenter_px.x() + 0.5) / zoom),
            y + static_cast<int>((comparison.isocenter_px.y() + 0.5) / zoom));
-      const std::string caption = tile == 0   ? comparison.label + "   X-ray"
-                                  : tile == 1 ? std::string("DRR, patient ") + rows[n].name
-                                              : std::string("overlay, ") + rows[n].name + "   (gray: they match)";
-      write_caption(page, x, y - kCaptionPx, caption);
+      write_caption(page, x, y - kCaptionPx, tiles[t].caption);
     }
   }
   write_png(path, page);
 }
 
 void write_line_integral_png(const std::filesystem::path& path, const Image<float>& line_integral) {
-  const Scale scale(line_integral);
+  const Scale scale = scale_of(line_integral.pixels);
   Image<Rgb> picture(line_integral.columns, line_integral.rows);
   std::ranges::transform(line_integral.pixels, picture.pixels.begin(), [&](float value) {
     const std::uint8_t gray = byte(scale(value));

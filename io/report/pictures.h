@@ -1,6 +1,7 @@
 #pragma once
 // Pictures a person judges a registration by.
 
+#include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <span>
@@ -12,17 +13,19 @@
 namespace isoshift {
 
 // One view before and after: X-ray, DRR at the planned pose, DRR at the pose found, all as line integrals of the same
-// size.
+// size, and the field (1 inside) in which they were compared.
 struct ViewComparison {
   std::string label;
   const Image<float>& xray;
+  const Image<std::uint8_t>& field;
   const Image<float>& drr_planned;
   const Image<float>& drr_found;
   Eigen::Vector2d isocenter_px;
 };
 
-// Two rows (planned, found) of X-ray, DRR and their overlay: X-ray magenta, DRR green, so that what matches is gray, for
-// color-blind eyes too. The cross marks the isocenter.
+// Two rows (planned, found) of X-ray, DRR and their overlay: X-ray magenta, DRR green, so that what matches is gray,
+// for color-blind eyes too. The DRRs are brought to the X-ray's scale by one straight line, fitted in the field at the
+// pose found; outside the field everything is dimmed. The cross marks the isocenter.
 void write_comparison_png(const std::filesystem::path& path, const ViewComparison& comparison);
 
 // One image of line integrals as radiographs are looked at: dense is bright.

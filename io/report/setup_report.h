@@ -57,15 +57,15 @@ struct SetupReport {
   std::vector<std::string> overrides, warnings;
 };
 
-// What may be shown of the result: components along an unobservable direction are absent, and without a shift (rejected)
-// all of the couch's are.
+// What may be shown of the result: components along an unobservable direction are absent, and without a shift
+// (rejected) all of the couch's are.
 struct ShownShift {
-  std::array<std::optional<double>, 3> setup_error_mm;   // x, y, z, IEC 61217 fixed
-  std::array<double, 3> setup_error_deg;                 // rx, ry, rz of R = Rz Rx Ry
-  bool withheld = false;                                 // the verdict forbids a couch shift
-  std::array<std::optional<double>, 3> couch_mm;         // lateral, longitudinal, vertical
-  std::array<double, 3> couch_deg;                       // yaw, pitch, roll: change of the read-outs
-  std::array<double, 3> couch_target_deg;                // yaw, pitch, roll: resulting read-outs
+  std::array<std::optional<double>, 3> setup_error_mm;  // x, y, z, IEC 61217 fixed
+  std::array<double, 3> setup_error_deg;                // rx, ry, rz of R = Rz Rx Ry
+  bool withheld = false;                                // the verdict forbids a couch shift
+  std::array<std::optional<double>, 3> couch_mm;        // lateral, longitudinal, vertical
+  std::array<double, 3> couch_deg;                      // yaw, pitch, roll: change of the read-outs
+  std::array<double, 3> couch_target_deg;               // yaw, pitch, roll: resulting read-outs
 };
 ShownShift shown_shift(const SetupReport& report);
 

@@ -33,7 +33,8 @@ std::string row(std::string_view name, const std::optional<double>& value, std::
 }
 
 std::string couch_rows(const ShownShift& shown) {
-  return row("Lateral", shown.couch_mm[0], "mm", kLateral) + row("Longitudinal", shown.couch_mm[1], "mm", kLongitudinal) +
+  return row("Lateral", shown.couch_mm[0], "mm", kLateral) +
+         row("Longitudinal", shown.couch_mm[1], "mm", kLongitudinal) +
          row("Vertical", shown.couch_mm[2], "mm", kVertical) + row("Yaw", shown.couch_deg[0], "deg", kYaw) +
          row("Pitch", shown.couch_deg[1], "deg", kPitch) + row("Roll", shown.couch_deg[2], "deg", kRoll);
 }
@@ -72,7 +73,8 @@ std::string text_report(const SetupReport& report) {
       report.plan_uid.empty() ? "none; isocenter given by hand" : plain(report.plan_label), report.patient_position,
       deg_from_rad(report.table.support_rad), fmt::join(report.isocenter_patient_mm, ", "));
   for (std::size_t n = 0; n < report.views.size(); ++n)
-    text += fmt::format("{}{} (gantry {:.1f} deg)", n ? ", " : "", plain(report.views[n].label), report.views[n].gantry_deg);
+    text += fmt::format("{}{} (gantry {:.1f} deg)", n ? ", " : "", plain(report.views[n].label),
+                        report.views[n].gantry_deg);
 
   text += fmt::format("\n\nVERDICT      {}\n", upper(to_string(report.verdict)));
   for (const std::string& reason : report.reasons) text += "  - " + reason + "\n";
@@ -89,9 +91,10 @@ std::string text_report(const SetupReport& report) {
   if (shown.withheld)
     text += "  withheld: the result was rejected\n";
   else
-    text += row("x", shown.setup_error_mm[0], "mm", kLateral) + row("y", shown.setup_error_mm[1], "mm", kLongitudinal) +
-            row("z", shown.setup_error_mm[2], "mm", kVertical) + row("about x", shown.setup_error_deg[0], "deg", kPitch) +
-            row("about y", shown.setup_error_deg[1], "deg", kRoll) + row("about z", shown.setup_error_deg[2], "deg", kYaw);
+    text +=
+        row("x", shown.setup_error_mm[0], "mm", kLateral) + row("y", shown.setup_error_mm[1], "mm", kLongitudinal) +
+        row("z", shown.setup_error_mm[2], "mm", kVertical) + row("about x", shown.setup_error_deg[0], "deg", kPitch) +
+        row("about y", shown.setup_error_deg[1], "deg", kRoll) + row("about z", shown.setup_error_deg[2], "deg", kYaw);
   if (report.translation_only) text += "  Only translations were searched; rotations were taken as 0.\n";
 
   text += "\nVIEWS               similarity at the planned pose -> at the pose found\n";
@@ -102,7 +105,8 @@ std::string text_report(const SetupReport& report) {
   text += fmt::format(
       "\nCONVENTIONS\n"
       "  IEC 61217, mm and degrees. Facing the gantry: x to the right, y toward the gantry, z up; the origin is the\n"
-      "  isocenter. Setup error: anatomy planned at p is found at R p + t, R = Rz Rx Ry. Couch: the table top's axes at\n"
+      "  isocenter. Setup error: anatomy planned at p is found at R p + t, R = Rz Rx Ry. Couch: the table top's axes "
+      "at\n"
       "  imaging; angles are changes of the table's read-outs. Shown to 0.1; result.json has full precision.\n\n"
       "Renderer     {} on {}; attenuation {}, threshold {:.0f} HU; seed {}\n"
       "Time         {:.1f} s, of which registration {:.1f} s\n",

@@ -10,9 +10,9 @@
 namespace isoshift {
 namespace {
 
-constexpr double kRimMm = 2.0;             // left out at the panel's rim and along the collimator's penumbra, at the isocenter
-constexpr double kPenumbraMm = 1.7;        // half the distance over which an edge must rise, at the isocenter
-constexpr double kMinEdgeMm = 12.0;        // the shortest edge that counts, at the isocenter
+constexpr double kRimMm = 2.0;  // left out at the panel's rim and along the collimator's penumbra, at the isocenter
+constexpr double kPenumbraMm = 1.7;         // half the distance over which an edge must rise, at the isocenter
+constexpr double kMinEdgeMm = 12.0;         // the shortest edge that counts, at the isocenter
 constexpr float kMinEdgeContrast = 0.916F;  // ln 2.5, of an intensity image
 constexpr float kMinEdgeShare = 0.15F;      // of the image's range, where line integrals come without a scale
 
@@ -34,8 +34,8 @@ struct Edge {
   int rows = 0;
 };
 
-// The longest edge at a column: rows in which the line integral falls by `contrast` from x - reach to x + reach, gaps of
-// two rows allowed.
+// The longest edge at a column: rows in which the line integral falls by `contrast` from x - reach to x + reach, gaps
+// of two rows allowed.
 Edge longest_edge_at(const cv::Mat& line_integral, int x, int reach, float contrast) {
   Edge longest{.column = x};
   int first_row = 0, gap = 0;
@@ -64,13 +64,14 @@ float median_of(const cv::Mat& part) {
 
 // What edges are looked for, in pixels and in the units of the line integral.
 struct EdgeSearch {
-  int reach;      // half the penumbra
-  int min_rows;   // the shortest edge that counts
+  int reach;     // half the penumbra
+  int min_rows;  // the shortest edge that counts
   float contrast;
 };
 
 // The field's left side: the longest edge left of the isocenter, if the collimator shades all that lies beyond it. The
-// patient's outline is bright on its outer side, and a metal rod is bright again on its other one. 0 where there is none.
+// patient's outline is bright on its outer side, and a metal rod is bright again on its other one. 0 where there is
+// none.
 int left_side(const cv::Mat& line_integral, double isocenter_column, const EdgeSearch& search) {
   const int end = std::min(static_cast<int>(isocenter_column), line_integral.cols - search.reach);
   std::vector<Edge> edges;
@@ -126,9 +127,8 @@ Image<float> line_integrals(const XrayImage& xray) {
   if (!(brightest > 0.0F)) return result;
   // A dead or blocked pixel has no logarithm; a millionth of the maximum is below anything a receptor resolves.
   const float darkest = brightest * 1e-6F;
-  std::ranges::transform(xray.values.pixels, result.pixels.begin(), [&](float intensity) {
-    return -std::log(std::max(intensity, darkest) / brightest);
-  });
+  std::ranges::transform(xray.values.pixels, result.pixels.begin(),
+                         [&](float intensity) { return -std::log(std::max(intensity, darkest) / brightest); });
   return result;
 }
 
@@ -137,14 +137,14 @@ Image<std::uint8_t> irradiated_field(const XrayImage& xray, const Image<float>& 
   cv::Mat smooth;
   cv::medianBlur(as_mat(line_integral), smooth, 5);
   const auto [darkest, brightest] = std::ranges::minmax(line_integral.pixels);
-  const EdgeSearch search{
-      .reach = std::max(1, static_cast<int>(std::lround(kPenumbraMm * scale))),
-      .min_rows = std::max(3, static_cast<int>(std::lround(kMinEdgeMm * scale))),
-      .contrast = xray.meaning == XrayImage::Meaning::kIntensity ? kMinEdgeContrast
-                                                                 : kMinEdgeShare * (brightest - darkest)};
+  const EdgeSearch search{.reach = std::max(1, static_cast<int>(std::lround(kPenumbraMm * scale))),
+                          .min_rows = std::max(3, static_cast<int>(std::lround(kMinEdgeMm * scale))),
+                          .contrast = xray.meaning == XrayImage::Meaning::kIntensity
+                                          ? kMinEdgeContrast
+                                          : kMinEdgeShare * (brightest - darkest)};
 
   // Turn the image so that the collimator's edges are upright, find them, and turn the rectangle back.
-  const double turn_deg = deg_from_rad(std::remainder(xray.collimator_angle_rad, std::numbers::pi / 2.0));
+  const double turn_deg = -deg_from_rad(std::remainder(xray.collimator_angle_rad, std::numbers::pi / 2.0));
   const cv::Size size = smooth.size();
   cv::Matx23d upright_from_image(1, 0, 0, 0, 1, 0);
   cv::Mat upright = smooth;

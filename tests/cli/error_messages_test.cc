@@ -42,16 +42,17 @@ class ErrorMessagesTest : public testing::Test {
 
 TEST_F(ErrorMessagesTest, NoCt) {
   std::filesystem::remove_all(study_.path() / "CT");
-  expect_error(fmt::format("no CT series found (searched {}).\n       Name its folder: --ct FOLDER", where(study_.path())));
+  expect_error(
+      fmt::format("no CT series found (searched {}).\n       Name its folder: --ct FOLDER", where(study_.path())));
 }
 
 TEST_F(ErrorMessagesTest, TwoCtSeries) {
-  for (const int k : {0, 1, 2})
-    edit(study_.ct_slice(k), [](DicomItem d) { d.put(DCM_SeriesInstanceUID, "1.2.3"); });
+  for (const int k : {0, 1, 2}) edit(study_.ct_slice(k), [](DicomItem d) { d.put(DCM_SeriesInstanceUID, "1.2.3"); });
   const CommandOutcome outcome = register_study();
   EXPECT_EQ(outcome.exit_status, 1);
-  EXPECT_THAT(outcome.err, StartsWith("error: 2 CT series found, expected one:\n       3 slices, series 1.2.3, first file " +
-                                      where(study_.ct_slice(0)) + "\n"));
+  EXPECT_THAT(outcome.err,
+              StartsWith("error: 2 CT series found, expected one:\n       3 slices, series 1.2.3, first file " +
+                         where(study_.ct_slice(0)) + "\n"));
   EXPECT_THAT(outcome.err, testing::EndsWith("\n       Name the planning CT: --ct FOLDER\n"));
 }
 
@@ -59,10 +60,11 @@ TEST_F(ErrorMessagesTest, MissingSlice) {
   std::string uid;
   edit(study_.ct_slice(20), [&](DicomItem d) { uid = d.required_text(DCM_SeriesInstanceUID); });
   std::filesystem::remove(study_.ct_slice(20));
-  expect_error(fmt::format("CT series {}: slices 20 and 21 are 12 mm apart, the others 6 mm (ImagePositionPatient (0020,0032)).\n"
-                           "       A uniform series is needed; a slice is probably missing.\n"
-                           "       If that is known to be right, allow it: --allow gaps=REASON",
-                           uid));
+  expect_error(fmt::format(
+      "CT series {}: slices 20 and 21 are 12 mm apart, the others 6 mm (ImagePositionPatient (0020,0032)).\n"
+      "       A uniform series is needed; a slice is probably missing.\n"
+      "       If that is known to be right, allow it: --allow gaps=REASON",
+      uid));
 }
 
 TEST_F(ErrorMessagesTest, UnevenSpacing) {
@@ -75,10 +77,11 @@ TEST_F(ErrorMessagesTest, UnevenSpacing) {
       position[2] += 2.5;
       d.put(DCM_ImagePositionPatient, position);
     });
-  expect_error(fmt::format("CT series {}: slices 20 and 21 are 8.5 mm apart, the others 6 mm (ImagePositionPatient (0020,0032)).\n"
-                           "       A uniform series is needed; this one has uneven spacing.\n"
-                           "       If that is known to be right, allow it: --allow gaps=REASON",
-                           uid));
+  expect_error(fmt::format(
+      "CT series {}: slices 20 and 21 are 8.5 mm apart, the others 6 mm (ImagePositionPatient (0020,0032)).\n"
+      "       A uniform series is needed; this one has uneven spacing.\n"
+      "       If that is known to be right, allow it: --allow gaps=REASON",
+      uid));
 }
 
 TEST_F(ErrorMessagesTest, ImageWithoutSadOrSid) {
@@ -86,9 +89,10 @@ TEST_F(ErrorMessagesTest, ImageWithoutSadOrSid) {
     d.erase(DCM_RadiationMachineSAD);
     d.erase(DCM_RTImageSID);
   });
-  expect_error(fmt::format("{0}: RadiationMachineSAD (3002,0022) is missing.\n       Supply it: --sad MM\n"
-                           "{0}: RTImageSID (3002,0026) is missing.\n       Supply it: --sid MM",
-                           where(study_.image(0))));
+  expect_error(
+      fmt::format("{0}: RadiationMachineSAD (3002,0022) is missing.\n       Supply it: --sad MM\n"
+                  "{0}: RTImageSID (3002,0026) is missing.\n       Supply it: --sid MM",
+                  where(study_.image(0))));
 }
 
 TEST_F(ErrorMessagesTest, ImageWithoutPositionGantryAngleAndCouchAngle) {
@@ -114,34 +118,37 @@ TEST_F(ErrorMessagesTest, DifferentPatients) {
 TEST_F(ErrorMessagesTest, ImageAndPlanThatDoNotBelongTogether) {
   std::string plan_uid;
   edit(study_.plan(), [&](DicomItem d) { plan_uid = d.required_text(DCM_SOPInstanceUID); });
-  edit(study_.image(1), [](DicomItem d) {
-    d.items(DCM_ReferencedRTPlanSequence)[0].put(DCM_ReferencedSOPInstanceUID, "1.2.3");
-  });
-  expect_error(fmt::format("{}: belongs to another plan than {} (ReferencedRTPlanSequence (300C,0002)): it refers to 1.2.3, "
-                           "the plan is {}\n"
-                           "       If that is known to be right, allow it: --allow plan-mismatch=REASON",
-                           where(study_.image(1)), where(study_.plan()), plan_uid));
+  edit(study_.image(1),
+       [](DicomItem d) { d.items(DCM_ReferencedRTPlanSequence)[0].put(DCM_ReferencedSOPInstanceUID, "1.2.3"); });
+  expect_error(
+      fmt::format("{}: belongs to another plan than {} (ReferencedRTPlanSequence (300C,0002)): it refers to 1.2.3, "
+                  "the plan is {}\n"
+                  "       If that is known to be right, allow it: --allow plan-mismatch=REASON",
+                  where(study_.image(1)), where(study_.plan()), plan_uid));
 }
 
 TEST_F(ErrorMessagesTest, PlanInAnotherFrameOfReference) {
   edit(study_.plan(), [](DicomItem d) { d.put(DCM_FrameOfReferenceUID, "1.2.3"); });
-  expect_error(fmt::format("{}: FrameOfReferenceUID (0020,0052) is not that of the CT, so the plan's isocenter does not apply to it\n"
-                           "       If that is known to be right, allow it: --allow for-mismatch=REASON",
-                           where(study_.plan())));
+  expect_error(fmt::format(
+      "{}: FrameOfReferenceUID (0020,0052) is not that of the CT, so the plan's isocenter does not apply to it\n"
+      "       If that is known to be right, allow it: --allow for-mismatch=REASON",
+      where(study_.plan())));
 }
 
 TEST_F(ErrorMessagesTest, TableMovedBetweenTheViews) {
   edit(study_.image(1), [](DicomItem d) { d.put(DCM_PatientSupportAngle, 2.0); });
-  expect_error(fmt::format("{}: the table turned by 2.0 degrees since {} (PatientSupportAngle (300A,0122))\n"
-                           "       If that is known to be right, allow it: --allow table-moved=REASON",
-                           where(study_.image(1)), where(study_.image(0))));
+  expect_error(
+      fmt::format("{}: the table turned by 2.0 degrees since {} (PatientSupportAngle (300A,0122))\n"
+                  "       If that is known to be right, allow it: --allow table-moved=REASON",
+                  where(study_.image(1)), where(study_.image(0))));
 }
 
 TEST_F(ErrorMessagesTest, ViewsTooFarApartInTime) {
   edit(study_.image(1), [](DicomItem d) { d.put(DCM_AcquisitionTime, "104500"); });
-  expect_error(fmt::format("{}: taken 30 minutes from {}, expected at most 10 (AcquisitionTime (0008,0032))\n"
-                           "       If that is known to be right, allow it: --allow time-span=REASON",
-                           where(study_.image(1)), where(study_.image(0))));
+  expect_error(
+      fmt::format("{}: taken 30 minutes from {}, expected at most 10 (AcquisitionTime (0008,0032))\n"
+                  "       If that is known to be right, allow it: --allow time-span=REASON",
+                  where(study_.image(1)), where(study_.image(0))));
 }
 
 TEST_F(ErrorMessagesTest, IsocenterOutsideTheCt) {
@@ -151,9 +158,10 @@ TEST_F(ErrorMessagesTest, IsocenterOutsideTheCt) {
 
 TEST_F(ErrorMessagesTest, NoPlan) {
   std::filesystem::remove(study_.plan());
-  expect_error(fmt::format("no RT Plan found (searched {}), so the planned isocenter is unknown.\n"
-                           "       Name the plan (--plan FILE) or supply the isocenter: --isocenter X,Y,Z",
-                           where(study_.path())));
+  expect_error(
+      fmt::format("no RT Plan found (searched {}), so the planned isocenter is unknown.\n"
+                  "       Name the plan (--plan FILE) or supply the isocenter: --isocenter X,Y,Z",
+                  where(study_.path())));
 }
 
 TEST_F(ErrorMessagesTest, UnreadableFile) {
@@ -189,8 +197,7 @@ TEST_F(ErrorMessagesTest, DiskFull) {
   std::filesystem::create_directory(disk);
   if (run_shell(fmt::format("mount -t tmpfs -o size=64k tmpfs {}", disk.string())).exit_status != 0)
     GTEST_SKIP() << "no tmpfs can be mounted here; needs root";
-  const CommandOutcome outcome =
-      run_command({"register", study_.path().string(), "-o", (disk / "result").string()});
+  const CommandOutcome outcome = run_command({"register", study_.path().string(), "-o", (disk / "result").string()});
   int left = 0;
   for ([[maybe_unused]] const auto& entry : std::filesystem::directory_iterator(disk)) ++left;
   run_shell(fmt::format("umount {}", disk.string()));
@@ -212,11 +219,10 @@ TEST_F(ErrorMessagesTest, UsageErrorsHaveTheirOwnStatus) {
 }
 
 TEST_F(ErrorMessagesTest, AnEmptyDrrIsAnError) {
-  const CommandOutcome outcome = run_command(
-      {"drr", study_.path().string(), "-o", study_.output().string(), "--threshold-hu", "9000"});
+  const CommandOutcome outcome =
+      run_command({"drr", study_.path().string(), "-o", study_.output().string(), "--threshold-hu", "9000"});
   EXPECT_EQ(outcome.exit_status, 1);
-  EXPECT_EQ(outcome.err, "warning: the plan is not approved (ApprovalStatus (300E,0002) is \"UNAPPROVED\")\n"
-                         "error: KV_G000: the DRR is empty: no ray meets anything above the threshold in the CT\n");
+  EXPECT_EQ(outcome.err, "error: KV_G000: the DRR is empty: no ray meets anything above the threshold in the CT\n");
   EXPECT_FALSE(std::filesystem::exists(study_.output()));
 }
 

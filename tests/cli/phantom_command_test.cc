@@ -20,7 +20,8 @@ TEST(PhantomCommand, MakesAStudyThatDciodvfyAccepts) {
   TemporaryFolder folder;
   ASSERT_EQ(make_phantom(folder / "study").exit_status, 0);
   for (const char* file : {"CT/CT0000.dcm", "RTPLAN.dcm", "RTIMAGE/KV_G000.dcm"}) {
-    const CommandOutcome checked = run_shell("dciodvfy -new " + (folder / "study" / file).string() + " | grep '^Error'");
+    const CommandOutcome checked =
+        run_shell("dciodvfy -new " + (folder / "study" / file).string() + " | grep '^Error'");
     // Known false positive (docs/dicom.md 6.3): KVP in the Exposure Sequence of a RADIOGRAPH.
     std::istringstream lines(checked.out);
     for (std::string line; std::getline(lines, line);) EXPECT_THAT(line, testing::HasSubstr("KVP")) << file;
@@ -33,7 +34,9 @@ TEST(PhantomCommand, SameSeedMakesTheSameStudy) {
   make_phantom(folder / "b");
   make_phantom(folder / "c", {"--seed", "2"});
   const auto uid = [&](const char* study) {
-    return DicomFile::read(folder / study / "RTIMAGE" / "KV_G090.dcm", DicomFile::Extent::kHeader).dataset().required_text(DCM_SOPInstanceUID);
+    return DicomFile::read(folder / study / "RTIMAGE" / "KV_G090.dcm", DicomFile::Extent::kHeader)
+        .dataset()
+        .required_text(DCM_SOPInstanceUID);
   };
   EXPECT_EQ(uid("a"), uid("b"));
   EXPECT_NE(uid("a"), uid("c"));

@@ -32,15 +32,21 @@ class RegisterCommandTest : public testing::Test {
 };
 
 TEST_F(RegisterCommandTest, FindsTheSetupErrorFromTheFirstFileToTheLast) {
-  const CommandOutcome outcome = register_study({"--truth", study_.truth().string()});
+  SmallStudy study([] {
+    PhantomOptions options = small_phantom();
+    options.voxel_mm = 1.5;
+    options.image_pixels = 256;
+    return options;
+  }());
+  const CommandOutcome outcome = run_command(
+      {"register", study.path().string(), "-o", study.output().string(), "--truth", study.truth().string()});
   EXPECT_EQ(outcome.exit_status, 0) << outcome.err;
-  // Voxels of 4 x 4 x 6 mm and pixels of 2.8 mm at the isocenter.
-  EXPECT_THAT(read_setup_error(study_.output() / "result.json"), PoseNear(read_setup_error(study_.truth()), 0.5, 0.4));
+  // Slices of 2.25 mm and pixels of 1.07 mm at the isocenter: what the demo asks of the default phantom.
+  EXPECT_THAT(read_setup_error(study.output() / "result.json"), PoseNear(read_setup_error(study.truth()), 0.3, 0.2));
   for (const char* name : {"report.txt", "result.json", "spatial_registration.dcm", "view1.png", "view2.png"})
-    EXPECT_TRUE(std::filesystem::exists(study_.output() / name)) << name;
+    EXPECT_TRUE(std::filesystem::exists(study.output() / name)) << name;
   EXPECT_THAT(outcome.out, HasSubstr("VERDICT      ACCEPTED"));
   EXPECT_THAT(outcome.out, HasSubstr("SETUP ERROR BESIDE THE TRUTH"));
-  EXPECT_EQ(result()["references"]["images"].size(), 2U);
 }
 
 TEST_F(RegisterCommandTest, ResultFollowsItsSchema) {
@@ -60,8 +66,7 @@ TEST_F(RegisterCommandTest, JsonOnStdoutIsTheResultFile) {
 }
 
 TEST_F(RegisterCommandTest, OneViewIsReviewWithoutDepthAndWithoutRegistrationObject) {
-  const CommandOutcome outcome =
-      register_study({"--image", study_.image(0).string(), "--write-reg-for-review"});
+  const CommandOutcome outcome = register_study({"--image", study_.image(0).string(), "--write-reg-for-review"});
   EXPECT_EQ(outcome.exit_status, 3);
   EXPECT_EQ(result()["verdict"], "review");
   EXPECT_TRUE(result()["setup_error"]["translation_mm"][2].is_null());  // gantry 0 looks along z
@@ -77,8 +82,8 @@ TEST_F(RegisterCommandTest, AReviewedResultIsWrittenOnlyOnRequestAndMarked) {
     options.anatomy = PhantomOptions::Anatomy::kSpine;
     return options;
   }());
-  const std::vector<std::string> mismatched = {"--ct", (other.path() / "CT").string(), "--allow", "patient-mismatch=test",
-                                               "--allow", "for-mismatch=test"};
+  const std::vector<std::string> mismatched = {
+      "--ct", (other.path() / "CT").string(), "--allow", "patient-mismatch=test", "--allow", "for-mismatch=test"};
   EXPECT_EQ(register_study(mismatched).exit_status, 3);
   EXPECT_FALSE(std::filesystem::exists(study_.output() / "spatial_registration.dcm"));
   auto on_request = mismatched;
@@ -103,7 +108,9 @@ TEST_F(RegisterCommandTest, LogsHoldNoPatientName) {
 
 TEST_F(RegisterCommandTest, DrrAtTheFoundPoseLooksLikeTheXray) {
   EXPECT_EQ(run_command({"drr", study_.path().string(), "-o", study_.output().string(), "--setup-error",
-                         study_.truth().string()}).exit_status, 0);
+                         study_.truth().string()})
+                .exit_status,
+            0);
   for (const char* name : {"drr1.png", "drr1.mha", "drr2.png", "drr2.mha"})
     EXPECT_TRUE(std::filesystem::exists(study_.output() / name)) << name;
   std::ifstream file(study_.output() / "drr1.mha", std::ios::binary);

@@ -34,7 +34,7 @@ Volume<float> textured_volume() {
 }
 
 Volume<float> phantom_ct_of(const std::vector<Shape>& shapes) {
-  const Volume<float> lattice = centered_volume({95, 115, 72}, {2.0, 2.0, 3.0}, 0.0F);
+  const Volume<float> lattice = centered_volume({127, 154, 108}, {1.5, 1.5, 2.0}, 0.0F);
   return ct_of_shapes(shapes, lattice.size, lattice.patient_from_voxel);
 }
 

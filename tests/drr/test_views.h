@@ -19,7 +19,7 @@ Volume<float> centered_volume(const Eigen::Vector3i& size, const Eigen::Vector3d
 // Random HU between -700 and 1300 in 16 x 20 x 12 voxels with oblique axes.
 Volume<float> textured_volume();
 
-// The CT of shapes, and of the head phantom, with voxels of 2 x 2 x 3 mm about the origin.
+// The CT of shapes, and of the head phantom, with voxels of 1.5 x 1.5 x 2 mm about the origin.
 Volume<float> phantom_ct_of(const std::vector<Shape>& shapes);
 Volume<float> phantom_ct();
 

@@ -26,19 +26,21 @@ Eigen::Isometry3d couch_motion(const CouchShift& shift, const TableAngles& table
   const double c = std::cos(table.yaw_rad()), s = std::sin(table.yaw_rad());
   const Vector3d& d = shift.translation_mm;
   const Eigen::Matrix3d before = rotation_from_zxy(table.zxy());
-  const Eigen::Matrix3d after = rotation_from_zxy({table.yaw_rad() + shift.change.z_rad,
-                                                   table.pitch_rad + shift.change.x_rad,
-                                                   table.roll_rad + shift.change.y_rad});
+  const Eigen::Matrix3d after =
+      rotation_from_zxy({table.yaw_rad() + shift.change.z_rad, table.pitch_rad + shift.change.x_rad,
+                         table.roll_rad + shift.change.y_rad});
   Eigen::Isometry3d motion = Eigen::Isometry3d::Identity();
   motion.linear() = after * before.transpose();
   motion.translation() = motion.linear() * Vector3d(c * d.x() - s * d.y(), s * d.x() + c * d.y(), d.z());
   return motion;
 }
 
-void expect_shift(const CouchShift& shift, const Vector3d& translation_mm, const Vector3d& target_deg, double tolerance) {
+void expect_shift(const CouchShift& shift, const Vector3d& translation_mm, const Vector3d& target_deg,
+                  double tolerance) {
   EXPECT_THAT(shift.translation_mm, VectorNear(translation_mm, tolerance));
-  EXPECT_THAT(Vector3d(deg_from_rad(shift.target.z_rad), deg_from_rad(shift.target.x_rad), deg_from_rad(shift.target.y_rad)),
-              VectorNear(target_deg, tolerance));
+  EXPECT_THAT(
+      Vector3d(deg_from_rad(shift.target.z_rad), deg_from_rad(shift.target.x_rad), deg_from_rad(shift.target.y_rad)),
+      VectorNear(target_deg, tolerance));
 }
 
 TEST(CouchShift, IsThatOfDicomMd51) {
@@ -70,14 +72,16 @@ TEST(CouchShift, FixedVectorAtCouch30) {
 
 TEST(CouchShift, UndoesAThousandRandomErrors) {
   std::mt19937_64 random(7);
-  const auto uniform = [&](double low, double high) { return std::uniform_real_distribution<double>(low, high)(random); };
+  const auto uniform = [&](double low, double high) {
+    return std::uniform_real_distribution<double>(low, high)(random);
+  };
   for (int n = 0; n < 1000; ++n) {
     const TableAngles table{.support_rad = rad_from_deg(uniform(0, 360)),
                             .pitch_rad = rad_from_deg(uniform(-3, 3)),
                             .roll_rad = rad_from_deg(uniform(-3, 3))};
-    const Eigen::Isometry3d planned = planned_room_from_patient(
-        kPatientPositions[static_cast<std::size_t>(n) % 8], table,
-        Vector3d(uniform(-200, 200), uniform(-200, 200), uniform(-900, 900)));
+    const Eigen::Isometry3d planned =
+        planned_room_from_patient(kPatientPositions[static_cast<std::size_t>(n) % 8], table,
+                                  Vector3d(uniform(-200, 200), uniform(-200, 200), uniform(-900, 900)));
     const Eigen::Isometry3d error = setup_error({uniform(-30, 30), uniform(-30, 30), uniform(-30, 30)},
                                                 uniform(-10, 10), uniform(-10, 10), uniform(-10, 10));
     const Eigen::Isometry3d actual = error * planned;

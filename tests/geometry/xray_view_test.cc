@@ -59,16 +59,33 @@ TEST(XrayView, ProjectsThePointsOfDicomMd24) {
   CarmGeometry translated_receptor = base_geometry(30);
   translated_receptor.receptor_translation_mm = Vector3d(12, -7.5, -500);
   const std::array<Case, 5> cases = {{
-      {base_geometry(0), couch(0),
+      {base_geometry(0),
+       couch(0),
        {{{511.5, 511.5}, {586.5, 511.5}, {511.5, 511.5}, {511.5, 436.5}, {627.479381, 318.201031}}}},
-      {base_geometry(90), couch(0),
+      {base_geometry(90),
+       couch(0),
        {{{511.5, 511.5}, {511.5, 511.5}, {586.5, 511.5}, {511.5, 436.5}, {395.520619, 318.201031}}}},
-      {turned_receptor, couch(10),
-       {{{511.5, 511.5}, {577.001884, 504.027283}, {548.221270, 514.712695}, {506.709831, 437.066722}, {541.858457, 301.443985}}}},
-      {translated_receptor, couch(350),
-       {{{481.5, 492.75}, {546.101339, 505.903147}, {518.361539, 492.75}, {492.798399, 418.760938}, {552.600889, 319.836595}}}},
-      {base_geometry(30), couch(10, 2, -1.5),
-       {{{511.5, 511.5}, {575.127816, 498.413543}, {549.593577, 508.631341}, {498.933572, 437.767800}, {516.583896, 303.965280}}}},
+      {turned_receptor,
+       couch(10),
+       {{{511.5, 511.5},
+         {577.001884, 504.027283},
+         {548.221270, 514.712695},
+         {506.709831, 437.066722},
+         {541.858457, 301.443985}}}},
+      {translated_receptor,
+       couch(350),
+       {{{481.5, 492.75},
+         {546.101339, 505.903147},
+         {518.361539, 492.75},
+         {492.798399, 418.760938},
+         {552.600889, 319.836595}}}},
+      {base_geometry(30),
+       couch(10, 2, -1.5),
+       {{{511.5, 511.5},
+         {575.127816, 498.413543},
+         {549.593577, 508.631341},
+         {498.933572, 437.767800},
+         {516.583896, 303.965280}}}},
   }};
   for (std::size_t c = 0; c < cases.size(); ++c)
     for (std::size_t p = 0; p < points.size(); ++p)
@@ -93,9 +110,12 @@ TEST(XrayView, ProjectsAllEightPatientPositionsOfDicomMd24) {
       {kFfdl, {402.276699, 693.538835}, {620.723301, 693.538835}, {500.403290, 708.513290}},
   }};
   for (const Case& c : cases) {
-    EXPECT_THAT(projected(base_geometry(0), couch(0), kPoint, c.position), VectorNear(c.g0, kPrintedPx)) << to_string(c.position);
-    EXPECT_THAT(projected(base_geometry(90), couch(0), kPoint, c.position), VectorNear(c.g90, kPrintedPx)) << to_string(c.position);
-    EXPECT_THAT(projected(base_geometry(30), couch(10), kPoint, c.position), VectorNear(c.g30_c10, kPrintedPx)) << to_string(c.position);
+    EXPECT_THAT(projected(base_geometry(0), couch(0), kPoint, c.position), VectorNear(c.g0, kPrintedPx))
+        << to_string(c.position);
+    EXPECT_THAT(projected(base_geometry(90), couch(0), kPoint, c.position), VectorNear(c.g90, kPrintedPx))
+        << to_string(c.position);
+    EXPECT_THAT(projected(base_geometry(30), couch(10), kPoint, c.position), VectorNear(c.g30_c10, kPrintedPx))
+        << to_string(c.position);
   }
 }
 

@@ -80,7 +80,8 @@ TEST_F(CtSeriesTest, PutsVoxelsWhereTheStandardSays) {
   // p = IPP + i * column spacing * row direction + j * row spacing * column direction
   EXPECT_THAT(Eigen::Vector3d(ct.hu.patient_from_voxel * Eigen::Vector3d(3, 2, 4)),
               VectorNear(Eigen::Vector3d(10 + 3 * 0.25, 20 + 2 * 0.5, 50), 1e-12));
-  EXPECT_THAT(ct.sop_instance_uids, testing::ElementsAre("1.2.3.1", "1.2.3.2", "1.2.3.3", "1.2.3.4", "1.2.3.5", "1.2.3.6"));
+  EXPECT_THAT(ct.sop_instance_uids,
+              testing::ElementsAre("1.2.3.1", "1.2.3.2", "1.2.3.3", "1.2.3.4", "1.2.3.5", "1.2.3.6"));
 }
 
 TEST_F(CtSeriesTest, RescalesEverySliceByItsOwnNumbers) {
@@ -120,13 +121,15 @@ TEST_F(CtSeriesTest, ReadsSlicesFromFeetToHeadToo) {
     write(k, {10, 20, 55 - 5.0 * k}, [](DicomItem d) { d.put(DCM_ImageOrientationPatient, "1\\0\\0\\0\\-1\\0"); });
   const CtSeries ct = read();
   // The normal points to the feet: the first slice along it is the uppermost.
-  EXPECT_THAT(Eigen::Vector3d(ct.hu.patient_from_voxel * Eigen::Vector3d(0, 2, 1)), VectorNear(Eigen::Vector3d(10, 19, 50), 1e-12));
+  EXPECT_THAT(Eigen::Vector3d(ct.hu.patient_from_voxel * Eigen::Vector3d(0, 2, 1)),
+              VectorNear(Eigen::Vector3d(10, 19, 50), 1e-12));
 }
 
 TEST_F(CtSeriesTest, ShearsTheLatticeOfATiltedGantry) {
   for (int k = 0; k < 6; ++k) write(k, {10, 20 + 1.0 * k, 30 + 5.0 * k});
   const CtSeries ct = read();
-  EXPECT_THAT(Eigen::Vector3d(ct.hu.patient_from_voxel * Eigen::Vector3d(0, 0, 5)), VectorNear(Eigen::Vector3d(10, 25, 55), 1e-12));
+  EXPECT_THAT(Eigen::Vector3d(ct.hu.patient_from_voxel * Eigen::Vector3d(0, 0, 5)),
+              VectorNear(Eigen::Vector3d(10, 25, 55), 1e-12));
   EXPECT_NEAR(ct.hu.patient_from_voxel.linear().col(2).y(), 1.0, 1e-12);
 }
 

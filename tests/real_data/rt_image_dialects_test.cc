@@ -17,17 +17,15 @@ class RtImageDialects : public testing::Test {
  protected:
   void SetUp() override {
     ISOSHIFT_NEED_REAL_DATA("rt-image-dialects.zip");
-    const CommandOutcome unpacked =
-        run_shell(fmt::format("cd {} && cmake -E tar xf {}", folder_.path().string(),
-                              (real_data() / "rt-image-dialects.zip").string()));
+    const CommandOutcome unpacked = run_shell(fmt::format("cd {} && cmake -E tar xf {}", folder_.path().string(),
+                                                          (real_data() / "rt-image-dialects.zip").string()));
     ASSERT_EQ(unpacked.exit_status, 0) << unpacked.out;
   }
 
   // Registers one of the images with the phantom's CT and plan; the image is refused before they are compared.
   std::string refusal(const std::string& name) {
-    const CommandOutcome outcome =
-        run_command({"register", phantom_.path().string(), "--image", (folder_ / name).string(), "-o",
-                     phantom_.output().string()});
+    const CommandOutcome outcome = run_command(
+        {"register", phantom_.path().string(), "--image", (folder_ / name).string(), "-o", phantom_.output().string()});
     EXPECT_EQ(outcome.exit_status, 1);
     EXPECT_FALSE(std::filesystem::exists(phantom_.output()));
     return outcome.err;
@@ -52,8 +50,10 @@ TEST_F(RtImageDialects, ElektaIviewIsRefusedByName) {
 }
 
 TEST_F(RtImageDialects, MosaiqIsRefusedByName) {
-  EXPECT_THAT(refusal("mosaiq-no-position.dcm"),
-              HasSubstr("RTImagePosition (3002,0012) is missing.\n       Supply it: --rt-image-position X,Y or --assume-centered"));
+  EXPECT_THAT(
+      refusal("mosaiq-no-position.dcm"),
+      HasSubstr(
+          "RTImagePosition (3002,0012) is missing.\n       Supply it: --rt-image-position X,Y or --assume-centered"));
 }
 
 TEST_F(RtImageDialects, EclipseDrrIsRefusedByName) {

@@ -12,8 +12,8 @@ OptimizerOptions two_parameters() {
 }
 
 TEST(Optimizer, FindsTheTopOfAParabola) {
-  const auto result = maximize([](auto x) { return -(x[0] - 3) * (x[0] - 3) - 2 * (x[1] + 1.5) * (x[1] + 1.5) + 7; },
-                               two_parameters());
+  const auto result =
+      maximize([](auto x) { return -(x[0] - 3) * (x[0] - 3) - 2 * (x[1] + 1.5) * (x[1] + 1.5) + 7; }, two_parameters());
   EXPECT_NEAR(result.best[0], 3.0, 1e-4);
   EXPECT_NEAR(result.best[1], -1.5, 1e-4);
   EXPECT_NEAR(result.value, 7.0, 1e-7);
@@ -35,7 +35,8 @@ TEST(Optimizer, SaysWhenTheEvaluationsRanOut) {
 }
 
 TEST(Optimizer, LetsTheObjectivesExceptionsThrough) {
-  EXPECT_THROW(maximize([](auto) -> double { throw std::runtime_error("no DRR"); }, two_parameters()), std::runtime_error);
+  EXPECT_THROW(maximize([](auto) -> double { throw std::runtime_error("no DRR"); }, two_parameters()),
+               std::runtime_error);
 }
 
 }  // namespace

@@ -43,8 +43,7 @@ TEST(Preprocess, OpenFieldReachesToTheRim) {
 }
 
 TEST(Preprocess, CollimatedFieldIsFoundOnAllSides) {
-  const FixedImage image =
-      prepare(collimated([](int c, int r) { return c >= 40 && c < 150 && r >= 60 && r < 170; }));
+  const FixedImage image = prepare(collimated([](int c, int r) { return c >= 40 && c < 150 && r >= 60 && r < 170; }));
   for (int row = 0; row < kPixels; ++row)
     for (int column = 0; column < kPixels; ++column) {
       // Within three pixels of the edge the mask may go either way.
@@ -82,8 +81,9 @@ TEST(Preprocess, ReducedImagesAverageAndKeepTheField) {
   FixedImage image = prepare(collimated([](int, int) { return true; }));
   const FixedImage half = reduced(image, 2);
   EXPECT_EQ(half.view.columns, 100);
-  const float mean = (image.line_integral.at(80, 84) + image.line_integral.at(81, 84) +
-                      image.line_integral.at(80, 85) + image.line_integral.at(81, 85)) / 4.0F;
+  const float mean = (image.line_integral.at(80, 84) + image.line_integral.at(81, 84) + image.line_integral.at(80, 85) +
+                      image.line_integral.at(81, 85)) /
+                     4.0F;
   EXPECT_FLOAT_EQ(half.line_integral.at(40, 42), mean);
   EXPECT_EQ(half.field.at(0, 42), 0);
   EXPECT_EQ(half.field.at(40, 42), 1);

@@ -14,7 +14,8 @@ using testing::HasSubstr;
 
 RegistrationResult good_result() {
   RegistrationResult result;
-  result.views = {{.similarity_start = 0.8, .similarity_final = 0.97}, {.similarity_start = 0.7, .similarity_final = 0.95}};
+  result.views = {{.similarity_start = 0.8, .similarity_final = 0.97},
+                  {.similarity_start = 0.7, .similarity_final = 0.95}};
   return result;
 }
 
@@ -46,7 +47,7 @@ TEST(Quality, AViewThatGotWorseNeedsReview) {
 
 TEST(Quality, APoorMatchNeedsReview) {
   RegistrationResult result = good_result();
-  result.views[0].similarity_final = result.views[1].similarity_final = 0.75;
+  result.views[0] = result.views[1] = {.similarity_start = 0.6, .similarity_final = 0.75};
   judge(kInside, {}, result);
   EXPECT_EQ(result.verdict, Verdict::kReview);
   EXPECT_THAT(result.reasons, ElementsAre(HasSubstr("0.750 is below 0.80")));

@@ -28,7 +28,7 @@ Scene make_scene(PatientPosition position, double couch_deg, const std::vector<d
   const std::vector<Shape> shapes = head_phantom(Eigen::Vector3d::Zero(), 5);
   Scene scene;
   for (const double gantry_deg : gantry_angles_deg) {
-    Imager imager{.gantry_angle_deg = gantry_deg, .pixels = 160, .pixel_mm = 2.4};
+    Imager imager{.gantry_angle_deg = gantry_deg, .pixels = 256, .pixel_mm = 1.6};
     XrayImage xray;
     xray.view = centered_view(gantry_deg, imager.pixels, imager.pixel_mm);
     xray.values = simulate_xray(shapes, placement, imager, 20000.0, 1);
@@ -47,7 +47,7 @@ TEST(RegisterViews, RecoversKnownOffsetFromTwoOrthogonalViewsInEveryPatientPosit
     const double couch_deg = position == PatientPosition::kHfs ? 0.0 : 20.0;
     Scene scene = make_scene(position, couch_deg, {0.0, 90.0});
     const auto result = register_views(*scene.renderer, scene.xrays, scene.planned, {});
-    // Pixels of 1.6 mm at the isocenter and slices of 3 mm: a fifth of a pixel, and the angle it subtends at 100 mm.
+    // Pixels of 1.1 mm at the isocenter and slices of 2 mm: about a fourth of a pixel, and its angle at 100 mm.
     EXPECT_THAT(setup_error_from_poses(scene.planned, result.actual_room_from_patient), PoseNear(scene.truth, 0.3, 0.2))
         << to_string(position);
     EXPECT_EQ(result.verdict, Verdict::kAccepted) << to_string(position);
@@ -58,7 +58,8 @@ TEST(RegisterViews, RecoversFromObliqueAndFromThreeViews) {
   for (const auto& gantry_angles : {std::vector<double>{315, 45}, std::vector<double>{0, 120, 240}}) {
     Scene scene = make_scene(PatientPosition::kHfs, 350.0, gantry_angles);
     const auto result = register_views(*scene.renderer, scene.xrays, scene.planned, {});
-    EXPECT_THAT(setup_error_from_poses(scene.planned, result.actual_room_from_patient), PoseNear(scene.truth, 0.3, 0.2));
+    EXPECT_THAT(setup_error_from_poses(scene.planned, result.actual_room_from_patient),
+                PoseNear(scene.truth, 0.3, 0.2));
   }
 }
 

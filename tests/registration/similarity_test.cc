@@ -50,7 +50,8 @@ TEST(Similarity, GradientCorrelationIgnoresSlowIntensityErrors) {
   for (int row = 0; row < 5; ++row)
     for (int column = 0; column < 5; ++column) {
       image.push_back(std::sin(1.3F * static_cast<float>(column)) + std::cos(2.1F * static_cast<float>(row)));
-      shaded.push_back(2.0F * image.back() + 5.0F + 0.4F * static_cast<float>(column));  // a ramp is a constant gradient
+      shaded.push_back(2.0F * image.back() + 5.0F +
+                       0.4F * static_cast<float>(column));  // a ramp is a constant gradient
     }
   EXPECT_NEAR(gradient_correlation(gradients(image, interior()), gradients(shaded, interior())), 1.0, 1e-6);
 }

@@ -17,6 +17,6 @@ inline std::filesystem::path real_data() {
 }  // namespace isoshift
 
 // Ends a test that needs the real data where it is absent.
-#define ISOSHIFT_NEED_REAL_DATA(part)                                                                     \
-  if (!std::filesystem::exists(::isoshift::real_data() / (part)))                                         \
+#define ISOSHIFT_NEED_REAL_DATA(part)                             \
+  if (!std::filesystem::exists(::isoshift::real_data() / (part))) \
   GTEST_SKIP() << (::isoshift::real_data() / (part)).string() << " is absent; set ISOSHIFT_DATA to its folder"
