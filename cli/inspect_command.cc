@@ -4,6 +4,7 @@
 #include <memory>
 
 #include "cli/commands.h"
+#include "drr/gl/context.h"
 #include "geometry/error.h"
 #include "io/study.h"
 
@@ -133,12 +134,24 @@ void run_inspect(const std::vector<std::filesystem::path>& paths, Console& conso
 }  // namespace
 
 void add_inspect_command(CLI::App& app, Console& console, int&) {
-  auto paths = std::make_shared<std::vector<std::filesystem::path>>();
+  struct Options {
+    std::vector<std::filesystem::path> paths;
+    bool devices = false;
+  };
+  auto options = std::make_shared<Options>();
   CLI::App* command =
       app.add_subcommand("inspect", "Say what files hold, their geometry as understood, and all that is missing");
-  command->footer("\nExample:\n  isoshift inspect exported/\n  isoshift inspect RTIMAGE/KV_AP.dcm");
-  command->add_option("path", *paths, "Files or folders")->required()->type_name("PATH");
-  command->callback([paths, &console] { run_inspect(*paths, console); });
+  command->footer(
+      "\nExample:\n  isoshift inspect exported/\n  isoshift inspect RTIMAGE/KV_AP.dcm\n  isoshift inspect --devices");
+  auto* paths = command->add_option("path", options->paths, "Files or folders")->type_name("PATH");
+  auto* devices = command->add_flag("--devices", options->devices, "Say what there is to render on");
+  command->require_option(1, 0);
+  paths->excludes(devices);
+  command->callback([options, &console] {
+    if (!options->devices) return run_inspect(options->paths, console);
+    for (const std::string& line : describe_gl_devices()) console.out << "OpenGL, " << line << "\n";
+    console.out << fmt::format("--renderer auto is {}\n", has_hardware_gl() ? "raycast" : "cpu");
+  });
 }
 
 }  // namespace isoshift

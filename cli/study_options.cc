@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <charconv>
 
+#include "drr/gl/context.h"
 #include "geometry/error.h"
 
 namespace isoshift {
@@ -108,9 +109,11 @@ void add_study_options(CLI::App& command, StudyOptions& options) {
 }
 
 RendererKind RenderingOptions::kind() const {
-  if (renderer == "auto") return RendererKind::kCpu;
+  if (renderer == "auto") return has_hardware_gl() ? RendererKind::kRaycast : RendererKind::kCpu;
   return renderer_kind_from(renderer).value();
 }
+
+GlDevice RenderingOptions::device() const { return gl == "hardware" ? GlDevice::kHardware : GlDevice::kSoftware; }
 
 AttenuationModel RenderingOptions::model() const {
   AttenuationModel model;
@@ -128,8 +131,13 @@ void add_rendering_options(CLI::App& command, RenderingOptions& options) {
   const char* group = "Rendering";
   std::vector<std::string> names = {"auto"};
   for (const RendererKind kind : kRendererKinds) names.emplace_back(to_string(kind));
-  command.add_option("--renderer", options.renderer, "What renders the DRRs; siddon and trilinear are slow references")
+  command.add_option("--renderer", options.renderer, "What renders the DRRs. auto: raycast on a GPU, else cpu; siddon and trilinear are slow references")
       ->check(CLI::IsMember(names))
+      ->capture_default_str()
+      ->group(group);
+  command
+      .add_option("--gl", options.gl, "OpenGL of --renderer raycast: a GPU, or Mesa's llvmpipe on the CPU")
+      ->check(CLI::IsMember({"hardware", "software"}))
       ->capture_default_str()
       ->group(group);
   command
@@ -159,7 +167,7 @@ LoadedStudy load(const StudyOptions& study_options, const RenderingOptions& rend
   std::vector<Beam> beams;
   for (const XrayImage& xray : loaded.study.xrays)
     if (std::ranges::find(beams, xray.view.beam) == beams.end()) beams.push_back(xray.view.beam);
-  loaded.renderer = make_renderer(rendering.kind(), loaded.study.ct.hu, model, beams);
+  loaded.renderer = make_renderer(rendering.kind(), loaded.study.ct.hu, model, beams, rendering.device());
   return loaded;
 }
 

@@ -29,11 +29,13 @@ void add_study_options(CLI::App& command, StudyOptions& options);
 
 struct RenderingOptions {
   std::string renderer = "auto";
+  std::string gl = "hardware";
   std::string attenuation = "physical";
   double threshold_hu = AttenuationModel{}.threshold_hu;
   std::vector<double> window;
 
-  RendererKind kind() const;
+  RendererKind kind() const;  // "auto" settled: raycast on a hardware GPU, else cpu
+  GlDevice device() const;
   AttenuationModel model() const;
 };
 void add_rendering_options(CLI::App& command, RenderingOptions& options);

@@ -7,6 +7,7 @@
 #include "drr/cpu/raycast.h"
 #include "drr/cpu/siddon.h"
 #include "drr/cpu/trilinear.h"
+#include "drr/raycast/raycast.h"
 #include "geometry/error.h"
 
 namespace isoshift {
@@ -16,6 +17,7 @@ std::string_view to_string(RendererKind kind) {
     case RendererKind::kSiddon: return "siddon";
     case RendererKind::kTrilinear: return "trilinear";
     case RendererKind::kCpu: return "cpu";
+    case RendererKind::kRaycast: return "raycast";
   }
   return "";
 }
@@ -32,12 +34,13 @@ std::size_t PixelSet::count(std::span<const XrayView> views, std::size_t view) c
 }
 
 std::unique_ptr<Renderer> make_renderer(RendererKind kind, const Volume<float>& ct_hu, const AttenuationModel& model,
-                                        std::span<const Beam> beams) {
+                                        std::span<const Beam> beams, GlDevice gl) {
   model.check();
   switch (kind) {
     case RendererKind::kSiddon: return std::make_unique<SiddonRenderer>(ct_hu, model, beams);
     case RendererKind::kTrilinear: return std::make_unique<TrilinearRenderer>(ct_hu, model, beams);
-    case RendererKind::kCpu: return std::make_unique<RaycastRenderer>(ct_hu, model, beams);
+    case RendererKind::kCpu: return std::make_unique<RaycastCpuRenderer>(ct_hu, model, beams);
+    case RendererKind::kRaycast: return std::make_unique<RaycastGlRenderer>(ct_hu, model, beams, gl);
   }
   return nullptr;
 }

@@ -25,12 +25,17 @@ enum class RendererKind {
   kSiddon,     // oracle, double precision: exact for voxels of constant attenuation
   kTrilinear,  // oracle, double precision: exact for trilinear interpolation between voxel centers
   kCpu,        // trilinear ray casting in single precision on all cores
+  kRaycast,    // the same in an OpenGL compute shader
 };
 
-inline constexpr std::array kRendererKinds = {RendererKind::kSiddon, RendererKind::kTrilinear, RendererKind::kCpu};
+inline constexpr std::array kRendererKinds = {RendererKind::kSiddon, RendererKind::kTrilinear, RendererKind::kCpu,
+                                              RendererKind::kRaycast};
 
 std::string_view to_string(RendererKind kind);
 std::optional<RendererKind> renderer_kind_from(std::string_view name);
+
+// Which OpenGL to render on: a GPU, or Mesa's llvmpipe on the CPU, which is never taken unless asked for.
+enum class GlDevice { kHardware, kSoftware };
 
 // Which pixels of every view are rendered: all, or per view a list of indices (row * columns + column).
 struct PixelSet {
@@ -73,9 +78,10 @@ class Renderer {
 };
 
 // A renderer for views of the given beam qualities; rendering another one is a logic error. Keeps its own copy of the
-// volume. Throws UsageError for a model that fails its check.
+// volume. `gl` matters to the kinds that use OpenGL. Throws UsageError for a model that fails its check, and Error with the
+// reason where there is no such OpenGL or the volume exceeds its limits: never another renderer instead.
 std::unique_ptr<Renderer> make_renderer(RendererKind kind, const Volume<float>& ct_hu, const AttenuationModel& model,
-                                        std::span<const Beam> beams);
+                                        std::span<const Beam> beams, GlDevice gl = GlDevice::kHardware);
 
 // Throws Error if a DRR of a whole image is zero everywhere: a blank picture is never a result.
 void require_not_empty(std::span<const float> line_integrals, std::string_view label);

@@ -7,32 +7,14 @@
 
 #include <algorithm>
 
+#include "drr/camera.h"
+
 namespace isoshift {
 namespace {
 
-// One pose and view, ready to turn pixel indices into voxel rays.
-struct Camera {
-  Eigen::Vector3d source_voxel;
-  Eigen::Matrix3d way_voxel_from_pixel;  // (column, row, 1) -> way from source to pixel
-  Eigen::Matrix3d patient_from_voxel_axes;
-  int columns;
-  Beam beam;
-
-  VoxelRay ray(std::uint32_t pixel) const {
-    const Eigen::Vector3d way = way_voxel_from_pixel * Eigen::Vector3d(pixel % columns, pixel / columns, 1.0);
-    return {.source = source_voxel, .way = way, .length_mm = (patient_from_voxel_axes * way).norm()};
-  }
-};
-
-Camera make_camera(const XrayView& view, const Eigen::Isometry3d& room_from_patient,
-                   const Eigen::Affine3d& voxel_from_patient) {
-  const Eigen::Isometry3d patient_from_room = room_from_patient.inverse();
-  const Eigen::Matrix3d voxel_from_room_axes = voxel_from_patient.linear() * patient_from_room.linear();
-  return {.source_voxel = voxel_from_patient * (patient_from_room * view.source_room_mm),
-          .way_voxel_from_pixel = voxel_from_room_axes * view.pixel_from_room.leftCols<3>().inverse(),
-          .patient_from_voxel_axes = voxel_from_patient.linear().inverse(),
-          .columns = view.columns,
-          .beam = view.beam};
+VoxelRay ray_to(std::uint32_t pixel, int columns, const Camera& camera, const Eigen::Matrix3d& mm_from_voxel_axes) {
+  const Eigen::Vector3d way = camera.way_voxel_from_pixel * Eigen::Vector3d(pixel % columns, pixel / columns, 1.0);
+  return {.source = camera.source_voxel, .way = way, .length_mm = (mm_from_voxel_axes * way).norm()};
 }
 
 }  // namespace
@@ -43,25 +25,25 @@ std::string CpuRenderer::device() const {
 
 RenderResult CpuRenderer::render(std::span<const XrayView> views, std::span<const Eigen::Isometry3d> room_from_patient,
                                  const PixelSet& pixels) {
-  std::vector<std::size_t> view_begins = {0};
-  for (std::size_t v = 0; v < views.size(); ++v) view_begins.push_back(view_begins.back() + pixels.count(views, v));
-  line_integrals_.resize(view_begins.back() * room_from_patient.size());
+  std::vector<std::size_t> begins = view_begins(views, pixels);
+  line_integrals_.resize(begins.back() * room_from_patient.size());
+  const Eigen::Matrix3d mm_from_voxel_axes = voxel_from_patient_.linear().inverse();
 
   for (std::size_t p = 0; p < room_from_patient.size(); ++p) {
     for (std::size_t v = 0; v < views.size(); ++v) {
       const Camera camera = make_camera(views[v], room_from_patient[p], voxel_from_patient_);
       const std::uint32_t* list = pixels.of_view.empty() ? nullptr : pixels.of_view[v].data();
-      float* drr = line_integrals_.data() + p * view_begins.back() + view_begins[v];
-      const std::size_t count = view_begins[v + 1] - view_begins[v];
+      float* drr = line_integrals_.data() + p * begins.back() + begins[v];
+      const std::size_t count = begins[v + 1] - begins[v];
       tbb::parallel_for(tbb::blocked_range<std::size_t>(0, count, 256), [&](const auto& range) {
         for (std::size_t n = range.begin(); n != range.end(); ++n) {
           const auto pixel = list ? list[n] : static_cast<std::uint32_t>(n);
-          drr[n] = static_cast<float>(integrate(camera.ray(pixel), camera.beam));
+          drr[n] = static_cast<float>(integrate(ray_to(pixel, views[v].columns, camera, mm_from_voxel_axes), views[v].beam));
         }
       });
     }
   }
-  return RenderResult(line_integrals_, std::move(view_begins));
+  return RenderResult(line_integrals_, std::move(begins));
 }
 
 std::optional<RaySegment> clip_to_box(const VoxelRay& ray, const Eigen::Vector3d& low, const Eigen::Vector3d& high) {

@@ -1,5 +1,7 @@
 #include "drr/cpu/raycast.h"
 
+#include <tbb/parallel_for.h>
+
 #include <algorithm>
 #include <cmath>
 
@@ -27,35 +29,29 @@ inline float sample(const float* voxels, std::ptrdiff_t row, std::ptrdiff_t slic
 
 }  // namespace
 
-RaycastRenderer::RaycastRenderer(const Volume<float>& ct_hu, const AttenuationModel& model, std::span<const Beam> beams)
+RaycastCpuRenderer::RaycastCpuRenderer(const Volume<float>& ct_hu, const AttenuationModel& model, std::span<const Beam> beams)
     : CpuRenderer(ct_hu), step_mm_(ct_hu.spacing_mm().minCoeff()) {
   for (const Beam beam : beams) volumes_.emplace(beam, pad(ct_hu, model, beam));
 }
 
-RaycastRenderer::PaddedVolume RaycastRenderer::pad(const Volume<float>& ct_hu, const AttenuationModel& model,
-                                                   Beam beam) {
+RaycastCpuRenderer::PaddedVolume RaycastCpuRenderer::pad(const Volume<float>& ct_hu, const AttenuationModel& model,
+                                                         Beam beam) {
   const Eigen::Vector3i size = ct_hu.size;
-  PaddedVolume padded{.attenuation_per_mm = Volume<float>(size.array() + 3, ct_hu.patient_from_voxel),
-                      .low = size.cast<double>(),
-                      .high = Eigen::Vector3d::Zero()};
-  for (int k = 0; k < size.z(); ++k)
+  Volume<float> padded(size.array() + 3, ct_hu.patient_from_voxel);
+  tbb::parallel_for(0, size.z(), [&](int k) {
     for (int j = 0; j < size.y(); ++j)
-      for (int i = 0; i < size.x(); ++i) {
-        const float attenuation = model.attenuation_per_mm(ct_hu.at(i, j, k), beam);
-        if (attenuation == 0.0F) continue;
-        padded.attenuation_per_mm.at(i + 1, j + 1, k + 1) = attenuation;
-        const Eigen::Vector3d center(i + 1, j + 1, k + 1);
-        padded.low = padded.low.cwiseMin(center - Eigen::Vector3d::Ones());
-        padded.high = padded.high.cwiseMax(center + Eigen::Vector3d::Ones());
-      }
-  return padded;
+      for (int i = 0; i < size.x(); ++i)
+        padded.at(i + 1, j + 1, k + 1) = model.attenuation_per_mm(ct_hu.at(i, j, k), beam);
+  });
+  const OccupiedBox box = occupied_box(padded);
+  return {.attenuation_per_mm = std::move(padded), .box = box};
 }
 
-double RaycastRenderer::integrate(const VoxelRay& ray, Beam beam) const {
+double RaycastCpuRenderer::integrate(const VoxelRay& ray, Beam beam) const {
   const PaddedVolume& volume = volumes_.at(beam);
   VoxelRay padded_ray = ray;
   padded_ray.source.array() += 1.0;
-  const auto segment = clip_to_box(padded_ray, volume.low, volume.high);
+  const auto segment = clip_to_box(padded_ray, volume.box.low, volume.box.high);
   if (!segment) return 0.0;
 
   // Midpoint rule: whole steps of at most one voxel fill the segment exactly.

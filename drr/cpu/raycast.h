@@ -7,9 +7,9 @@
 
 namespace isoshift {
 
-class RaycastRenderer final : public CpuRenderer {
+class RaycastCpuRenderer final : public CpuRenderer {
  public:
-  RaycastRenderer(const Volume<float>& ct_hu, const AttenuationModel& model, std::span<const Beam> beams);
+  RaycastCpuRenderer(const Volume<float>& ct_hu, const AttenuationModel& model, std::span<const Beam> beams);
   RendererKind kind() const override { return RendererKind::kCpu; }
 
  private:
@@ -17,7 +17,7 @@ class RaycastRenderer final : public CpuRenderer {
   // one exactly on the upper face.
   struct PaddedVolume {
     Volume<float> attenuation_per_mm;
-    Eigen::Vector3d low, high;  // the box, in padded voxel indices, outside which every sample is zero
+    OccupiedBox box;  // in padded voxel indices
   };
   static PaddedVolume pad(const Volume<float>& ct_hu, const AttenuationModel& model, Beam beam);
 

@@ -9,14 +9,13 @@
 #include <cmath>
 #include <random>
 
+#include "drr/gl/context.h"
 #include "geometry/rotation.h"
 #include "phantom/shapes.h"
 #include "tests/drr/test_views.h"
 #include "tests/support/pose_near.h"
 
 namespace isoshift {
-
-void PrintTo(RendererKind kind, std::ostream* out) { *out << to_string(kind); }
 
 namespace {
 
@@ -32,11 +31,33 @@ std::vector<float> rendered(Renderer& renderer, const XrayView& view, const Eige
   return {pixels.begin(), pixels.end()};
 }
 
-class RendererTest : public testing::TestWithParam<RendererKind> {
+// What a test runs over: a kind and, where it uses OpenGL, on which.
+struct Tested {
+  RendererKind kind;
+  GlDevice gl = GlDevice::kHardware;
+};
+
+std::string name_of(const Tested& tested) {
+  const std::string kind(to_string(tested.kind));
+  if (tested.kind != RendererKind::kRaycast) return kind;
+  return kind + (tested.gl == GlDevice::kHardware ? "_hardware" : "_software");
+}
+
+void PrintTo(const Tested& tested, std::ostream* out) { *out << name_of(tested); }
+
+class RendererTest : public testing::TestWithParam<Tested> {
  protected:
-  std::unique_ptr<Renderer> make(const Volume<float>& ct) { return make_renderer(GetParam(), ct, {}, kBothBeams); }
+  void SetUp() override {
+    if (GetParam().kind == RendererKind::kRaycast && GetParam().gl == GlDevice::kHardware && !has_hardware_gl())
+      GTEST_SKIP() << "no GPU here";
+  }
+  std::unique_ptr<Renderer> make(const Volume<float>& ct, const AttenuationModel& model = {}) {
+    return make_renderer(GetParam().kind, ct, model, kBothBeams, GetParam().gl);
+  }
   // Interpolating renderers smear an edge over one voxel; Siddon does not.
-  bool interpolates() const { return GetParam() != RendererKind::kSiddon; }
+  bool interpolates() const { return GetParam().kind != RendererKind::kSiddon; }
+  // The others are exact for their interpolation.
+  bool steps() const { return GetParam().kind == RendererKind::kCpu || GetParam().kind == RendererKind::kRaycast; }
 };
 
 TEST_P(RendererTest, RayThroughUniformCubeIntegratesToPathLengthTimesAttenuation) {
@@ -58,7 +79,7 @@ TEST_P(RendererTest, OneVoxelIntegratesToItsEdgeLength) {
   const auto renderer = make(ct);
   // The central ray meets the voxel's center along one of its axes: the interpolated tent has the voxel's own area. Two
   // or three midpoint samples of such a tent are off by up to a ninth; on a CT these errors average out.
-  const double tolerance = GetParam() == RendererKind::kCpu ? 0.12 : 1e-6;
+  const double tolerance = steps() ? 0.12 : 1e-6;
   EXPECT_NEAR(rendered(*renderer, centered_view(0, 33, 1.0), Eigen::Isometry3d::Identity())[16 * 33 + 16], 3.0 * kWater,
               tolerance * 3.0 * kWater + 1e-7);
   EXPECT_NEAR(rendered(*renderer, centered_view(90, 33, 1.0), Eigen::Isometry3d::Identity())[16 * 33 + 16],
@@ -71,7 +92,7 @@ TEST_P(RendererTest, SphereHasTheChordsOfASphere) {
   const Shape sphere =
       make_shape(Shape::Kind::kEllipsoid, Vector3d::Zero(), Vector3d::Constant(radius_mm), {.water = 1.0});
   ct = ct_of_shapes({sphere}, ct.size, ct.patient_from_voxel);
-  const auto renderer = make_renderer(GetParam(), ct, {.threshold_hu = -1001}, kBothBeams);
+  const auto renderer = make(ct, {.threshold_hu = -1001});
   const XrayView view = centered_view(30, 65, 2.0);
   const auto drr = rendered(*renderer, view, Eigen::Isometry3d::Identity());
   for (const int column : {32, 40, 48}) {
@@ -160,8 +181,12 @@ TEST_P(RendererTest, AgreesWithItsOracle) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(All, RendererTest, testing::ValuesIn(kRendererKinds),
-                         [](const auto& param) { return std::string(to_string(param.param)); });
+INSTANTIATE_TEST_SUITE_P(All, RendererTest,
+                         testing::Values(Tested{RendererKind::kSiddon}, Tested{RendererKind::kTrilinear},
+                                         Tested{RendererKind::kCpu},
+                                         Tested{RendererKind::kRaycast, GlDevice::kSoftware},
+                                         Tested{RendererKind::kRaycast, GlDevice::kHardware}),
+                         [](const auto& param) { return name_of(param.param); });
 
 TEST(Oracles, DifferByLessThanWhatTheDocsSay) {
   // docs/algorithms.md, "Oracles": 0.8 % on this phantom; they interpolate differently and must not be equal.

@@ -1,0 +1,17 @@
+# embed_shader(FILE): makes <build>/drr/raycast/raycast.comp.h of drr/raycast/raycast.comp, with its text as kRaycastComp.
+function(embed_shader file)
+  file(READ ${CMAKE_CURRENT_SOURCE_DIR}/${file} text)
+  set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/${file})
+  get_filename_component(name ${file} NAME)
+  string(REGEX REPLACE "[._]" ";" words ${name})
+  set(symbol k)
+  foreach(word ${words})
+    string(SUBSTRING ${word} 0 1 first)
+    string(SUBSTRING ${word} 1 -1 rest)
+    string(TOUPPER ${first} first)
+    string(APPEND symbol ${first}${rest})
+  endforeach()
+  set(header ${CMAKE_CURRENT_BINARY_DIR}/${file}.h)
+  file(CONFIGURE OUTPUT ${header} @ONLY CONTENT
+"#pragma once\n// Made from ${file}.\n\nnamespace isoshift {\ninline constexpr const char* @symbol@ = R\"glsl(@text@)glsl\";\n}\n")
+endfunction()

@@ -1,0 +1,145 @@
+#include "drr/raycast/raycast.h"
+
+#include <epoxy/gl.h>
+
+#include <algorithm>
+#include <array>
+#include <limits>
+
+#include "drr/camera.h"
+#include "drr/raycast/raycast.comp.h"
+#include "geometry/error.h"
+
+namespace isoshift {
+namespace {
+
+// Binding slots and uniform locations, as in raycast.comp.
+constexpr std::uint32_t kKvTexture = 0, kMvTexture = 1;
+constexpr std::uint32_t kCameras = 0, kViews = 1, kPixels = 2, kResult = 3;
+enum Uniform : int {
+  kPoseCount = 0,
+  kViewCount = 1,
+  kPixelsPerPose = 2,
+  kHasPixelList = 3,
+  kStepMm = 4,
+  kMmFromVoxelAxes = 5,
+  kBoxLow = 6,
+  kBoxHigh = 7,
+};
+
+constexpr std::size_t kGroupSize = 64;
+constexpr std::size_t kMaxGroups = 65535;  // what every OpenGL 4.5 allows along each axis
+
+struct GlView {
+  std::uint32_t first_pixel, columns, is_mv, unused;
+};
+
+template <class T>
+std::span<const std::byte> bytes_of(const std::vector<T>& values) {
+  return std::as_bytes(std::span(values));
+}
+
+}  // namespace
+
+RaycastGlRenderer::RaycastGlRenderer(const Volume<float>& ct_hu, const AttenuationModel& model,
+                                     std::span<const Beam> beams, GlDevice device)
+    : context_(device),
+      program_(kRaycastComp, "drr/raycast/raycast.comp"),
+      voxel_from_patient_(ct_hu.patient_from_voxel.inverse()),
+      step_mm_(ct_hu.spacing_mm().minCoeff()),
+      box_low_(Eigen::Vector3d::Constant(std::numeric_limits<double>::max())),
+      box_high_(Eigen::Vector3d::Constant(-1.0)) {
+  for (const Beam beam : beams) {
+    const Volume<float> attenuation = attenuation_volume(ct_hu, model, beam);
+    attenuation_per_mm_.emplace(beam, Texture3d(attenuation.size, attenuation.voxels));
+    const OccupiedBox box = occupied_box(attenuation);
+    box_low_ = box_low_.cwiseMin(box.low);
+    box_high_ = box_high_.cwiseMax(box.high);
+  }
+  context_.check("uploading the CT");
+}
+
+RenderResult RaycastGlRenderer::render(std::span<const XrayView> views,
+                                       std::span<const Eigen::Isometry3d> room_from_patient, const PixelSet& pixels) {
+  context_.make_current();
+  std::vector<std::size_t> begins = view_begins(views, pixels);
+  const std::size_t pixels_per_pose = begins.back();
+  line_integrals_.resize(pixels_per_pose * room_from_patient.size());
+  upload_views(views, begins, pixels);
+
+  // As many poses at once as one storage buffer can hold.
+  GLint64 max_bytes = 0;
+  glGetInteger64v(GL_MAX_SHADER_STORAGE_BLOCK_SIZE, &max_bytes);
+  const std::size_t pose_bytes = std::max<std::size_t>(1, pixels_per_pose * sizeof(float));
+  const std::size_t poses_at_once = static_cast<std::size_t>(max_bytes) / pose_bytes;
+  if (poses_at_once == 0)
+    throw Error("images of this size exceed the storage buffers of this OpenGL.\n       Use --renderer cpu");
+  for (std::size_t first = 0; first < room_from_patient.size(); first += poses_at_once) {
+    const std::size_t count = std::min(poses_at_once, room_from_patient.size() - first);
+    dispatch(views, room_from_patient.subspan(first, count), pixels_per_pose, !pixels.of_view.empty(),
+             std::span(line_integrals_).subspan(first * pixels_per_pose, count * pixels_per_pose));
+  }
+  context_.check("rendering");
+  return RenderResult(line_integrals_, std::move(begins));
+}
+
+void RaycastGlRenderer::upload_views(std::span<const XrayView> views, const std::vector<std::size_t>& begins,
+                                     const PixelSet& pixels) {
+  std::vector<GlView> gl_views;
+  for (std::size_t v = 0; v < views.size(); ++v) {
+    attenuation_per_mm_.at(views[v].beam);  // a beam that was not prepared is a logic error
+    gl_views.push_back({.first_pixel = static_cast<std::uint32_t>(begins[v]),
+                        .columns = static_cast<std::uint32_t>(views[v].columns),
+                        .is_mv = views[v].beam == Beam::kMegavoltage ? 1U : 0U,
+                        .unused = 0});
+  }
+  views_.upload(bytes_of(gl_views));
+  std::vector<std::uint32_t> list = {0};  // never empty: a buffer without storage cannot be bound
+  if (!pixels.of_view.empty()) {
+    list.clear();
+    for (const auto& of_view : pixels.of_view) list.insert(list.end(), of_view.begin(), of_view.end());
+  }
+  pixels_.upload(bytes_of(list));
+}
+
+void RaycastGlRenderer::dispatch(std::span<const XrayView> views, std::span<const Eigen::Isometry3d> poses,
+                                 std::size_t pixels_per_pose, bool has_pixel_list, std::span<float> line_integrals) {
+  std::vector<glm::mat4> cameras;
+  for (const Eigen::Isometry3d& pose : poses)
+    for (const XrayView& view : views) {
+      const Camera camera = make_camera(view, pose, voxel_from_patient_);
+      Eigen::Matrix4d voxel_from_pixel = Eigen::Matrix4d::Identity();
+      voxel_from_pixel.topLeftCorner<3, 3>() = camera.way_voxel_from_pixel;
+      voxel_from_pixel.topRightCorner<3, 1>() = camera.source_voxel;
+      cameras.push_back(to_glm(voxel_from_pixel));
+    }
+  cameras_.upload(bytes_of(cameras));
+  result_.reserve(line_integrals.size_bytes());
+
+  program_.use();
+  const Texture3d& kv = attenuation_per_mm_.begin()->second;  // where a beam is absent, any texture stands in unread
+  const Texture3d& mv = attenuation_per_mm_.rbegin()->second;
+  kv.bind(kKvTexture);
+  mv.bind(kMvTexture);
+  cameras_.bind(kCameras);
+  views_.bind(kViews);
+  pixels_.bind(kPixels);
+  result_.bind(kResult);
+  const Eigen::Matrix3f mm_from_voxel_axes = voxel_from_patient_.linear().inverse().cast<float>();
+  const Eigen::Vector3f low = box_low_.cast<float>(), high = box_high_.cast<float>();
+  glUniform1ui(kPoseCount, static_cast<GLuint>(poses.size()));
+  glUniform1ui(kViewCount, static_cast<GLuint>(views.size()));
+  glUniform1ui(kPixelsPerPose, static_cast<GLuint>(pixels_per_pose));
+  glUniform1i(kHasPixelList, has_pixel_list ? 1 : 0);
+  glUniform1f(kStepMm, static_cast<GLfloat>(step_mm_));
+  glUniformMatrix3fv(kMmFromVoxelAxes, 1, GL_FALSE, mm_from_voxel_axes.data());
+  glUniform3fv(kBoxLow, 1, low.data());
+  glUniform3fv(kBoxHigh, 1, high.data());
+  const std::size_t groups = (pixels_per_pose + kGroupSize - 1) / kGroupSize;
+  glDispatchCompute(static_cast<GLuint>(std::min(groups, kMaxGroups)),
+                    static_cast<GLuint>(std::min(poses.size(), kMaxGroups)), 1);
+  glMemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT);
+  result_.download(std::as_writable_bytes(line_integrals));
+}
+
+}  // namespace isoshift

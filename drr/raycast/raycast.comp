@@ -1,0 +1,68 @@
+// raycast.comp: line integrals of attenuation along source-to-pixel rays, for all poses, views and pixels of one call.
+// Positions are continuous voxel indices, lengths mm, attenuation 1/mm. The volume is sampled trilinearly at the middle
+// of equal steps of at most step_mm; outside of it the texture's border is 0 (docs/algorithms.md, "Ray casting").
+
+layout(local_size_x = 64) in;
+
+layout(binding = 0) uniform sampler3D kv_attenuation_per_mm;
+layout(binding = 1) uniform sampler3D mv_attenuation_per_mm;
+
+struct View {
+  uint first_pixel;  // where the view's pixels begin among those of one pose
+  uint columns;
+  uint is_mv;
+  uint unused;
+};
+
+// Columns 0 to 2 take (column, row, 1) to the way from source to pixel; column 3 is the source.
+layout(std430, binding = 0) readonly buffer Cameras { mat4 voxel_from_pixel[]; };  // [pose][view]
+layout(std430, binding = 1) readonly buffer Views { View views[]; };
+layout(std430, binding = 2) readonly buffer Pixels { uint pixels[]; };             // of one pose, where a list is given
+layout(std430, binding = 3) writeonly buffer Result { float line_integrals[]; };   // [pose][pixel]
+
+layout(location = 0) uniform uint pose_count;
+layout(location = 1) uniform uint view_count;
+layout(location = 2) uniform uint pixels_per_pose;
+layout(location = 3) uniform bool has_pixel_list;
+layout(location = 4) uniform float step_mm;
+layout(location = 5) uniform mat3 mm_from_voxel_axes;
+layout(location = 6) uniform vec3 box_low;   // outside of this box, in voxel indices, every sample is 0
+layout(location = 7) uniform vec3 box_high;
+
+float attenuation(bool is_mv, vec3 voxel) {
+  if (is_mv) return textureLod(mv_attenuation_per_mm, (voxel + 0.5) / vec3(textureSize(mv_attenuation_per_mm, 0)), 0.0).r;
+  return textureLod(kv_attenuation_per_mm, (voxel + 0.5) / vec3(textureSize(kv_attenuation_per_mm, 0)), 0.0).r;
+}
+
+float line_integral(vec3 source, vec3 way, bool is_mv) {
+  // The part of the ray inside the box. A component of 0 gives infinities, which min and max put in their place.
+  vec3 at_low = (box_low - source) / way;
+  vec3 at_high = (box_high - source) / way;
+  vec3 enters = min(at_low, at_high);
+  vec3 leaves = max(at_low, at_high);
+  float begin = max(max(enters.x, enters.y), max(enters.z, 0.0));
+  float end = min(min(leaves.x, leaves.y), min(leaves.z, 1.0));
+  if (!(begin < end)) return 0.0;
+
+  float way_mm = length(mm_from_voxel_axes * way);
+  int steps = max(1, int(ceil((end - begin) * way_mm / step_mm)));
+  float step_t = (end - begin) / float(steps);
+  float sum = 0.0;
+  for (int n = 0; n < steps; ++n) sum += attenuation(is_mv, source + (begin + (float(n) + 0.5) * step_t) * way);
+  return sum * step_t * way_mm;
+}
+
+void main() {
+  // Strides instead of one thread per ray: group counts have limits, poses and pixels have none.
+  for (uint pose = gl_WorkGroupID.y; pose < pose_count; pose += gl_NumWorkGroups.y) {
+    for (uint n = gl_GlobalInvocationID.x; n < pixels_per_pose; n += gl_NumWorkGroups.x * gl_WorkGroupSize.x) {
+      uint view = 0u;
+      while (view + 1u < view_count && n >= views[view + 1u].first_pixel) ++view;
+      uint pixel = has_pixel_list ? pixels[n] : n - views[view].first_pixel;
+      vec3 position = vec3(float(pixel % views[view].columns), float(pixel / views[view].columns), 1.0);
+      mat4 camera = voxel_from_pixel[pose * view_count + view];
+      line_integrals[pose * pixels_per_pose + n] =
+          line_integral(camera[3].xyz, mat3(camera) * position, views[view].is_mv != 0u);
+    }
+  }
+}
