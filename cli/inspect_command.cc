@@ -117,17 +117,20 @@ std::string describe_ct(const std::string& series_uid, const std::vector<std::fi
 void run_inspect(const std::vector<std::filesystem::path>& paths, Console& console) {
   const StudyFiles files = scan_study(paths);
   std::optional<std::string> planned_position;
-  for (const auto& path : files.rt_plans) {
+  for (const auto& [path, uid, frame, structures] : files.plans) {
     console.out << describe_plan(path);
     const RtPlan plan = read_rt_plan(path);
     planned_position = common_patient_position(plan, plan.beams);
   }
-  for (const auto& [series_uid, slices] : files.ct_series) console.out << describe_ct(series_uid, slices, console);
-  for (const auto& path : files.rt_images) console.out << describe_rt_image(path, planned_position);
-  for (const auto& path : files.rt_structures) console.out << fmt::format("RT Structure Set, {}\n\n", path.string());
-  for (const StudyFiles::LeftAside& file : files.left_aside)
-    console.out << fmt::format("left aside: {}: {}\n", file.path.string(), file.reason);
-  if (files.ct_series.empty() && files.rt_images.empty() && files.rt_plans.empty() && files.rt_structures.empty())
+  for (const StudyFiles::Ct& ct : files.cts) console.out << describe_ct(ct.series_instance_uid, ct.files, console);
+  for (const StudyFiles::Image& image : files.images) console.out << describe_rt_image(image.file, planned_position);
+  for (const auto& structures : files.structures)
+    console.out << fmt::format("RT Structure Set, {}\n\n", structures.file.string());
+  for (const std::string& file : files.left_aside) console.out << "left aside: " << file << "\n";
+  for (const std::string& reason : files.unreadable) console.out << "unreadable: " << reason << "\n";
+  if (!files.unreadable.empty())
+    throw Error(fmt::format("{} of the files cannot be read; see above", files.unreadable.size()));
+  if (files.cts.empty() && files.images.empty() && files.plans.empty() && files.structures.empty())
     throw Error(fmt::format("{}: nothing that isoshift reads", paths.front().string()));
 }
 

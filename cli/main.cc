@@ -1,10 +1,34 @@
+#include <signal.h>
 #include <unistd.h>
 
 #include <iostream>
+#include <thread>
 
 #include "cli/commands.h"
+#include "io/output_folder.h"
+
+namespace {
+
+// SIGINT and SIGTERM end the program without leaving half a result behind: a thread of its own waits for them, since
+// hardly anything may be done in a handler.
+void end_cleanly_on_signals() {
+  static sigset_t signals;
+  sigemptyset(&signals);
+  sigaddset(&signals, SIGINT);
+  sigaddset(&signals, SIGTERM);
+  pthread_sigmask(SIG_BLOCK, &signals, nullptr);  // inherited by every thread made later
+  std::thread([] {
+    int signal = 0;
+    sigwait(&signals, &signal);
+    isoshift::abandon_outputs();
+    ::_exit(128 + signal);
+  }).detach();
+}
+
+}  // namespace
 
 int main(int argc, char** argv) {
+  end_cleanly_on_signals();
   isoshift::Console console{.out = std::cout, .err = std::cerr, .err_is_terminal = ::isatty(STDERR_FILENO) == 1};
   return isoshift::run_isoshift(argc, argv, console);
 }

@@ -65,7 +65,9 @@ SetupReport make_report(const RegisterOptions& options, const Study& study, cons
                              .termination = stage.termination});
   report.seed = options.registration.seed;
   report.attenuation = options.rendering.attenuation;
-  report.threshold_hu = options.rendering.threshold_hu;
+  const AttenuationModel model = options.rendering.model();
+  report.threshold_hu = model.threshold_hu;
+  if (model.kind == AttenuationModel::Kind::kWindowed) report.window_hu = {model.window_low_hu, model.window_high_hu};
   report.renderer = to_string(renderer.kind());
   report.device = renderer.device();
   report.seconds_register = result.seconds;
@@ -117,7 +119,7 @@ int run_register(const RegisterOptions& given, Console& console) {
   RegisterOptions options = given;
   options.registration.dof = options.dof == "rigid" ? Dof::kRigid : Dof::kTranslation;
   const Stopwatch total;
-  OutputFolder output(options.output, options.overwrite, {"result.json", "report.txt", kRegistrationFile});
+  OutputFolder output(options.output, options.overwrite);
   std::optional<Eigen::Isometry3d> truth;
   if (!options.truth.empty()) truth = read_setup_error(options.truth);
 
@@ -137,6 +139,7 @@ int run_register(const RegisterOptions& given, Console& console) {
         study, result.actual_room_from_patient, label_of(result.verdict), output.path() / kRegistrationFile, notes);
   write_pictures(study, *renderer, result.actual_room_from_patient, output.path());
   report.overrides = notes.overrides;
+  report.left_aside = notes.left_aside;
   report.warnings = notes.warnings;
   report.warnings.insert(report.warnings.end(), result.warnings.begin(), result.warnings.end());
   report.seconds_load = seconds_load;
@@ -169,7 +172,8 @@ void add_register_command(CLI::App& app, Console& console, int& exit_status) {
   command->add_option("--dof", options->dof, "Degrees of freedom: six, or the three translations")
       ->check(CLI::IsMember({"rigid", "translation"}))
       ->capture_default_str();
-  command->add_option("--seed", options->registration.seed, "Of the pixels drawn; the only randomness")
+  command->add_option("--seed", options->registration.seed, "Draws the pixels compared; the only randomness")
+      ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
   command->add_option("--truth", options->truth, "truth.json of a phantom study: print the result beside it")
       ->type_name("FILE");

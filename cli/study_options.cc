@@ -3,7 +3,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <charconv>
+#include <cmath>
 
 #include "drr/gl/context.h"
 #include "geometry/error.h"
@@ -22,8 +24,8 @@ std::pair<std::string, std::string> key_and_value(const std::string& text, std::
 double number_from(const std::string& text, std::string_view flag) {
   double value = 0.0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc() || end != text.data() + text.size())
-    throw UsageError(fmt::format("{}: \"{}\" is no number", flag, text));
+  if (error != std::errc() || end != text.data() + text.size() || !std::isfinite(value))
+    throw UsageError(fmt::format("{}: \"{}\" is no finite number", flag, text));
   return value;
 }
 
@@ -35,12 +37,25 @@ std::string allow_keys_help() {
 
 }  // namespace
 
+void StudyOptions::check_finite() const {
+  const auto check = [](const char* flag, const auto& values) {
+    for (const double value : values)
+      if (!std::isfinite(value)) throw UsageError(fmt::format("{}: {} is no finite number", flag, value));
+  };
+  check("--isocenter", isocenter);
+  check("--rt-image-position", rt_image_position);
+  check("--couch-angle", std::array{couch_angle_deg.value_or(0.0)});
+  check("--sad", std::array{sad_mm.value_or(0.0)});
+  check("--sid", std::array{sid_mm.value_or(0.0)});
+}
+
 StudyRequest StudyOptions::request() const {
+  check_finite();
   StudyRequest request;
-  request.study = study;
-  request.ct = ct;
-  request.images = images;
-  if (!plan.empty()) request.plan = plan;
+  if (study.empty() && (ct.empty() || images.empty()))
+    throw UsageError("which study? Name its folder, or its parts with --ct and --image");
+  request.parts = {.study = study, .ct = ct, .images = images, .plan = std::nullopt};
+  if (!plan.empty()) request.parts.plan = plan;
   if (!isocenter.empty()) request.isocenter_patient_mm = Eigen::Vector3d(isocenter.data());
   for (const std::string& text : gantry_angles) {
     const auto [label, angle] = key_and_value(text, "--gantry-angle");
@@ -131,12 +146,13 @@ void add_rendering_options(CLI::App& command, RenderingOptions& options) {
   const char* group = "Rendering";
   std::vector<std::string> names = {"auto"};
   for (const RendererKind kind : kRendererKinds) names.emplace_back(to_string(kind));
-  command.add_option("--renderer", options.renderer, "What renders the DRRs. auto: raycast on a GPU, else cpu; siddon and trilinear are slow references")
+  command
+      .add_option("--renderer", options.renderer,
+                  "What renders the DRRs. auto: raycast on a GPU, else cpu; siddon and trilinear are slow references")
       ->check(CLI::IsMember(names))
       ->capture_default_str()
       ->group(group);
-  command
-      .add_option("--gl", options.gl, "OpenGL of --renderer raycast: a GPU, or Mesa's llvmpipe on the CPU")
+  command.add_option("--gl", options.gl, "OpenGL of --renderer raycast: a GPU, or Mesa's llvmpipe on the CPU")
       ->check(CLI::IsMember({"hardware", "software"}))
       ->capture_default_str()
       ->group(group);
@@ -164,6 +180,7 @@ LoadedStudy load(const StudyOptions& study_options, const RenderingOptions& rend
     ProgressBar bar(console, "Reading CT");
     loaded.study = load_study(request, notes, [&](std::size_t done, std::size_t total) { bar.update(done, total); });
   }
+  for (const std::string& file : notes.left_aside) console.err << "left aside: " << file << "\n";
   std::vector<Beam> beams;
   for (const XrayImage& xray : loaded.study.xrays)
     if (std::ranges::find(beams, xray.view.beam) == beams.end()) beams.push_back(xray.view.beam);

@@ -22,8 +22,11 @@ struct StudyOptions {
   std::optional<double> couch_angle_deg, sad_mm, sid_mm;
   bool assume_centered = false;
 
-  // Throws UsageError for a word that is none of those allowed.
+  // Throws UsageError for a word that is none of those allowed, a number that is not finite, or no study at all.
   StudyRequest request() const;
+
+ private:
+  void check_finite() const;
 };
 void add_study_options(CLI::App& command, StudyOptions& options);
 

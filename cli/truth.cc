@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <array>
+#include <cmath>
 #include <fstream>
 #include <nlohmann/json.hpp>
 
@@ -41,6 +42,13 @@ double mean_target_registration_error_mm(const Eigen::Isometry3d& found, const E
   return sum_mm / 27.0;
 }
 
+namespace {
+
+// A number that rounds to nothing is shown without a sign.
+double unsigned_zero(double value) { return std::abs(value) < 0.005 ? 0.0 : value; }
+
+}  // namespace
+
 std::string compared_with_truth(const Eigen::Isometry3d& found_error, const Eigen::Isometry3d& true_error) {
   static constexpr std::array kAxes = {"x", "y", "z"};
   const auto angles_deg = [](const Eigen::Isometry3d& error) {
@@ -50,12 +58,13 @@ std::string compared_with_truth(const Eigen::Isometry3d& found_error, const Eige
   std::string table = "SETUP ERROR BESIDE THE TRUTH\n                       found      true   difference\n";
   for (int axis = 0; axis < 3; ++axis) {
     const double found = found_error.translation()[axis], known = true_error.translation()[axis];
-    table += fmt::format("  {:<14} {:>11.2f} {:>9.2f} {:>9.2f} mm\n", kAxes[axis], found, known, found - known);
+    table += fmt::format("  {:<14} {:>11.2f} {:>9.2f} {:>9.2f} mm\n", kAxes[axis], found, known,
+                         unsigned_zero(found - known));
   }
   for (int axis = 0; axis < 3; ++axis) {
     const double found = angles_deg(found_error)[axis], known = angles_deg(true_error)[axis];
     table += fmt::format("  {:<14} {:>11.2f} {:>9.2f} {:>9.2f} deg\n", fmt::format("about {}", kAxes[axis]), found,
-                         known, found - known);
+                         known, unsigned_zero(found - known));
   }
   table += fmt::format("  mean target registration error, 27 points within 50 mm: {:.2f} mm\n",
                        mean_target_registration_error_mm(found_error, true_error));

@@ -11,8 +11,8 @@
 namespace isoshift {
 
 struct Camera {
-  Eigen::Vector3d source_voxel;           // in continuous voxel indices
-  Eigen::Matrix3d way_voxel_from_pixel;   // (column, row, 1) to the way from the source to that pixel's center
+  Eigen::Vector3d source_voxel;          // in continuous voxel indices
+  Eigen::Matrix3d way_voxel_from_pixel;  // (column, row, 1) to the way from the source to that pixel's center
 };
 
 Camera make_camera(const XrayView& view, const Eigen::Isometry3d& room_from_patient,

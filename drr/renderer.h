@@ -78,8 +78,8 @@ class Renderer {
 };
 
 // A renderer for views of the given beam qualities; rendering another one is a logic error. Keeps its own copy of the
-// volume. `gl` matters to the kinds that use OpenGL. Throws UsageError for a model that fails its check, and Error with the
-// reason where there is no such OpenGL or the volume exceeds its limits: never another renderer instead.
+// volume. `gl` matters to the kinds that use OpenGL. Throws UsageError for a model that fails its check, and Error with
+// the reason where there is no such OpenGL or the volume exceeds its limits: never another renderer instead.
 std::unique_ptr<Renderer> make_renderer(RendererKind kind, const Volume<float>& ct_hu, const AttenuationModel& model,
                                         std::span<const Beam> beams, GlDevice gl = GlDevice::kHardware);
 

@@ -15,6 +15,8 @@ namespace {
 
 constexpr double kMinPositionDifferenceMm = 0.01;  // CT-6: closer slices are duplicates
 constexpr double kMaxAxisResidualMm = 0.1;         // CT-8: of every slice's position from the straight line
+constexpr int kMaxGapsListed = 10;
+constexpr double kMaxVoxels = 2e9;  // CT-14: 8 GB as float; more is a mistake or an attack
 constexpr float kAirHu = -1000.0F;
 
 struct Slice {
@@ -145,18 +147,19 @@ void drop_duplicates(std::vector<Slice>& sorted, const Eigen::Vector3d& normal, 
 std::vector<Finding> spacing_findings(const std::vector<double>& positions_mm, double median_mm,
                                       const std::string& series) {
   std::vector<Finding> findings;
+  int gaps = 0;
   const double tolerance_mm = std::max(0.01, 0.001 * median_mm);
   for (std::size_t k = 0; k + 1 < positions_mm.size(); ++k) {
     const double distance_mm = positions_mm[k + 1] - positions_mm[k];
     if (std::abs(distance_mm - median_mm) <= tolerance_mm) continue;
     const double multiple = std::round(distance_mm / median_mm);
     const bool missing = multiple >= 2.0 && std::abs(distance_mm - multiple * median_mm) <= multiple * tolerance_mm;
+    if (++gaps > kMaxGapsListed) break;
     findings.push_back(
         {"gaps", fmt::format("CT series {}: slices {} and {} are {:.3g} mm apart, the others {:.3g} mm ({}).\n"
                              "       A uniform series is needed; {}",
                              series, k + 1, k + 2, distance_mm, median_mm, described(DCM_ImagePositionPatient),
                              missing ? "a slice is probably missing." : "this one has uneven spacing.")});
-    break;  // one is enough to act on
   }
   return findings;
 }
@@ -203,9 +206,14 @@ Volume<float> assembled(std::vector<Slice>& slices, const Eigen::Matrix3d& axes,
   }
   const std::vector<Finding> findings = spacing_findings(positions_mm, median_mm, series);
   settle(findings, allowed, notes);
-  const double spacing_mm = findings.empty() ? length_mm / static_cast<double>(slices.size() - 1) : ordered.front();
+  const double spacing_mm = findings.empty() ? length_mm / static_cast<double>(slices.size() - 1)
+                                             : std::max(ordered.front(), 0.25 * median_mm);
   const int count = findings.empty() ? static_cast<int>(slices.size())
                                      : static_cast<int>(std::floor(length_mm / spacing_mm + 1e-6)) + 1;
+
+  if (static_cast<double>(first.format.columns) * first.format.rows * count > kMaxVoxels)
+    throw Error(fmt::format("CT series {}: {} x {} x {} voxels are more than this program takes", series,
+                            first.format.columns, first.format.rows, count));
 
   Eigen::Affine3d patient_from_voxel;
   patient_from_voxel.makeAffine();
@@ -229,6 +237,7 @@ CtSeries read_ct_series(std::span<const std::filesystem::path> files, const Allo
   series.series_instance_uid = header.required_text(DCM_SeriesInstanceUID);
   series.frame_of_reference_uid = header.required_text(DCM_FrameOfReferenceUID);
   series.body_part_examined = header.text(DCM_BodyPartExamined).value_or("");
+  series.patient_position = header.text(DCM_PatientPosition).value_or("");
   if (header.text(DCM_LossyImageCompression) == "01")
     notes.warnings.push_back("the CT has been compressed with loss (LossyImageCompression is 01)");
 

@@ -20,6 +20,7 @@ struct CtSeries {
   std::string series_instance_uid;
   std::string frame_of_reference_uid;
   std::string body_part_examined;
+  std::string patient_position;                // of the scan; annotation only (C.7.3.1.1.2)
   std::vector<std::string> sop_instance_uids;  // in the order of the slices
 };
 

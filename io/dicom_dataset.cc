@@ -40,6 +40,11 @@ std::string_view trimmed(std::string_view text) {
   return text.substr(begin, text.find_last_not_of(kPadding) - begin + 1);
 }
 
+void make_printable(std::string& text) {
+  for (char& c : text)
+    if (static_cast<unsigned char>(c) < 0x20 || c == 0x7F) c = ' ';
+}
+
 bool is_text_vr(DcmEVR vr) { return vr == EVR_DS || vr == EVR_IS; }
 
 }  // namespace
@@ -60,7 +65,7 @@ std::vector<std::string> DicomItem::texts(const DcmTagKey& tag) const {
   std::string_view rest = whole;
   for (;;) {
     const auto separator = rest.find('\\');
-    values.emplace_back(trimmed(rest.substr(0, separator)));
+    make_printable(values.emplace_back(trimmed(rest.substr(0, separator))));
     if (separator == std::string_view::npos) break;
     rest.remove_prefix(separator + 1);
   }
@@ -68,6 +73,12 @@ std::vector<std::string> DicomItem::texts(const DcmTagKey& tag) const {
 }
 
 std::optional<std::string> DicomItem::text(const DcmTagKey& tag) const {
+  auto value = raw_text(tag);
+  if (value) make_printable(*value);
+  return value;
+}
+
+std::optional<std::string> DicomItem::raw_text(const DcmTagKey& tag) const {
   DcmElement* element = nullptr;
   if (!has_value(tag) || item_->findAndGetElement(tag, element).bad()) return std::nullopt;
   OFString whole;

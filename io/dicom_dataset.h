@@ -30,9 +30,11 @@ class DicomItem {
   // The file, and for an item its sequence, as a message names it.
   const std::string& where() const { return where_; }
 
-  // Reading. Absent and empty are the same: nothing. Values lose their padding; text is UTF-8 where convertible.
+  // Reading. Absent and empty are the same: nothing. Values lose their padding; text is UTF-8 where convertible, and
+  // its control characters are spaces, so that no file can forge a line of a message or report.
   bool has_value(const DcmTagKey& tag) const;
   std::optional<std::string> text(const DcmTagKey& tag) const;
+  std::optional<std::string> raw_text(const DcmTagKey& tag) const;  // with control characters, to copy to another file
   std::vector<std::string> texts(const DcmTagKey& tag) const;
   std::optional<double> number(const DcmTagKey& tag) const;
   std::vector<double> numbers(const DcmTagKey& tag) const;

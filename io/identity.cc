@@ -27,7 +27,7 @@ Identity read_identity(const DicomItem& dataset) {
   Identity identity;
   identity.character_set = dataset.text(DCM_SpecificCharacterSet).value_or("");
   identity.patient_id_issuer = dataset.text(DCM_IssuerOfPatientID).value_or("");
-  for (const auto& [tag, member] : kAttributes) identity.*member = dataset.text(tag).value_or("");
+  for (const auto& [tag, member] : kAttributes) identity.*member = dataset.raw_text(tag).value_or("");
   return identity;
 }
 

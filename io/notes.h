@@ -1,5 +1,6 @@
 #pragma once
-// What a run must tell its user beside the result: warnings, and overrides of what a file lacks or a check forbids.
+// What a run must tell its user beside the result: warnings, overrides of what a file lacks or a check forbids, and
+// files that were found and not used.
 
 #include <map>
 #include <string>
@@ -11,6 +12,7 @@ namespace isoshift {
 struct Notes {
   std::vector<std::string> warnings;
   std::vector<std::string> overrides;
+  std::vector<std::string> left_aside;  // files found and not used, with the reason
 };
 
 // What a person allows although a check forbids it: key (kAllowKeys) to reason, from --allow KEY=REASON.

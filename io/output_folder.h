@@ -1,23 +1,24 @@
 #pragma once
-// Results appear whole or not at all: written aside, flushed, then renamed into place.
+// Results appear whole or not at all: written aside, flushed, then put in place by one rename.
 
 #include <filesystem>
-#include <string>
 #include <string_view>
 #include <vector>
 
 namespace isoshift {
 
-// A folder that is being filled beside its final place. commit() moves it there; without commit() nothing remains.
+// A folder that is being filled beside its final place. commit() puts it there; without commit() nothing remains.
 //
 //   OutputFolder output("results/today", overwrite);
 //   write_text(output.path() / "report.txt", report);
 //   output.commit();
+//
+// It lists its files in one of its own, .isoshift, by which a later run knows what it may replace.
 class OutputFolder {
  public:
-  // Throws Error if `destination` holds anything and `overwrite` is false, or if nothing can be written beside it.
-  // `obsolete` names files of an earlier result that must not survive beside the new one.
-  OutputFolder(std::filesystem::path destination, bool overwrite, std::vector<std::string> obsolete = {});
+  // Throws Error if `destination` holds anything and `overwrite` is false, if it holds anything that no output folder
+  // wrote, or if nothing can be written beside it.
+  OutputFolder(std::filesystem::path destination, bool overwrite);
   ~OutputFolder();
   OutputFolder(const OutputFolder&) = delete;
   OutputFolder& operator=(const OutputFolder&) = delete;
@@ -25,15 +26,20 @@ class OutputFolder {
   const std::filesystem::path& path() const { return staging_; }
   const std::filesystem::path& destination() const { return destination_; }
 
-  // Flushes all files to the disk and moves them to the destination. Where that existed, files of the same names are
-  // replaced one by one, others stay.
+  // Flushes all files to the disk and puts the folder in its place, where an earlier output goes as a whole.
   void commit();
 
  private:
+  void make_parents();
+
   std::filesystem::path destination_;
   std::filesystem::path staging_;
-  std::vector<std::string> obsolete_;
+  std::vector<std::filesystem::path> made_parents_;  // outermost first
+  bool replaces_ = false;
 };
+
+// Removes what uncommitted output folders of this process hold so far. For a process that is told to end.
+void abandon_outputs() noexcept;
 
 // The whole text or an Error naming the file.
 void write_text(const std::filesystem::path& path, std::string_view text);

@@ -13,11 +13,16 @@ namespace {
 
 constexpr double kMaxAngleNoiseDeg = 0.01;  // read-outs such as 359.998 mean 0
 
-// The value of the single exposure where it has one, else the top level's.
+// The exposure's value where it has one, else the top level's. Several exposures must agree.
 std::optional<double> exposure_number(const DicomItem& dataset, const DcmTagKey& tag) {
   const std::vector<DicomItem> exposures = dataset.items(DCM_ExposureSequence);
-  if (exposures.size() == 1)
-    if (const auto value = exposures.front().number(tag)) return value;
+  for (const DicomItem& exposure : exposures) {
+    const auto value = exposure.number(tag);
+    if (!value) continue;
+    if (exposures.size() > 1 && value != exposures.front().number(tag))
+      throw Error(fmt::format("{}: {} differs between exposures of one image", dataset.where(), described(tag)));
+    return value;
+  }
   return dataset.number(tag);
 }
 
@@ -113,6 +118,7 @@ RtImage read_rt_image_header(const std::filesystem::path& path) {
   if (const auto sign = d.number(DCM_PixelIntensityRelationshipSign); sign && (*sign == 1 || *sign == -1))
     image.intensity_sign = static_cast<int>(*sign);
   image.photometric_interpretation = d.text(DCM_PhotometricInterpretation).value_or("");
+  image.has_modality_lut = !d.items(DCM_ModalityLUTSequence).empty();
   return image;
 }
 
@@ -185,6 +191,9 @@ std::vector<Finding> rt_image_findings(const RtImage& image) {
     findings.push_back(
         {"planned-geometry", fmt::format("{}: {} says {}: its angles were not measured", where,
                                          described(DCM_ReportedValuesOrigin), *image.reported_values_origin)});
+  if (image.has_modality_lut)
+    throw Error(fmt::format("{}: {}: pixel values through a table are not supported", where,
+                            described(DCM_ModalityLUTSequence)));
   if (std::abs(wrapped_rad(rad_from_deg(image.gantry_pitch_angle_deg.value_or(0.0)))) > rad_from_deg(kMaxAngleNoiseDeg))
     throw Error(
         fmt::format("{}: {} is {} degrees; a tilted gantry is not supported, since the order of its rotations is "
@@ -240,6 +249,10 @@ CarmGeometry carm_geometry(const RtImage& image, Notes& notes) {
     notes.warnings.push_back(fmt::format("{}: {} is missing, taken as (0, 0, SAD - SID)", image.label,
                                          described(DCM_XRayImageReceptorTranslation)));
   }
+  if (image.photometric_interpretation == "MONOCHROME1")
+    notes.warnings.push_back(
+        fmt::format("{}: {} is MONOCHROME1, which is for display only; pixel values are taken as they are", image.label,
+                    described(DCM_PhotometricInterpretation)));
   if (sid_mm == geometry.sad_mm)
     notes.warnings.push_back(
         fmt::format("{}: {} equals the SAD; its true value may be unknown", image.label, described(DCM_RTImageSID)));
@@ -288,8 +301,12 @@ XrayImage read_xray_image(const RtImage& image, Beam beam, const CarmGeometry& g
   xray.view = make_xray_view(geometry, beam);
   xray.values = Image<float>(format.columns, format.rows);
   // Both angles turn counter-clockwise seen from the source, which is how the image is displayed (PS3.3 C.8.8.2.7).
-  xray.collimator_angle_rad =
-      rad_from_deg(image.collimator_angle_deg.value_or(0.0) - image.receptor_angle_deg.value_or(0.0));
+  // An image that is itself turned or mirrored on the receptor shows them turned back.
+  const double on_receptor_rad =
+      rad_from_deg(image.collimator_angle_deg.value_or(0.0) - image.receptor_angle_deg.value_or(0.0)) -
+      std::atan2(geometry.row_direction.y(), geometry.row_direction.x());
+  const bool is_mirrored = geometry.row_direction.cross(geometry.column_direction).z() > 0.0;
+  xray.collimator_angle_rad = is_mirrored ? -on_receptor_rad : on_receptor_rad;
   const bool is_linear = image.intensity_relationship == "LIN";
   xray.meaning = is_linear ? XrayImage::Meaning::kIntensity : XrayImage::Meaning::kLineIntegral;
 

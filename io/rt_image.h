@@ -61,6 +61,7 @@ struct RtImage {
   std::optional<std::string> intensity_relationship;
   std::optional<int> intensity_sign;
   std::string photometric_interpretation;
+  bool has_modality_lut = false;
 };
 
 RtImage read_rt_image_header(const std::filesystem::path& path);

@@ -30,6 +30,7 @@ struct RtPlan {
   std::optional<std::string> frame_of_reference_uid;
   std::string approval_status;
   std::vector<Beam> beams;
+  Eigen::Vector3d setup_displacement_mm = Eigen::Vector3d::Zero();  // vertical, longitudinal, lateral (300A,01D2..01D6)
 };
 
 RtPlan read_rt_plan(const std::filesystem::path& path);

@@ -1,6 +1,5 @@
 #include "io/study.h"
 
-#include <dcmtk/dcmdata/dcuid.h>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
@@ -9,101 +8,15 @@
 #include <charconv>
 #include <chrono>
 #include <cmath>
-#include <set>
 
 #include "geometry/error.h"
 
 namespace isoshift {
 namespace {
 
-namespace fs = std::filesystem;
-
 constexpr double kMaxTimeSpanS = 600.0;
 constexpr double kMaxTableMoveMm = 0.5;
 constexpr double kMaxTableTurnDeg = 0.1;
-
-std::vector<fs::path> files_below(const std::vector<fs::path>& paths) {
-  std::set<fs::path> files;
-  for (const fs::path& path : paths) {
-    std::error_code error;
-    const auto status = fs::status(path, error);
-    if (!fs::exists(status)) throw Error(fmt::format("{}: no such file or folder", path.string()));
-    if (!fs::is_directory(status)) {
-      files.insert(path);
-      continue;
-    }
-    for (auto entry = fs::recursive_directory_iterator(path, error); !error && entry != fs::end(entry);
-         entry.increment(error))
-      if (entry->is_regular_file()) files.insert(entry->path());
-    if (error) throw Error(fmt::format("{}: cannot be searched: {}", path.string(), error.message()));
-  }
-  return {files.begin(), files.end()};
-}
-
-void sort_in(const fs::path& path, StudyFiles& files) {
-  if (!has_dicom_magic(path)) {
-    files.left_aside.push_back({path, "not a DICOM file"});
-    return;
-  }
-  const DicomFile file = DicomFile::read(path, DicomFile::Extent::kHeader);
-  const DicomItem dataset = file.dataset();
-  const std::string sop_class = dataset.text(DCM_SOPClassUID).value_or("");
-  if (sop_class == UID_CTImageStorage) {
-    const auto type = dataset.texts(DCM_ImageType);
-    if (type.size() > 2 && type[2] == "LOCALIZER")
-      files.left_aside.push_back({path, "a CT localizer"});
-    else
-      files.ct_series[dataset.required_text(DCM_SeriesInstanceUID)].push_back(path);
-  } else if (sop_class == UID_RTImageStorage) {
-    files.rt_images.push_back(path);
-  } else if (sop_class == UID_RTPlanStorage || sop_class == UID_RTIonPlanStorage) {
-    files.rt_plans.push_back(path);
-  } else if (sop_class == UID_RTStructureSetStorage) {
-    files.rt_structures.push_back(path);
-  } else {
-    const char* name = dcmFindNameOfUID(sop_class.c_str(), "an object of unknown class");
-    files.left_aside.push_back({path, name});
-  }
-}
-
-// The parts of a study after the rule "what is named wins, the rest is searched for".
-struct Parts {
-  std::vector<fs::path> ct;
-  std::vector<fs::path> images;
-  std::optional<fs::path> plan;
-};
-
-std::string searched(const StudyRequest& request) {
-  return request.study.empty() ? "no study folder was given" : "searched " + request.study.string();
-}
-
-Parts find_parts(const StudyRequest& request) {
-  StudyFiles found;
-  if (!request.study.empty()) found = scan_study({request.study});
-  if (!request.ct.empty()) found.ct_series = scan_study(request.ct).ct_series;
-  if (!request.images.empty()) found.rt_images = scan_study(request.images).rt_images;
-  if (request.plan) found.rt_plans = scan_study({*request.plan}).rt_plans;
-
-  Parts parts;
-  if (found.ct_series.empty())
-    throw Error(fmt::format("no CT series found ({}).\n       Name its folder: --ct FOLDER", searched(request)));
-  if (found.ct_series.size() > 1) {
-    std::string list;
-    for (const auto& [uid, files] : found.ct_series)
-      list += fmt::format("\n       {} slices, series {}, first file {}", files.size(), uid, files.front().string());
-    throw Error(fmt::format("{} CT series found, expected one:{}\n       Name the planning CT: --ct FOLDER",
-                            found.ct_series.size(), list));
-  }
-  parts.ct = found.ct_series.begin()->second;
-  if (found.rt_images.empty())
-    throw Error(fmt::format("no RT Image found ({}).\n       Name the X-rays: --image FILE", searched(request)));
-  parts.images = found.rt_images;
-  if (found.rt_plans.size() > 1)
-    throw Error(fmt::format("{} RT Plans found, expected one: {} and {}.\n       Name the plan: --plan FILE",
-                            found.rt_plans.size(), found.rt_plans[0].string(), found.rt_plans[1].string()));
-  if (!found.rt_plans.empty()) parts.plan = found.rt_plans.front();
-  return parts;
-}
 
 // Seconds since an epoch from DA and TM ("20260301", "101500.25"); nothing where either is absent or malformed.
 std::optional<double> seconds_of(const RtImage& image) {
@@ -125,14 +38,25 @@ std::optional<double> seconds_of(const RtImage& image) {
   return ((days * 24 + *hour) * 60 + minute) * 60 + second;
 }
 
+// One patient throughout: an ID is there and the same, and so are name and birth date where both files have them.
 std::vector<Finding> patient_findings(const Study& study) {
-  const Identity& reference = study.ct.identity;
+  const Identity& ct = study.ct.identity;
   std::vector<Finding> findings;
   const auto compare = [&](const Identity& other, const std::string& where) {
-    if (other.patient_id == reference.patient_id && other.patient_id_issuer == reference.patient_id_issuer) return;
-    findings.push_back(
-        {"patient-mismatch", fmt::format("{}: {} differs from the CT's: the inputs are of different patients", where,
-                                         described(DCM_PatientID))});
+    const auto differ = [&](const std::string Identity::*member, const DcmTagKey& tag, bool may_be_empty) {
+      const bool is_empty = (other.*member).empty() || (ct.*member).empty();
+      if (other.*member == ct.*member && (may_be_empty || !is_empty)) return;
+      if (may_be_empty && is_empty) return;
+      findings.push_back({"patient-mismatch",
+                          is_empty ? fmt::format("{}: {} is empty in this file or in the CT: whose they are is unknown",
+                                                 where, described(tag))
+                                   : fmt::format("{}: {} differs from the CT's: the inputs are of different patients",
+                                                 where, described(tag))});
+    };
+    differ(&Identity::patient_id, DCM_PatientID, false);
+    differ(&Identity::patient_id_issuer, DCM_IssuerOfPatientID, true);
+    differ(&Identity::patient_name, DCM_PatientName, true);
+    differ(&Identity::patient_birth_date, DCM_PatientBirthDate, true);
   };
   if (study.plan) compare(study.plan->identity, study.plan->path.string());
   for (const RtImage& image : study.rt_images) compare(image.identity, image.path.string());
@@ -151,6 +75,11 @@ std::vector<Finding> plan_findings(const Study& study, Notes& notes) {
         {"for-mismatch", fmt::format("{}: {} is not that of the CT, so the plan's isocenter does not apply "
                                      "to it",
                                      plan.path.string(), described(DCM_FrameOfReferenceUID))});
+  if (plan.setup_displacement_mm.norm() > 0.0)
+    notes.warnings.push_back(fmt::format(
+        "the plan moves the table by ({:.1f}) mm (vertical, longitudinal, lateral) from marks to treatment ({}): "
+        "find out whether the X-rays were taken before or after that move",
+        fmt::join(plan.setup_displacement_mm, ", "), described(DCM_TableTopVerticalSetupDisplacement)));
   if (plan.approval_status != "APPROVED")
     notes.warnings.push_back(
         fmt::format("the plan is not approved ({} is \"{}\")", described(DCM_ApprovalStatus), plan.approval_status));
@@ -167,39 +96,90 @@ std::vector<Finding> plan_findings(const Study& study, Notes& notes) {
   return findings;
 }
 
-std::vector<Finding> session_findings(const Study& study) {
+// The views must be of one moment and one table position. Each is compared with the first view that says; one that does
+// not say is warned of where others do.
+std::vector<Finding> session_findings(const Study& study, Notes& notes) {
   std::vector<Finding> findings;
+  const auto compare = [&](const DcmTagKey& tag, auto&& value_of, auto&& finding_of) {
+    const RtImage* reference = nullptr;
+    for (const RtImage& image : study.rt_images) {
+      if (!value_of(image)) continue;
+      if (reference == nullptr) reference = &image;
+      if (auto finding = finding_of(image, *value_of(image), *reference, *value_of(*reference)))
+        findings.push_back(std::move(*finding));
+    }
+    for (const RtImage& image : study.rt_images)
+      if (!value_of(image) && study.rt_images.size() > 1)
+        notes.warnings.push_back(fmt::format("{}: {} is missing, so it could not be compared with the other views",
+                                             image.label, described(tag)));
+  };
+
+  compare(DCM_AcquisitionTime, seconds_of,
+          [](const RtImage& image, double at_s, const RtImage& first, double first_s) -> std::optional<Finding> {
+            if (std::abs(at_s - first_s) <= kMaxTimeSpanS) return std::nullopt;
+            return Finding{"time-span", fmt::format("{}: taken {:.0f} minutes from {}, expected at most 10 ({})",
+                                                    image.path.string(), std::abs(at_s - first_s) / 60.0,
+                                                    first.path.string(), described(DCM_AcquisitionTime))};
+          });
+  const auto has_positions = [](const RtImage& image) { return image.table_position_mm.has_value(); };
+  if (std::ranges::any_of(study.rt_images, has_positions))
+    compare(
+        DCM_TableTopVerticalPosition, [](const RtImage& image) { return image.table_position_mm; },
+        [](const RtImage& image, const Eigen::Vector3d& at_mm, const RtImage& first,
+           const Eigen::Vector3d& first_mm) -> std::optional<Finding> {
+          const Eigen::Vector3d moved_mm = at_mm - first_mm;
+          if (moved_mm.cwiseAbs().maxCoeff() <= kMaxTableMoveMm) return std::nullopt;
+          return Finding{"table-moved", fmt::format("{}: the table moved by ({:.1f}) mm since {} ({})",
+                                                    image.path.string(), fmt::join(moved_mm, ", "), first.path.string(),
+                                                    described(DCM_TableTopVerticalPosition))};
+        });
+  const auto compare_angle = [&](const std::optional<double> RtImage::*angle, const DcmTagKey& tag) {
+    if (std::ranges::none_of(study.rt_images, [&](const RtImage& image) { return (image.*angle).has_value(); })) return;
+    compare(
+        tag, [&](const RtImage& image) { return image.*angle; },
+        [&](const RtImage& image, double at_deg, const RtImage& first, double first_deg) -> std::optional<Finding> {
+          const double turned_deg = deg_from_rad(wrapped_rad(rad_from_deg(at_deg - first_deg)));
+          if (std::abs(turned_deg) <= kMaxTableTurnDeg) return std::nullopt;
+          return Finding{"table-moved",
+                         fmt::format("{}: the table turned by {:.1f} degrees since {} ({})", image.path.string(),
+                                     turned_deg, first.path.string(), described(tag))};
+        });
+  };
+  compare_angle(&RtImage::support_angle_deg, DCM_PatientSupportAngle);
+  compare_angle(&RtImage::eccentric_angle_deg, DCM_TableTopEccentricAngle);
+  compare_angle(&RtImage::table_pitch_deg, DCM_TableTopPitchAngle);
+  compare_angle(&RtImage::table_roll_deg, DCM_TableTopRollAngle);
+  return findings;
+}
+
+void check_one_patient_position(const Study& study) {
   const RtImage& first = study.rt_images.front();
-  for (const RtImage& image : study.rt_images) {
-    const auto begin = seconds_of(first), end = seconds_of(image);
-    if (begin && end && std::abs(*end - *begin) > kMaxTimeSpanS)
-      findings.push_back({"time-span", fmt::format("{}: taken {:.0f} minutes from {}, expected at most 10 ({})",
-                                                   image.path.string(), std::abs(*end - *begin) / 60.0,
-                                                   first.path.string(), described(DCM_AcquisitionTime))});
-    if (image.table_position_mm && first.table_position_mm &&
-        (*image.table_position_mm - *first.table_position_mm).cwiseAbs().maxCoeff() > kMaxTableMoveMm)
-      findings.push_back(
-          {"table-moved", fmt::format("{}: the table moved by ({:.1f}) mm since {} ({})", image.path.string(),
-                                      fmt::join(*image.table_position_mm - *first.table_position_mm, ", "),
-                                      first.path.string(), described(DCM_TableTopVerticalPosition))});
-    const auto turned = [&](const std::optional<double> RtImage::*angle, const DcmTagKey& tag) {
-      const double change_deg =
-          deg_from_rad(wrapped_rad(rad_from_deg((image.*angle).value_or(0.0) - (first.*angle).value_or(0.0))));
-      if (std::abs(change_deg) > kMaxTableTurnDeg)
-        findings.push_back(
-            {"table-moved", fmt::format("{}: the table turned by {:.1f} degrees since {} ({})", image.path.string(),
-                                        change_deg, first.path.string(), described(tag))});
-    };
-    turned(&RtImage::support_angle_deg, DCM_PatientSupportAngle);
-    turned(&RtImage::eccentric_angle_deg, DCM_TableTopEccentricAngle);
-    turned(&RtImage::table_pitch_deg, DCM_TableTopPitchAngle);
-    turned(&RtImage::table_roll_deg, DCM_TableTopRollAngle);
+  for (const RtImage& image : study.rt_images)
     if (image.patient_position != first.patient_position)
       throw Error(fmt::format("{}: {} is {}, that of {} is {}", image.path.string(), described(DCM_PatientPosition),
                               image.patient_position.value_or("missing"), first.path.string(),
                               first.patient_position.value_or("missing")));
+}
+
+// An X-ray that lies there twice is one view (C.12.1: the UID is the instance's own).
+void drop_repeated_images(std::vector<RtImage>& images, Notes& notes) {
+  for (auto image = images.begin(); image != images.end();) {
+    const auto first = std::find_if(
+        images.begin(), image, [&](const RtImage& other) { return other.sop_instance_uid == image->sop_instance_uid; });
+    if (first == image) {
+      ++image;
+      continue;
+    }
+    notes.left_aside.push_back(fmt::format("{}: the same X-ray as {}", image->path.string(), first->path.string()));
+    image = images.erase(image);
   }
-  return findings;
+}
+
+void check_labels(const RtImageSwitches& switches, const std::vector<RtImage>& images) {
+  for (const auto& [label, angle_deg] : switches.gantry_angle_deg)
+    if (const auto count = std::ranges::count(images, label, &RtImage::label); count != 1)
+      throw UsageError(
+          fmt::format("--gantry-angle {}={}: {} images have this label, expected one", label, angle_deg, count));
 }
 
 void check_nothing_missing(const std::vector<RtImage>& images, std::string refused) {
@@ -234,16 +214,19 @@ void warn_of_planned_couch_angle(const Study& study, const std::vector<RtPlan::B
   }
 }
 
+bool is_inside(const Eigen::VectorXd& position, const Eigen::VectorXd& size) {
+  return (position.array() >= -0.5).all() && (position.array() <= size.array() - 0.5).all();  // false for NaN
+}
+
 void check_isocenter(const Study& study) {
   const Eigen::Vector3d voxel = study.ct.hu.patient_from_voxel.inverse() * study.isocenter_patient_mm;
-  const Eigen::Vector3d last = study.ct.hu.size.cast<double>().array() - 0.5;
-  if ((voxel.array() < -0.5).any() || (voxel.array() > last.array()).any())
+  if (!is_inside(voxel, study.ct.hu.size.cast<double>()))
     throw Error(fmt::format("the isocenter ({:.1f}) mm lies outside the CT ({})",
                             fmt::join(study.isocenter_patient_mm, ", "), described(DCM_IsocenterPosition)));
   for (std::size_t n = 0; n < study.xrays.size(); ++n) {
     const XrayView& view = study.xrays[n].view;
     const auto pixel = view.project(Eigen::Vector3d::Zero());
-    if (!pixel || (pixel->array() < -0.5).any() || pixel->x() > view.columns - 0.5 || pixel->y() > view.rows - 0.5)
+    if (!pixel || !is_inside(*pixel, Eigen::Vector2d(view.columns, view.rows)))
       throw Error(fmt::format("{}: the isocenter is projected outside the image ({}, {})",
                               study.rt_images[n].path.string(), described(DCM_RTImagePosition),
                               described(DCM_XRayImageReceptorTranslation)));
@@ -252,22 +235,16 @@ void check_isocenter(const Study& study) {
 
 }  // namespace
 
-StudyFiles scan_study(const std::vector<fs::path>& paths) {
-  StudyFiles files;
-  for (const fs::path& path : files_below(paths)) sort_in(path, files);
-  return files;
-}
-
 Study load_study(const StudyRequest& request, Notes& notes, const Progress& progress) {
-  const Parts parts = find_parts(request);
+  const StudyParts parts = find_parts(request.parts);
   Study study;
+  notes.left_aside = parts.left_aside;
   if (parts.plan) study.plan = read_rt_plan(*parts.plan);
-  for (const fs::path& path : parts.images)
-    study.rt_images.push_back(with_switches(read_rt_image_header(path), request.switches, notes));
+  for (const std::filesystem::path& path : parts.images) study.rt_images.push_back(read_rt_image_header(path));
+  drop_repeated_images(study.rt_images, notes);
+  check_labels(request.switches, study.rt_images);
+  for (RtImage& image : study.rt_images) image = with_switches(image, request.switches, notes);
   std::ranges::stable_sort(study.rt_images, {}, [](const RtImage& image) { return seconds_of(image); });
-  for (const auto& [label, angle_deg] : request.switches.gantry_angle_deg)
-    if (std::ranges::find(study.rt_images, label, &RtImage::label) == study.rt_images.end())
-      throw UsageError(fmt::format("--gantry-angle {}={}: no image has this label", label, angle_deg));
 
   // A position or isocenter that only the plan has; a switch wins over both.
   std::vector<RtPlan::Beam> beams;
@@ -291,8 +268,9 @@ Study load_study(const StudyRequest& request, Notes& notes, const Progress& prog
   study.ct = read_ct_series(parts.ct, request.allowed, notes, progress);
   findings = patient_findings(study);
   std::ranges::move(plan_findings(study, notes), std::back_inserter(findings));
-  std::ranges::move(session_findings(study), std::back_inserter(findings));
+  std::ranges::move(session_findings(study, notes), std::back_inserter(findings));
   settle(findings, request.allowed, notes);
+  check_one_patient_position(study);
 
   study.patient_position = patient_position_from(study.rt_images.front().patient_position.value()).value();
   study.table = table_angles(study.rt_images.front(), notes);
@@ -303,16 +281,20 @@ Study load_study(const StudyRequest& request, Notes& notes, const Progress& prog
   } else if (study.plan) {
     study.isocenter_patient_mm = common_isocenter(*study.plan, beams);
   } else {
-    throw Error(
-        fmt::format("no RT Plan found ({}), so the planned isocenter is unknown.\n"
-                    "       Name the plan (--plan FILE) or supply the isocenter: --isocenter X,Y,Z",
-                    searched(request)));
+    throw Error(fmt::format(
+        "no RT Plan found ({}), so the planned isocenter is unknown.\n"
+        "       Name the plan (--plan FILE) or supply the isocenter: --isocenter X,Y,Z",
+        request.parts.study.empty() ? "no study folder was given" : "searched " + request.parts.study.string()));
   }
   if (const auto planned = study.plan ? common_patient_position(*study.plan, beams) : std::nullopt;
       planned && *planned != to_string(study.patient_position))
     throw Error(fmt::format("{}: {} is {}, that of {} is {}", study.rt_images.front().path.string(),
                             described(DCM_PatientPosition), to_string(study.patient_position),
                             study.plan->path.string(), *planned));
+  if (!study.ct.patient_position.empty() && study.ct.patient_position != to_string(study.patient_position))
+    notes.warnings.push_back(fmt::format("the CT was scanned in {}, the patient is treated in {} ({})",
+                                         study.ct.patient_position, to_string(study.patient_position),
+                                         described(DCM_PatientPosition)));
   warn_of_planned_couch_angle(study, beams, notes);
   study.planned_room_from_patient =
       planned_room_from_patient(study.patient_position, study.table, study.isocenter_patient_mm);

@@ -1,10 +1,7 @@
 #pragma once
 // From a folder to everything one registration needs, checked: DICOM ends here.
 
-#include <filesystem>
-#include <map>
 #include <optional>
-#include <string>
 #include <vector>
 
 #include "geometry/patient_setup.h"
@@ -13,32 +10,13 @@
 #include "io/notes.h"
 #include "io/rt_image.h"
 #include "io/rt_plan.h"
+#include "io/study_files.h"
 
 namespace isoshift {
 
-// The files below some paths, sorted by what they are.
-struct StudyFiles {
-  struct LeftAside {
-    std::filesystem::path path;
-    std::string reason;
-  };
-  std::map<std::string, std::vector<std::filesystem::path>> ct_series;  // by SeriesInstanceUID
-  std::vector<std::filesystem::path> rt_images;
-  std::vector<std::filesystem::path> rt_plans;
-  std::vector<std::filesystem::path> rt_structures;
-  std::vector<LeftAside> left_aside;
-};
-
-// Reads the headers of all files below `paths` (files or folders), in the order of their names. A file that is no DICOM
-// is left aside; one that begins as DICOM and cannot be read is an Error.
-StudyFiles scan_study(const std::vector<std::filesystem::path>& paths);
-
 // What to register and what a person supplies or allows.
 struct StudyRequest {
-  std::filesystem::path study;                // a folder (or file) searched for all parts not named below
-  std::vector<std::filesystem::path> ct;      // folders or files of the CT
-  std::vector<std::filesystem::path> images;  // RT Images
-  std::optional<std::filesystem::path> plan;
+  NamedParts parts;
   std::optional<Eigen::Vector3d> isocenter_patient_mm;
   RtImageSwitches switches;
   Allowances allowed;

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <random>
+#include <set>
 
 #include "geometry/error.h"
 #include "geometry/patient_setup.h"
@@ -274,7 +275,15 @@ void PhantomOptions::check() const {
   if (image_pixels < 64 || image_pixels > 2048)
     throw UsageError(fmt::format("{} image pixels are not within 64 to 2048", image_pixels));
   if (gantry_angles_deg.empty() || gantry_angles_deg.size() > 6) throw UsageError("1 to 6 gantry angles are needed");
-  if (!(photons >= 0.0)) throw UsageError(fmt::format("{} photons: expected 0 or more", photons));
+  std::set<std::string> labels;
+  for (const double angle_deg : gantry_angles_deg)
+    if (!std::isfinite(angle_deg) || !labels.insert(image_label(angle_deg)).second)
+      throw UsageError(fmt::format("gantry angle {}: expected finite angles, a degree or more apart", angle_deg));
+  if (!placement.translation_mm.allFinite() || !placement.rotation_deg.allFinite() ||
+      !std::isfinite(placement.couch_angle_deg))
+    throw UsageError("the setup error and the couch angle must be finite numbers");
+  if (!(photons >= 0.0 && std::isfinite(photons)))
+    throw UsageError(fmt::format("{} photons: expected 0 or more", photons));
 }
 
 std::vector<Shape> phantom_shapes(const PhantomOptions& options) {

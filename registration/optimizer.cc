@@ -1,5 +1,6 @@
 #include "registration/optimizer.h"
 
+#include <exception>
 #include <nlopt.hpp>
 
 namespace isoshift {
@@ -31,17 +32,25 @@ OptimizerResult maximize(const std::function<double(std::span<const double>)>& o
   struct Call {
     const std::function<double(std::span<const double>)>& objective;
     int& evaluations;
-  } call{objective, result.evaluations};
+    std::exception_ptr failure;  // nlopt would replace it by one of its own
+  } call{objective, result.evaluations, nullptr};
   bobyqa.set_max_objective(
       [](const std::vector<double>& x, std::vector<double>&, void* data) {
-        const auto& [function, evaluations] = *static_cast<Call*>(data);
+        auto& [function, evaluations, failure] = *static_cast<Call*>(data);
         ++evaluations;
-        return function(x);
+        try {
+          return function(x);
+        } catch (...) {
+          failure = std::current_exception();
+          throw nlopt::forced_stop();
+        }
       },
       &call);
   result.best = options.start;
   try {
     result.termination = reason(bobyqa.optimize(result.best, result.value));
+  } catch (const nlopt::forced_stop&) {
+    std::rethrow_exception(call.failure);
   } catch (const nlopt::roundoff_limited&) {
     result.value = bobyqa.last_optimum_value();  // `best` holds the best point so far
     result.termination = "limited by round-off";

@@ -91,6 +91,7 @@ std::vector<Stage> RegistrationOptions::default_stages() {
       {.name = "coarse", .pixel_mm = 5.0, .initial_step_mm = 8.0, .initial_step_rad = 0.06, .relative_tolerance = 0.02},
       {.name = "medium",
        .pixel_mm = 2.5,
+       .pixel_fraction = 0.5,
        .initial_step_mm = 1.5,
        .initial_step_rad = 0.015,
        .relative_tolerance = 0.02},
@@ -141,7 +142,8 @@ RegistrationResult register_views(Renderer& renderer, std::span<const XrayImage>
                              .similarity = std::string(to_string(stage.similarity)),
                              .evaluations = found.evaluations,
                              .seconds = seconds_since(stage_begin),
-                             .termination = found.termination});
+                             .termination = found.termination,
+                             .reached_limit = found.evaluations >= stage.max_evaluations});
     if (progress) progress(static_cast<double>(n + 1) / static_cast<double>(options.stages.size()));
   }
   result.actual_room_from_patient = setup_error_from_parameters(parameters) * planned_room_from_patient;

@@ -53,6 +53,7 @@ struct StageReport {
   int evaluations = 0;
   double seconds = 0.0;
   std::string termination = "not run";
+  bool reached_limit = false;  // the evaluations ran out before the search converged
 };
 
 // Normalized cross correlation of one view over its whole field, at the resolution of the last stage.

@@ -38,7 +38,8 @@ RenderResult CpuRenderer::render(std::span<const XrayView> views, std::span<cons
       tbb::parallel_for(tbb::blocked_range<std::size_t>(0, count, 256), [&](const auto& range) {
         for (std::size_t n = range.begin(); n != range.end(); ++n) {
           const auto pixel = list ? list[n] : static_cast<std::uint32_t>(n);
-          drr[n] = static_cast<float>(integrate(ray_to(pixel, views[v].columns, camera, mm_from_voxel_axes), views[v].beam));
+          drr[n] =
+              static_cast<float>(integrate(ray_to(pixel, views[v].columns, camera, mm_from_voxel_axes), views[v].beam));
         }
       });
     }
@@ -47,6 +48,7 @@ RenderResult CpuRenderer::render(std::span<const XrayView> views, std::span<cons
 }
 
 std::optional<RaySegment> clip_to_box(const VoxelRay& ray, const Eigen::Vector3d& low, const Eigen::Vector3d& high) {
+  if (!ray.source.allFinite() || !ray.way.allFinite()) return std::nullopt;
   RaySegment segment{.begin = 0.0, .end = 1.0};
   for (int axis = 0; axis < 3; ++axis) {
     if (ray.way[axis] == 0.0) {

@@ -29,7 +29,8 @@ inline float sample(const float* voxels, std::ptrdiff_t row, std::ptrdiff_t slic
 
 }  // namespace
 
-RaycastCpuRenderer::RaycastCpuRenderer(const Volume<float>& ct_hu, const AttenuationModel& model, std::span<const Beam> beams)
+RaycastCpuRenderer::RaycastCpuRenderer(const Volume<float>& ct_hu, const AttenuationModel& model,
+                                       std::span<const Beam> beams)
     : CpuRenderer(ct_hu), step_mm_(ct_hu.spacing_mm().minCoeff()) {
   for (const Beam beam : beams) volumes_.emplace(beam, pad(ct_hu, model, beam));
 }

@@ -27,14 +27,12 @@ bool has_word(const char* list, const char* word) {
 }
 
 // Extensions of EGL itself, before there is a display.
-bool has_client_extension(const char* name) {
-  return has_word(eglQueryString(EGL_NO_DISPLAY, EGL_EXTENSIONS), name);
-}
+bool has_client_extension(const char* name) { return has_word(eglQueryString(EGL_NO_DISPLAY, EGL_EXTENSIONS), name); }
 
 std::vector<EGLDeviceEXT> hardware_devices() {
-  const bool can_enumerate = has_client_extension("EGL_EXT_device_base") ||
-                             (has_client_extension("EGL_EXT_device_enumeration") &&
-                              has_client_extension("EGL_EXT_device_query"));
+  const bool can_enumerate =
+      has_client_extension("EGL_EXT_device_base") ||
+      (has_client_extension("EGL_EXT_device_enumeration") && has_client_extension("EGL_EXT_device_query"));
   if (!can_enumerate || !has_client_extension("EGL_EXT_platform_device")) return {};
   std::array<EGLDeviceEXT, 32> all{};
   EGLint count = 0;
@@ -79,10 +77,9 @@ struct GlContext::Handles {
     EGLConfig config = nullptr;
     EGLint configs = 0;
     if (!eglChooseConfig(display, config_attributes.data(), &config, 1, &configs) || configs < 1) config = nullptr;
-    const std::array<EGLint, 7> attributes = {EGL_CONTEXT_MAJOR_VERSION,       4,
-                                              EGL_CONTEXT_MINOR_VERSION,       5,
-                                              EGL_CONTEXT_OPENGL_PROFILE_MASK, EGL_CONTEXT_OPENGL_CORE_PROFILE_BIT,
-                                              EGL_NONE};
+    const std::array<EGLint, 7> attributes = {
+        EGL_CONTEXT_MAJOR_VERSION,           4,       EGL_CONTEXT_MINOR_VERSION, 5, EGL_CONTEXT_OPENGL_PROFILE_MASK,
+        EGL_CONTEXT_OPENGL_CORE_PROFILE_BIT, EGL_NONE};
     context = eglCreateContext(display, config, EGL_NO_CONTEXT, attributes.data());
     if (context == EGL_NO_CONTEXT || !eglMakeCurrent(display, EGL_NO_SURFACE, EGL_NO_SURFACE, context))
       return "it has no OpenGL 4.5";
@@ -130,9 +127,9 @@ void GlContext::make_current() const {
 
 void GlContext::check(const char* doing) const {
   if (const GLenum error = glGetError(); error != GL_NO_ERROR)
-    throw Error(fmt::format("{}: {}{}.{}", renderer_, doing,
-                            error == GL_OUT_OF_MEMORY ? ": out of its memory" : fmt::format(": OpenGL error {:#x}", error),
-                            kInstead));
+    throw Error(fmt::format(
+        "{}: {}{}.{}", renderer_, doing,
+        error == GL_OUT_OF_MEMORY ? ": out of its memory" : fmt::format(": OpenGL error {:#x}", error), kInstead));
 }
 
 std::vector<std::string> describe_gl_devices() {

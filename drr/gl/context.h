@@ -12,7 +12,8 @@ namespace isoshift {
 // A current OpenGL 4.5 core context without a window. One thread at a time; make_current() before use.
 class GlContext {
  public:
-  // Throws Error saying why there is none, and what to use instead: no EGL library, no device of that kind, no OpenGL 4.5.
+  // Throws Error saying why there is none, and what to use instead: no EGL library, no device of that kind, no
+  // OpenGL 4.5.
   explicit GlContext(GlDevice device);
   ~GlContext();
   GlContext(const GlContext&) = delete;

@@ -59,9 +59,10 @@ Texture3d::Texture3d(const Eigen::Vector3i& size, std::span<const float> voxels)
   GLint limit = 0;
   glGetIntegerv(GL_MAX_3D_TEXTURE_SIZE, &limit);
   if (size.maxCoeff() > limit)
-    throw Error(fmt::format("a CT of {} x {} x {} voxels is too large for this OpenGL, whose limit is {} along each edge.\n"
-                            "       Use --renderer cpu, which has no such limit",
-                            size.x(), size.y(), size.z(), limit));
+    throw Error(
+        fmt::format("a CT of {} x {} x {} voxels is too large for this OpenGL, whose limit is {} along each edge.\n"
+                    "       Use --renderer cpu, which has no such limit",
+                    size.x(), size.y(), size.z(), limit));
   glTextureStorage3D(name_.get(), 1, GL_R32F, size.x(), size.y(), size.z());
   for (const GLenum filter : {GL_TEXTURE_MIN_FILTER, GL_TEXTURE_MAG_FILTER})
     glTextureParameteri(name_.get(), filter, GL_LINEAR);

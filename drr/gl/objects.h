@@ -1,9 +1,9 @@
 #pragma once
 // Move-only OpenGL objects: a buffer, a 3D texture, a compute program. All need a current GlContext, at their end too.
 
+#include <Eigen/Core>
 #include <cstddef>
 #include <cstdint>
-#include <Eigen/Core>
 #include <glm/mat4x4.hpp>
 #include <span>
 #include <string>

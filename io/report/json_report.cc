@@ -81,6 +81,7 @@ std::string json_report(const SetupReport& report) {
                {"threshold_hu", report.threshold_hu},
                {"renderer", report.renderer},
                {"device", report.device}};
+  json["window_hu"] = report.window_hu ? array_of(*report.window_hu) : Json(nullptr);
   int evaluations = 0;
   Json images = Json::array();
   for (const SetupReport::View& view : report.views) {
@@ -108,6 +109,7 @@ std::string json_report(const SetupReport& report) {
                         {"spatial_registration", or_null(report.spatial_registration_uid)}};
   json["overrides"] = report.overrides;
   json["warnings"] = report.warnings;
+  json["left_aside"] = report.left_aside;
   // Text from files may hold bytes that are no UTF-8; they are replaced, never a reason to lose a result.
   return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }

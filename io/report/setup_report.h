@@ -48,13 +48,14 @@ struct SetupReport {
   std::uint64_t seed = 1;
   std::string attenuation;
   double threshold_hu = 0.0;
+  std::optional<std::array<double, 2>> window_hu;  // low, high; where attenuation is windowed
   std::string renderer, device;
   double seconds_load = 0.0, seconds_register = 0.0, seconds_total = 0.0;
 
   std::string ct_series_uid;
   std::string plan_uid;                  // empty: there was no plan
   std::string spatial_registration_uid;  // empty: none was written
-  std::vector<std::string> overrides, warnings;
+  std::vector<std::string> overrides, warnings, left_aside;
 };
 
 // What may be shown of the result: components along an unobservable direction are absent, and without a shift

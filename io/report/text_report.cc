@@ -83,9 +83,9 @@ std::string text_report(const SetupReport& report) {
   if (shown.withheld)
     text += "  withheld: the result was rejected\n";
   else
-    text += couch_rows(shown) +
-            fmt::format("  IEC table angles after the move: yaw {:.1f}, pitch {:.1f}, roll {:.1f} deg\n",
-                        shown.couch_target_deg[0], shown.couch_target_deg[1], shown.couch_target_deg[2]);
+    text += couch_rows(shown) + fmt::format("  IEC table angles after the move: yaw {}, pitch {}, roll {} deg\n",
+                                            rounded(shown.couch_target_deg[0]), rounded(shown.couch_target_deg[1]),
+                                            rounded(shown.couch_target_deg[2]));
 
   text += "\nSETUP ERROR         (where the patient lies, against the plan)\n";
   if (shown.withheld)

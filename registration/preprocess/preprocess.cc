@@ -1,10 +1,13 @@
 #include "registration/preprocess/preprocess.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <opencv2/imgproc.hpp>
 
+#include "geometry/error.h"
 #include "geometry/rotation.h"
 
 namespace isoshift {
@@ -124,7 +127,6 @@ Image<float> line_integrals(const XrayImage& xray) {
   if (xray.meaning == XrayImage::Meaning::kLineIntegral) return xray.values;
   Image<float> result(xray.values.columns, xray.values.rows);
   const float brightest = *std::ranges::max_element(xray.values.pixels);
-  if (!(brightest > 0.0F)) return result;
   // A dead or blocked pixel has no logarithm; a millionth of the maximum is below anything a receptor resolves.
   const float darkest = brightest * 1e-6F;
   std::ranges::transform(xray.values.pixels, result.pixels.begin(),
@@ -195,6 +197,13 @@ FixedImage reduced(const FixedImage& image, int factor) {
 }
 
 FixedImage prepare(const XrayImage& xray) {
+  const auto [darkest, brightest] = std::ranges::minmax(xray.values.pixels);
+  const bool is_intensity = xray.meaning == XrayImage::Meaning::kIntensity;
+  if (!(brightest > darkest) || (is_intensity && !(brightest > 0.0F)))
+    throw Error(
+        fmt::format("{}: the X-ray is blank: its {} run from {} to {} (check the pixel intensity relationship and its "
+                    "sign)",
+                    xray.label, is_intensity ? "intensities" : "line integrals", darkest, brightest));
   FixedImage image;
   image.view = xray.view;
   image.line_integral = line_integrals(xray);

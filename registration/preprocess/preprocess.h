@@ -26,7 +26,7 @@ struct FixedImage {
 };
 FixedImage reduced(const FixedImage& image, int factor);
 
-// The whole way for one X-ray, at full resolution.
+// The whole way for one X-ray, at full resolution. Throws Error for a blank one.
 FixedImage prepare(const XrayImage& xray);
 
 }  // namespace isoshift

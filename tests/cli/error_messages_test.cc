@@ -50,9 +50,9 @@ TEST_F(ErrorMessagesTest, TwoCtSeries) {
   for (const int k : {0, 1, 2}) edit(study_.ct_slice(k), [](DicomItem d) { d.put(DCM_SeriesInstanceUID, "1.2.3"); });
   const CommandOutcome outcome = register_study();
   EXPECT_EQ(outcome.exit_status, 1);
-  EXPECT_THAT(outcome.err,
-              StartsWith("error: 2 CT series found, expected one:\n       3 slices, series 1.2.3, first file " +
-                         where(study_.ct_slice(0)) + "\n"));
+  EXPECT_THAT(outcome.err, StartsWith("error: 2 CT series found, and the plan does not tell which one it was made "
+                                      "on:\n       3 slices, series 1.2.3, first file " +
+                                      where(study_.ct_slice(0)) + "\n"));
   EXPECT_THAT(outcome.err, testing::EndsWith("\n       Name the planning CT: --ct FOLDER\n"));
 }
 
@@ -113,6 +113,29 @@ TEST_F(ErrorMessagesTest, DifferentPatients) {
   const std::string message = fmt::format(
       "{}: PatientID (0010,0020) differs from the CT's: the inputs are of different patients", where(study_.image(0)));
   expect_error(message + "\n       If that is known to be right, allow it: --allow patient-mismatch=REASON");
+}
+
+TEST_F(ErrorMessagesTest, PatientsWithoutAnId) {
+  for (const auto& path : {study_.image(0), study_.image(1)}) edit(path, [](DicomItem d) { d.put(DCM_PatientID, ""); });
+  const CommandOutcome outcome = register_study();
+  EXPECT_EQ(outcome.exit_status, 1);
+  EXPECT_THAT(outcome.err,
+              HasSubstr(where(study_.image(0)) + ": PatientID (0010,0020) is empty in this file or in the CT"));
+}
+
+TEST_F(ErrorMessagesTest, PatientsOfDifferentNames) {
+  edit(study_.image(1), [](DicomItem d) { d.put(DCM_PatientName, "Other^Person"); });
+  const CommandOutcome outcome = register_study();
+  EXPECT_EQ(outcome.exit_status, 1);
+  EXPECT_THAT(outcome.err, HasSubstr(": PatientName (0010,0010) differs from the CT's"));
+  EXPECT_THAT(outcome.err, testing::Not(HasSubstr("Other^Person")));
+}
+
+TEST_F(ErrorMessagesTest, BlankXray) {
+  edit(study_.image(0), [](DicomItem d) { d.put_pixels(std::vector<std::uint16_t>(96 * 96, 0)); });
+  const CommandOutcome outcome = register_study();
+  EXPECT_EQ(outcome.exit_status, 1);
+  EXPECT_THAT(outcome.err, HasSubstr("KV_G000: the X-ray is blank: its intensities run from 0 to 0"));
 }
 
 TEST_F(ErrorMessagesTest, ImageAndPlanThatDoNotBelongTogether) {
@@ -216,13 +239,20 @@ TEST_F(ErrorMessagesTest, UsageErrorsHaveTheirOwnStatus) {
   EXPECT_EQ(register_study({"--gantry-angle", "KV_G000=north"}).exit_status, 2);
   EXPECT_EQ(register_study({"--gantry-angle", "NOBODY=0"}).exit_status, 2);
   EXPECT_EQ(register_study({"--attenuation", "windowed", "--window", "100,-100"}).exit_status, 2);
+  EXPECT_EQ(register_study({"--gantry-angle", "KV_G000=nan"}).exit_status, 2);
+  EXPECT_EQ(register_study({"--couch-angle", "nan"}).exit_status, 2);
+  EXPECT_EQ(register_study({"--isocenter", "nan,nan,nan"}).exit_status, 2);
+  EXPECT_EQ(register_study({"--sid", "inf"}).exit_status, 2);
+  EXPECT_EQ(register_study({"--seed", "-1"}).exit_status, 2);
+  EXPECT_EQ(run_command({"register", "-o", where(study_.output())}).exit_status, 2);
+  EXPECT_EQ(run_command({"register", where(study_.path()), "-o", ""}).exit_status, 2);
 }
 
 TEST_F(ErrorMessagesTest, AnEmptyDrrIsAnError) {
   const CommandOutcome outcome =
       run_command({"drr", study_.path().string(), "-o", study_.output().string(), "--threshold-hu", "9000"});
   EXPECT_EQ(outcome.exit_status, 1);
-  EXPECT_EQ(outcome.err, "error: KV_G000: the DRR is empty: no ray meets anything above the threshold in the CT\n");
+  EXPECT_THAT(outcome.err, testing::EndsWith("error: KV_G000: the DRR is empty: no ray meets anything above the threshold in the CT\n"));
   EXPECT_FALSE(std::filesystem::exists(study_.output()));
 }
 

@@ -46,6 +46,8 @@ TEST(PhantomCommand, RefusesNonsense) {
   TemporaryFolder folder;
   EXPECT_EQ(make_phantom(folder / "a", {"--patient-position", "HFX"}).exit_status, 2);
   EXPECT_EQ(make_phantom(folder / "a", {"--photons", "-1"}).exit_status, 2);
+  EXPECT_EQ(make_phantom(folder / "a", {"--translation", "nan,0,0"}).exit_status, 2);
+  EXPECT_EQ(make_phantom(folder / "a", {"--gantry-angles", "30.2,30.4"}).exit_status, 2);
   EXPECT_FALSE(std::filesystem::exists(folder / "a"));
 }
 

@@ -76,7 +76,7 @@ TEST_F(RegisterCommandTest, OneViewIsReviewWithoutDepthAndWithoutRegistrationObj
 }
 
 TEST_F(RegisterCommandTest, AReviewedResultIsWrittenOnlyOnRequestAndMarked) {
-  // The patient of another seed: the skull matches poorly.
+  // The X-rays of a head against the CT of a spine.
   SmallStudy other([] {
     PhantomOptions options = small_phantom();
     options.anatomy = PhantomOptions::Anatomy::kSpine;
@@ -98,6 +98,35 @@ TEST_F(RegisterCommandTest, AllowedFindingsAreInTheResult) {
   edit(study_.image(1), [](DicomItem d) { d.put(DCM_AcquisitionTime, "104500"); });
   EXPECT_EQ(register_study({"--allow", "time-span=phantom does not move"}).exit_status, 0);
   EXPECT_THAT(result()["overrides"][0].get<std::string>(), HasSubstr("(allowed by time-span: phantom does not move)"));
+}
+
+TEST_F(RegisterCommandTest, TheSameXrayTwiceIsOneView) {
+  std::filesystem::copy(study_.image(0), study_.path() / "RTIMAGE" / "again.dcm");
+  const CommandOutcome outcome = register_study();
+  EXPECT_EQ(result()["views"].size(), 2U);
+  EXPECT_THAT(outcome.err, HasSubstr("left aside: "));
+  EXPECT_THAT(result()["left_aside"].dump(), HasSubstr("the same X-ray as"));
+}
+
+TEST_F(RegisterCommandTest, AViewWithoutATimeIsWarnedOfAndDoesNotHideTheOthers) {
+  edit(study_.image(0), [](DicomItem d) {
+    d.erase(DCM_AcquisitionTime);
+    d.erase(DCM_ContentTime);
+  });
+  register_study();
+  EXPECT_THAT(result()["warnings"].dump(), HasSubstr("KV_G000: AcquisitionTime (0008,0032) is missing"));
+}
+
+TEST_F(RegisterCommandTest, LabelsCannotForgeLines) {
+  edit(study_.image(0), [](DicomItem d) { d.put(DCM_RTImageLabel, "A\nVERDICT"); });
+  edit(study_.image(1), [](DicomItem d) {
+    d.put(DCM_RTImageLabel, "B\nerror: forged");
+    d.erase(DCM_AcquisitionTime);
+    d.erase(DCM_ContentTime);
+  });
+  const CommandOutcome outcome = register_study();
+  EXPECT_THAT(outcome.err, testing::Not(HasSubstr("\nerror: forged")));
+  EXPECT_THAT(outcome.out, HasSubstr("A VERDICT"));
 }
 
 TEST_F(RegisterCommandTest, LogsHoldNoPatientName) {

@@ -49,18 +49,54 @@ TEST(OutputFolder, RefusesAFolderThatHoldsSomething) {
   EXPECT_EQ(content(folder / "precious.txt"), "keep me");
 }
 
-TEST(OutputFolder, OverwritingKeepsWhatIsNotOursAndDropsWhatIsObsolete) {
+TEST(OutputFolder, OverwritingReplacesAnEarlierOutputAsAWhole) {
   TemporaryFolder folder;
-  std::filesystem::create_directory(folder / "out");
-  std::ofstream(folder / "out" / "note.txt") << "mine";
-  std::ofstream(folder / "out" / "result.json") << "old";
-  std::ofstream(folder / "out" / "spatial_registration.dcm") << "old";
-  OutputFolder output(folder / "out", true, {"result.json", "spatial_registration.dcm"});
+  {
+    OutputFolder earlier(folder / "out", false);
+    write_text(earlier.path() / "result.json", "old");
+    write_text(earlier.path() / "spatial_registration.dcm", "old");
+    earlier.commit();
+  }
+  OutputFolder output(folder / "out", true);
   write_text(output.path() / "result.json", "new");
+  EXPECT_EQ(content(folder / "out" / "result.json"), "old");
   output.commit();
-  EXPECT_EQ(content(folder / "out" / "note.txt"), "mine");
   EXPECT_EQ(content(folder / "out" / "result.json"), "new");
   EXPECT_FALSE(std::filesystem::exists(folder / "out" / "spatial_registration.dcm"));
+  EXPECT_EQ(entries(folder.path()), 1);
+}
+
+TEST(OutputFolder, OverwritingSparesWhatItDidNotWrite) {
+  TemporaryFolder folder;
+  {
+    OutputFolder earlier(folder / "out", false);
+    write_text(earlier.path() / "result.json", "old");
+    earlier.commit();
+  }
+  std::ofstream(folder / "out" / "note.txt") << "mine";
+  try {
+    OutputFolder(folder / "out", true);
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_THAT(error.what(), testing::HasSubstr("note.txt: was not written by isoshift"));
+  }
+  EXPECT_EQ(content(folder / "out" / "note.txt"), "mine");
+  EXPECT_EQ(content(folder / "out" / "result.json"), "old");
+}
+
+TEST(OutputFolder, DoesNotReplaceWhatAppearedMeanwhile) {
+  TemporaryFolder folder;
+  OutputFolder output(folder / "out", false);
+  std::filesystem::create_directory(folder / "out");
+  std::ofstream(folder / "out" / "note.txt") << "mine";
+  EXPECT_THROW(output.commit(), Error);
+  EXPECT_EQ(content(folder / "out" / "note.txt"), "mine");
+}
+
+TEST(OutputFolder, TakesTheParentsItMadeAwayAgain) {
+  TemporaryFolder folder;
+  { OutputFolder output(folder / "a" / "b" / "out", false); }
+  EXPECT_EQ(entries(folder.path()), 0);
 }
 
 }  // namespace

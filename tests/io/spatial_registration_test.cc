@@ -46,7 +46,7 @@ class SpatialRegistrationFileTest : public testing::Test {
  protected:
   Study load() {
     StudyRequest request;
-    request.study = small_.path();
+    request.parts.study = small_.path();
     return load_study(request, notes_, {});
   }
 

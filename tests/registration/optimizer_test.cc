@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include <stdexcept>
+#include "geometry/error.h"
 
 namespace isoshift {
 namespace {
@@ -35,8 +35,12 @@ TEST(Optimizer, SaysWhenTheEvaluationsRanOut) {
 }
 
 TEST(Optimizer, LetsTheObjectivesExceptionsThrough) {
-  EXPECT_THROW(maximize([](auto) -> double { throw std::runtime_error("no DRR"); }, two_parameters()),
-               std::runtime_error);
+  try {
+    maximize([](auto) -> double { throw Error("no DRR"); }, two_parameters());
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_STREQ(error.what(), "no DRR");
+  }
 }
 
 }  // namespace

@@ -3,6 +3,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <limits>
+
 #include "tests/drr/test_views.h"
 #include "tests/support/pose_near.h"
 
@@ -16,6 +18,7 @@ RegistrationResult good_result() {
   RegistrationResult result;
   result.views = {{.similarity_start = 0.8, .similarity_final = 0.97},
                   {.similarity_start = 0.7, .similarity_final = 0.95}};
+  result.stages = {{.name = "fine", .similarity = "gradient-correlation", .evaluations = 40}};
   return result;
 }
 
@@ -43,6 +46,27 @@ TEST(Quality, AViewThatGotWorseNeedsReview) {
   judge(kInside, {}, result);
   EXPECT_EQ(result.verdict, Verdict::kReview);
   EXPECT_THAT(result.reasons, ElementsAre(HasSubstr("view 2 matches worse")));
+}
+
+TEST(Quality, ASearchThatRanOutOfEvaluationsNeedsReview) {
+  RegistrationResult result = good_result();
+  result.stages.back().reached_limit = true;
+  judge(kInside, {}, result);
+  EXPECT_THAT(result.reasons, ElementsAre(HasSubstr("did not converge")));
+}
+
+TEST(Quality, ASimilarityThatIsNoNumberNeedsReview) {
+  RegistrationResult result = good_result();
+  result.views[0].similarity_final = std::numeric_limits<double>::quiet_NaN();
+  judge(kInside, {}, result);
+  EXPECT_EQ(result.verdict, Verdict::kReview);
+}
+
+TEST(Quality, ALittleLessInOneViewIsNoise) {
+  RegistrationResult result = good_result();
+  result.views[1] = {.similarity_start = 0.952, .similarity_final = 0.95};
+  judge(kInside, {}, result);
+  EXPECT_EQ(result.verdict, Verdict::kAccepted);
 }
 
 TEST(Quality, APoorMatchNeedsReview) {
@@ -76,6 +100,8 @@ TEST(Quality, ViewsThirtyDegreesApartSeeAllAxes) {
   EXPECT_TRUE(unobservable_directions(apart).empty());
   const std::array close = {centered_view(0, 10, 1.0), centered_view(29, 10, 1.0)};
   EXPECT_EQ(unobservable_directions(close).size(), 1U);
+  const std::array around = {centered_view(0, 10, 1.0), centered_view(20, 10, 1.0), centered_view(340, 10, 1.0)};
+  EXPECT_TRUE(unobservable_directions(around).empty());  // the outer two are 40 degrees apart
 }
 
 }  // namespace

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "geometry/couch_shift.h"
+#include "geometry/error.h"
 #include "geometry/patient_setup.h"
 #include "phantom/study_writer.h"
 #include "tests/drr/test_views.h"
@@ -19,12 +20,14 @@ struct Scene {
 };
 
 // X-rays by ray-shape intersections on one side, the program's own geometry on the other.
-Scene make_scene(PatientPosition position, double couch_deg, const std::vector<double>& gantry_angles_deg) {
+Scene make_scene(PatientPosition position, double couch_deg, const std::vector<double>& gantry_angles_deg,
+                 const Eigen::Vector3d& translation_mm = {-6.2, 4.7, 5.9},
+                 const Eigen::Vector3d& rotation_deg = {-1.6, 2.2, -1.3}) {
   Placement placement;
   placement.patient_position = to_string(position);
   placement.couch_angle_deg = couch_deg;
-  placement.translation_mm = Eigen::Vector3d(-6.2, 4.7, 5.9);
-  placement.rotation_deg = Eigen::Vector3d(-1.6, 2.2, -1.3);
+  placement.translation_mm = translation_mm;
+  placement.rotation_deg = rotation_deg;
   const std::vector<Shape> shapes = head_phantom(Eigen::Vector3d::Zero(), 5);
   Scene scene;
   for (const double gantry_deg : gantry_angles_deg) {
@@ -63,11 +66,35 @@ TEST(RegisterViews, RecoversFromObliqueAndFromThreeViews) {
   }
 }
 
+TEST(RegisterViews, APatientExactlyOnPlanIsAccepted) {
+  Scene scene = make_scene(PatientPosition::kHfs, 0.0, {0.0, 90.0}, Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero());
+  const auto result = register_views(*scene.renderer, scene.xrays, scene.planned, {});
+  EXPECT_THAT(setup_error_from_poses(scene.planned, result.actual_room_from_patient), PoseNear(scene.truth, 0.3, 0.2));
+  EXPECT_EQ(result.verdict, Verdict::kAccepted) << testing::PrintToString(result.reasons);
+}
+
+TEST(RegisterViews, ABlankXrayIsAnError) {
+  Scene scene = make_scene(PatientPosition::kHfs, 0.0, {0.0, 90.0});
+  std::ranges::fill(scene.xrays[1].values.pixels, 0.0F);
+  scene.xrays[1].label = "DARK";
+  try {
+    register_views(*scene.renderer, scene.xrays, scene.planned, {});
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_THAT(error.what(), testing::HasSubstr("DARK: the X-ray is blank"));
+  }
+}
+
 TEST(RegisterViews, SameSeedSamePose) {
   Scene scene = make_scene(PatientPosition::kHfs, 0.0, {0.0, 90.0});
   const auto first = register_views(*scene.renderer, scene.xrays, scene.planned, {});
   const auto second = register_views(*scene.renderer, scene.xrays, scene.planned, {});
   EXPECT_EQ(first.actual_room_from_patient.matrix(), second.actual_room_from_patient.matrix());
+  RegistrationOptions other_seed;
+  other_seed.seed = 2;
+  const auto third = register_views(*scene.renderer, scene.xrays, scene.planned, other_seed);
+  EXPECT_NE(first.actual_room_from_patient.matrix(), third.actual_room_from_patient.matrix());  // the seed is used
+  EXPECT_THAT(third.actual_room_from_patient, PoseNear(first.actual_room_from_patient, 0.1, 0.05));
 }
 
 TEST(RegisterViews, TranslationOnlyLeavesTheRotationAlone) {

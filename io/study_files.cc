@@ -1,0 +1,208 @@
+#include "io/study_files.h"
+
+#include <dcmtk/dcmdata/dcuid.h>
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "geometry/error.h"
+#include "io/dicom_dataset.h"
+
+namespace isoshift {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::vector<fs::path> files_below(const std::vector<fs::path>& paths) {
+  std::set<fs::path> files;
+  for (const fs::path& path : paths) {
+    std::error_code error;
+    const auto status = fs::status(path, error);
+    if (!fs::exists(status)) throw Error(fmt::format("{}: no such file or folder", path.string()));
+    if (!fs::is_directory(status)) {
+      files.insert(path);
+      continue;
+    }
+    for (auto entry = fs::recursive_directory_iterator(path, error); !error && entry != fs::end(entry);
+         entry.increment(error))
+      if (entry->is_regular_file()) files.insert(entry->path());
+    if (error) throw Error(fmt::format("{}: cannot be searched: {}", path.string(), error.message()));
+  }
+  return {files.begin(), files.end()};
+}
+
+std::string first_reference(const DicomItem& dataset, const DcmTagKey& sequence) {
+  for (const DicomItem& item : dataset.items(sequence)) return item.text(DCM_ReferencedSOPInstanceUID).value_or("");
+  return "";
+}
+
+// The series that a structure set was drawn on (PS3.3 C.8.8.5).
+std::set<std::string> drawn_on(const DicomItem& structures) {
+  std::set<std::string> series_uids;
+  for (const DicomItem& frame : structures.items(DCM_ReferencedFrameOfReferenceSequence))
+    for (const DicomItem& study : frame.items(DCM_RTReferencedStudySequence))
+      for (const DicomItem& series : study.items(DCM_RTReferencedSeriesSequence))
+        if (const auto uid = series.text(DCM_SeriesInstanceUID)) series_uids.insert(*uid);
+  return series_uids;
+}
+
+void add_ct_slice(const fs::path& path, const DicomItem& dataset, StudyFiles& files) {
+  const auto type = dataset.texts(DCM_ImageType);
+  if (type.size() > 2 && type[2] == "LOCALIZER") {
+    files.left_aside.push_back(fmt::format("{}: a CT localizer", path.string()));
+    return;
+  }
+  const std::string series_uid = dataset.required_text(DCM_SeriesInstanceUID);
+  auto ct = std::ranges::find(files.cts, series_uid, &StudyFiles::Ct::series_instance_uid);
+  if (ct == files.cts.end()) {
+    files.cts.push_back({.series_instance_uid = series_uid,
+                         .frame_of_reference_uid = dataset.text(DCM_FrameOfReferenceUID).value_or("")});
+    ct = files.cts.end() - 1;
+  }
+  ct->files.push_back(path);
+}
+
+void add(const fs::path& path, StudyFiles& files) {
+  if (!has_dicom_magic(path)) {
+    files.left_aside.push_back(fmt::format("{}: not a DICOM file", path.string()));
+    return;
+  }
+  const DicomFile file = DicomFile::read(path, DicomFile::Extent::kHeader);
+  const DicomItem dataset = file.dataset();
+  const std::string sop_class = dataset.text(DCM_SOPClassUID).value_or("");
+  if (sop_class == UID_CTImageStorage) {
+    add_ct_slice(path, dataset, files);
+  } else if (sop_class == UID_RTImageStorage) {
+    files.images.push_back({.file = path, .plan_uid = first_reference(dataset, DCM_ReferencedRTPlanSequence)});
+  } else if (sop_class == UID_RTPlanStorage || sop_class == UID_RTIonPlanStorage) {
+    files.plans.push_back({.file = path,
+                           .sop_instance_uid = dataset.required_text(DCM_SOPInstanceUID),
+                           .frame_of_reference_uid = dataset.text(DCM_FrameOfReferenceUID).value_or(""),
+                           .structure_set_uid = first_reference(dataset, DCM_ReferencedStructureSetSequence)});
+  } else if (sop_class == UID_RTStructureSetStorage) {
+    files.structures.push_back({.file = path,
+                                .sop_instance_uid = dataset.required_text(DCM_SOPInstanceUID),
+                                .ct_series_uids = drawn_on(dataset)});
+  } else {
+    files.left_aside.push_back(
+        fmt::format("{}: {}", path.string(), dcmFindNameOfUID(sop_class.c_str(), "an object of unknown class")));
+  }
+}
+
+// Where one kind of part was looked for, for a message: what was named for it, else the study.
+std::string searched(const std::vector<fs::path>& named, const fs::path& study) {
+  if (!named.empty()) return "searched " + named.front().string() + (named.size() > 1 ? " and others" : "");
+  return study.empty() ? "no study folder was given" : "searched " + study.string();
+}
+
+// A file that cannot be read may be a slice or a view: what is left would be another study.
+StudyFiles scan_readable(const std::vector<fs::path>& paths) {
+  StudyFiles files = scan_study(paths);
+  if (!files.unreadable.empty()) throw Error(files.unreadable.front());
+  return files;
+}
+
+// The plan that all images with a reference refer to, or the only one there is; nothing if there is none.
+const StudyFiles::Plan* choose_plan(const StudyFiles& files, bool was_named) {
+  if (files.plans.empty()) return nullptr;
+  if (files.plans.size() == 1) return &files.plans.front();
+  std::vector<const StudyFiles::Plan*> referred;
+  for (const StudyFiles::Plan& plan : files.plans)
+    if (std::ranges::find(files.images, plan.sop_instance_uid, &StudyFiles::Image::plan_uid) != files.images.end())
+      referred.push_back(&plan);
+  if (referred.size() == 1) return referred.front();
+  std::string list;
+  for (const StudyFiles::Plan& plan : files.plans) list += "\n       " + plan.file.string();
+  throw Error(
+      fmt::format("{} RT Plans {}, and the X-rays do not tell which one is meant:{}\n       Name the plan: --plan FILE",
+                  files.plans.size(), was_named ? "named" : "found", list));
+}
+
+// The CT in whose frame of reference the plan was made; of several, the one its structure set was drawn on.
+const StudyFiles::Ct& choose_ct(const StudyFiles& files, const StudyFiles::Plan* plan) {
+  if (files.cts.size() == 1) return files.cts.front();
+  std::vector<const StudyFiles::Ct*> candidates;
+  for (const StudyFiles::Ct& ct : files.cts)
+    if (plan == nullptr || ct.frame_of_reference_uid == plan->frame_of_reference_uid) candidates.push_back(&ct);
+  if (candidates.size() > 1 && plan != nullptr)
+    for (const StudyFiles::Structures& structures : files.structures)
+      if (structures.sop_instance_uid == plan->structure_set_uid)
+        std::erase_if(candidates,
+                      [&](const auto* ct) { return !structures.ct_series_uids.contains(ct->series_instance_uid); });
+  if (candidates.size() == 1) return *candidates.front();
+  std::string list;
+  for (const StudyFiles::Ct& ct : files.cts)
+    list += fmt::format("\n       {} slices, series {}, first file {}", ct.files.size(), ct.series_instance_uid,
+                        ct.files.front().string());
+  throw Error(fmt::format("{} CT series found, and {}:{}\n       Name the planning CT: --ct FOLDER", files.cts.size(),
+                          candidates.empty() ? "none is in the plan's frame of reference"
+                                             : "the plan does not tell which one it was made on",
+                          list));
+}
+
+}  // namespace
+
+StudyFiles scan_study(const std::vector<fs::path>& paths) {
+  StudyFiles files;
+  for (const fs::path& path : files_below(paths)) {
+    try {
+      add(path, files);
+    } catch (const Error& error) {
+      files.unreadable.emplace_back(error.what());
+    }
+  }
+  return files;
+}
+
+StudyParts find_parts(const NamedParts& named) {
+  StudyFiles files;
+  if (!named.study.empty()) files = scan_readable({named.study});
+  std::vector<StudyFiles::Plan> other_plans;  // a named plan makes those found in the folder others
+  if (!named.ct.empty()) files.cts = scan_readable(named.ct).cts;
+  if (!named.images.empty()) files.images = scan_readable(named.images).images;
+  if (named.plan) std::swap(other_plans, files.plans), files.plans = scan_readable({*named.plan}).plans;
+
+  if (files.cts.empty())
+    throw Error(
+        fmt::format("no CT series found ({}).\n       Name its folder: --ct FOLDER", searched(named.ct, named.study)));
+  if (files.images.empty())
+    throw Error(fmt::format("no RT Image found ({}).\n       Name the X-rays: --image FILE",
+                            searched(named.images, named.study)));
+  if (named.plan && files.plans.empty()) throw Error(fmt::format("{}: holds no RT Plan", named.plan->string()));
+
+  StudyParts parts{.left_aside = files.left_aside};
+  const StudyFiles::Plan* plan = choose_plan(files, named.plan.has_value());
+  const StudyFiles::Ct& ct = choose_ct(files, plan);
+  parts.ct = ct.files;
+  for (const StudyFiles::Ct& other : files.cts)
+    if (&other != &ct)
+      parts.left_aside.push_back(fmt::format("{} and {} more: CT series {}, not the one the plan was made on",
+                                             other.files.front().string(), other.files.size() - 1,
+                                             other.series_instance_uid));
+  if (plan != nullptr) {
+    parts.plan = plan->file;
+    for (const StudyFiles::Plan& other : files.plans)
+      if (&other != plan) other_plans.push_back(other);
+  }
+  std::erase_if(other_plans,
+                [&](const auto& other) { return plan && other.sop_instance_uid == plan->sop_instance_uid; });
+  for (const StudyFiles::Plan& other : other_plans)
+    parts.left_aside.push_back(fmt::format("{}: an RT Plan that {}", other.file.string(),
+                                           named.plan ? "was not named" : "no X-ray refers to"));
+  // An image of another plan that lies here too belongs to that one; an image of an unknown plan is a matter for
+  // checks.
+  for (const StudyFiles::Image& image : files.images) {
+    const bool of_other =
+        std::ranges::find(other_plans, image.plan_uid, &StudyFiles::Plan::sop_instance_uid) != other_plans.end();
+    if (of_other && named.images.empty())
+      parts.left_aside.push_back(fmt::format("{}: an X-ray of another plan", image.file.string()));
+    else
+      parts.images.push_back(image.file);
+  }
+  if (parts.images.empty())
+    throw Error(fmt::format("no X-ray found refers to {} ({}).\n       Name the X-rays: --image FILE",
+                            parts.plan->string(), searched(named.images, named.study)));
+  return parts;
+}
+
+}  // namespace isoshift

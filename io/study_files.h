@@ -1,0 +1,69 @@
+#pragma once
+// What a folder holds, and which of it belongs together.
+
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <set>
+#include <string>
+#include <vector>
+
+namespace isoshift {
+
+// The files below some paths, sorted by what they are, with what tells which of them belong together.
+struct StudyFiles {
+  struct Ct {
+    std::string series_instance_uid;
+    std::string frame_of_reference_uid;
+    std::vector<std::filesystem::path> files;
+  };
+  struct Plan {
+    std::filesystem::path file;
+    std::string sop_instance_uid;
+    std::string frame_of_reference_uid;
+    std::string structure_set_uid;  // ReferencedStructureSetSequence
+  };
+  struct Image {
+    std::filesystem::path file;
+    std::string plan_uid;  // ReferencedRTPlanSequence
+  };
+  struct Structures {
+    std::filesystem::path file;
+    std::string sop_instance_uid;
+    std::set<std::string> ct_series_uids;  // of the images it was drawn on
+  };
+
+  std::vector<Ct> cts;
+  std::vector<Plan> plans;
+  std::vector<Image> images;
+  std::vector<Structures> structures;
+  std::vector<std::string> left_aside;  // "FILE: reason"
+  std::vector<std::string> unreadable;  // why files that begin as DICOM, or cannot be opened, cannot be read
+};
+
+// Reads the headers of all files below `paths` (files or folders), in the order of their names. A file that is no DICOM
+// is left aside.
+StudyFiles scan_study(const std::vector<std::filesystem::path>& paths);
+
+// The parts of one registration.
+struct StudyParts {
+  std::vector<std::filesystem::path> ct;
+  std::vector<std::filesystem::path> images;
+  std::optional<std::filesystem::path> plan;
+  std::vector<std::string> left_aside;
+};
+
+// Which parts a person named; the others are searched for in `study`.
+struct NamedParts {
+  std::filesystem::path study;
+  std::vector<std::filesystem::path> ct;
+  std::vector<std::filesystem::path> images;
+  std::optional<std::filesystem::path> plan;
+};
+
+// The plan that the images refer to, the CT in whose frame of reference (and, of several, on whose structure set) it
+// was made, and the images of that plan. All else is left aside, with the reason. Throws Error where something is
+// absent or the files do not tell which of several is meant.
+StudyParts find_parts(const NamedParts& named);
+
+}  // namespace isoshift

@@ -1,0 +1,102 @@
+// What goes wrong silently elsewhere must not be possible here: one test each.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "drr/gl/context.h"
+#include "geometry/couch_shift.h"
+#include "io/spatial_registration.h"
+#include "tests/support/command.h"
+#include "tests/support/pose_near.h"
+#include "tests/support/small_study.h"
+
+namespace isoshift {
+namespace {
+
+using testing::HasSubstr;
+
+class SilentFailures : public testing::Test {
+ protected:
+  CommandOutcome register_study(std::vector<std::string> more = {}) {
+    std::vector<std::string> arguments = {"register", study_.path().string(), "-o", study_.output().string()};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return run_command(arguments);
+  }
+
+  XrayView view() {
+    Notes notes;
+    return make_xray_view(carm_geometry(read_rt_image_header(study_.image(0)), notes), Beam::kKilovoltage);
+  }
+
+  SmallStudy study_;
+};
+
+TEST_F(SilentFailures, ARequestForAGpuWhereThereIsNoneIsAnError) {
+  if (has_hardware_gl()) GTEST_SKIP() << "there is a GPU here";
+  const CommandOutcome outcome = register_study({"--renderer", "raycast"});
+  EXPECT_EQ(outcome.exit_status, 1);
+  EXPECT_THAT(outcome.err,
+              HasSubstr("error: no hardware OpenGL: there is no GPU that EGL knows.\n"
+                        "       Use --renderer cpu, which needs no OpenGL, or --gl software to run this one on "
+                        "the CPU\n"));
+  EXPECT_FALSE(std::filesystem::exists(study_.output()));
+}
+
+TEST_F(SilentFailures, AnAllZeroDrrIsAnError) {
+  for (const char* renderer : {"cpu", "raycast"}) {
+    const CommandOutcome outcome =
+        register_study({"--threshold-hu", "9000", "--renderer", renderer, "--gl", "software"});
+    EXPECT_EQ(outcome.exit_status, 1);
+    EXPECT_THAT(outcome.err, HasSubstr("the DRR is empty")) << renderer;
+  }
+}
+
+TEST_F(SilentFailures, AReceptorTranslationIsNotIgnored) {
+  const Eigen::Vector2d before = view().project(Eigen::Vector3d::Zero()).value();
+  edit(study_.image(0), [](DicomItem d) { d.put(DCM_XRayImageReceptorTranslation, "8.54166\\0\\-500"); });
+  // The panel moves two pixels of 4.27 mm toward +x, so the isocenter lies two columns further left on it.
+  EXPECT_THAT(view().project(Eigen::Vector3d::Zero()).value(),
+              VectorNear(Eigen::Vector2d(before - Eigen::Vector2d(2, 0)), 1e-3));
+}
+
+TEST_F(SilentFailures, AReceptorAngleIsNotIgnored) {
+  edit(study_.image(0), [](DicomItem d) { d.put(DCM_XRayImageReceptorAngle, 90.0); });
+  // The receptor turns counter-clockwise seen from the source: what lay at its right (+x) now lies below (image rows
+  // grow downward), since the receptor's own x axis points where its y axis did.
+  const Eigen::Vector2d pixel = view().project(Eigen::Vector3d(20, 0, 0)).value();
+  EXPECT_NEAR(pixel.x(), 47.5, 1e-6);
+  EXPECT_NEAR(pixel.y(), 47.5 + 30.0 / (410.0 / 96), 1e-6);
+}
+
+TEST_F(SilentFailures, DegreesAreNotTakenForRadians) {
+  edit(study_.image(0), [](DicomItem d) { d.put(DCM_GantryAngle, 90.0); });
+  EXPECT_THAT(view().source_room_mm, VectorNear(Eigen::Vector3d(1000, 0, 0), 1e-9));
+  // And back: a quarter turn is said to be 90.
+  EXPECT_DOUBLE_EQ(deg_from_rad(zxy_from_rotation(rotation_z(rad_from_deg(90.0))).z_rad), 90.0);
+}
+
+TEST_F(SilentFailures, TheRegistrationObjectGivesThePoseOnTheWayBackAndNotItsInverse) {
+  Notes notes;
+  StudyRequest request;
+  request.parts.study = study_.path();
+  const Study study = load_study(request, notes, {});
+  Eigen::Isometry3d error = Eigen::Isometry3d::Identity();
+  error.linear() = rotation_from_zxy({0.1, -0.05, 0.07});
+  error.translation() = Eigen::Vector3d(12, -8, 6);
+  const Eigen::Isometry3d actual = error * study.planned_room_from_patient;
+  const std::filesystem::path path = study_.path() / "reg.dcm";
+  write_spatial_registration(study, actual, {}, path, notes);
+
+  // Read by us and applied: the pose is that of the room's axes seen through item 2's matrix.
+  const Eigen::Isometry3d m = read_spatial_registration(path).items[1].registered_from_source;
+  Eigen::Isometry3d room_from_treatment = Eigen::Isometry3d::Identity();
+  room_from_treatment.linear() = study.planned_room_from_patient.linear();
+  const auto error_by = [&](const Eigen::Isometry3d& ct_from_source) {
+    return setup_error_from_poses(study.planned_room_from_patient, room_from_treatment * ct_from_source.inverse());
+  };
+  EXPECT_THAT(error_by(m), PoseNear(error, 1e-6, 1e-6));
+  EXPECT_THAT(error_by(m.inverse()), testing::Not(PoseNear(error, 1.0, 1.0)));
+}
+
+}  // namespace
+}  // namespace isoshift
