@@ -252,7 +252,9 @@ TEST_F(ErrorMessagesTest, AnEmptyDrrIsAnError) {
   const CommandOutcome outcome =
       run_command({"drr", study_.path().string(), "-o", study_.output().string(), "--threshold-hu", "9000"});
   EXPECT_EQ(outcome.exit_status, 1);
-  EXPECT_THAT(outcome.err, testing::EndsWith("error: KV_G000: the DRR is empty: no ray meets anything above the threshold in the CT\n"));
+  EXPECT_THAT(
+      outcome.err,
+      testing::EndsWith("error: KV_G000: the DRR is empty: no ray meets anything above the threshold in the CT\n"));
   EXPECT_FALSE(std::filesystem::exists(study_.output()));
 }
 
