@@ -3,13 +3,18 @@
 #include <benchmark/benchmark.h>
 
 #include "bench/scene.h"
+#include "drr/gl/context.h"
 
 namespace isoshift {
 namespace {
 
-void render_drr(benchmark::State& state, RendererKind kind, int pixels) {
+void render_drr(benchmark::State& state, RendererKind kind, int pixels, GlDevice gl = GlDevice::kHardware) {
+  if (kind == RendererKind::kRaycast && gl == GlDevice::kHardware && !has_hardware_gl()) {
+    state.SkipWithError("no GPU here");
+    return;
+  }
   static const Volume<float> ct = bench_ct();
-  const auto renderer = make_renderer(kind, ct, {}, std::array{Beam::kKilovoltage});
+  const auto renderer = make_renderer(kind, ct, {}, std::array{Beam::kKilovoltage}, gl);
   const XrayView view = bench_view(30.0, pixels);
   const Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
   for (auto _ : state) {
@@ -23,6 +28,12 @@ void render_drr(benchmark::State& state, RendererKind kind, int pixels) {
 BENCHMARK_CAPTURE(render_drr, siddon, RendererKind::kSiddon, 512)->UseRealTime()->Unit(benchmark::kMillisecond);
 BENCHMARK_CAPTURE(render_drr, trilinear, RendererKind::kTrilinear, 512)->UseRealTime()->Unit(benchmark::kMillisecond);
 BENCHMARK_CAPTURE(render_drr, cpu, RendererKind::kCpu, 512)->UseRealTime()->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(render_drr, raycast_software, RendererKind::kRaycast, 512, GlDevice::kSoftware)
+    ->UseRealTime()
+    ->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(render_drr, raycast_hardware, RendererKind::kRaycast, 512, GlDevice::kHardware)
+    ->UseRealTime()
+    ->Unit(benchmark::kMillisecond);
 
 }  // namespace
 }  // namespace isoshift

@@ -25,7 +25,7 @@ std::vector<fs::path> files_below(const std::vector<fs::path>& paths) {
     }
     for (auto entry = fs::recursive_directory_iterator(path, error); !error && entry != fs::end(entry);
          entry.increment(error))
-      if (entry->is_regular_file()) files.insert(entry->path());
+      if (entry->is_regular_file() && !entry->path().filename().string().starts_with('.')) files.insert(entry->path());
     if (error) throw Error(fmt::format("{}: cannot be searched: {}", path.string(), error.message()));
   }
   return {files.begin(), files.end()};

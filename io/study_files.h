@@ -42,7 +42,7 @@ struct StudyFiles {
 };
 
 // Reads the headers of all files below `paths` (files or folders), in the order of their names. A file that is no DICOM
-// is left aside.
+// is left aside; hidden files (named with a leading dot) are not looked at.
 StudyFiles scan_study(const std::vector<std::filesystem::path>& paths);
 
 // The parts of one registration.
