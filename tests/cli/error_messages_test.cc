@@ -18,15 +18,9 @@ using testing::StartsWith;
 
 class ErrorMessagesTest : public testing::Test {
  protected:
-  CommandOutcome register_study(std::vector<std::string> more = {}) {
-    std::vector<std::string> arguments = {"register", study_.path().string(), "-o", study_.output().string()};
-    arguments.insert(arguments.end(), more.begin(), more.end());
-    return run_command(arguments);
-  }
-
   // Registers, and expects failure with exactly this message, nothing on stdout and no result left behind.
   void expect_error(const std::string& message, std::vector<std::string> more = {}) {
-    const CommandOutcome outcome = register_study(std::move(more));
+    const CommandOutcome outcome = register_study(study_, std::move(more));
     EXPECT_EQ(outcome.exit_status, 1);
     EXPECT_EQ(outcome.err, "error: " + message + "\n");
     EXPECT_EQ(outcome.out, "");
@@ -48,7 +42,7 @@ TEST_F(ErrorMessagesTest, NoCt) {
 
 TEST_F(ErrorMessagesTest, TwoCtSeries) {
   for (const int k : {0, 1, 2}) edit(study_.ct_slice(k), [](DicomItem d) { d.put(DCM_SeriesInstanceUID, "1.2.3"); });
-  const CommandOutcome outcome = register_study();
+  const CommandOutcome outcome = register_study(study_);
   EXPECT_EQ(outcome.exit_status, 1);
   EXPECT_THAT(outcome.err, StartsWith("error: 2 CT series found, and the plan does not tell which one it was made "
                                       "on:\n       3 slices, series 1.2.3, first file " +
@@ -117,7 +111,7 @@ TEST_F(ErrorMessagesTest, DifferentPatients) {
 
 TEST_F(ErrorMessagesTest, PatientsWithoutAnId) {
   for (const auto& path : {study_.image(0), study_.image(1)}) edit(path, [](DicomItem d) { d.put(DCM_PatientID, ""); });
-  const CommandOutcome outcome = register_study();
+  const CommandOutcome outcome = register_study(study_);
   EXPECT_EQ(outcome.exit_status, 1);
   EXPECT_THAT(outcome.err,
               HasSubstr(where(study_.image(0)) + ": PatientID (0010,0020) is empty in this file or in the CT"));
@@ -125,7 +119,7 @@ TEST_F(ErrorMessagesTest, PatientsWithoutAnId) {
 
 TEST_F(ErrorMessagesTest, PatientsOfDifferentNames) {
   edit(study_.image(1), [](DicomItem d) { d.put(DCM_PatientName, "Other^Person"); });
-  const CommandOutcome outcome = register_study();
+  const CommandOutcome outcome = register_study(study_);
   EXPECT_EQ(outcome.exit_status, 1);
   EXPECT_THAT(outcome.err, HasSubstr(": PatientName (0010,0010) differs from the CT's"));
   EXPECT_THAT(outcome.err, testing::Not(HasSubstr("Other^Person")));
@@ -133,7 +127,7 @@ TEST_F(ErrorMessagesTest, PatientsOfDifferentNames) {
 
 TEST_F(ErrorMessagesTest, BlankXray) {
   edit(study_.image(0), [](DicomItem d) { d.put_pixels(std::vector<std::uint16_t>(96 * 96, 0)); });
-  const CommandOutcome outcome = register_study();
+  const CommandOutcome outcome = register_study(study_);
   EXPECT_EQ(outcome.exit_status, 1);
   EXPECT_THAT(outcome.err, HasSubstr("KV_G000: the X-ray is blank: its intensities run from 0 to 0"));
 }
@@ -189,14 +183,14 @@ TEST_F(ErrorMessagesTest, NoPlan) {
 
 TEST_F(ErrorMessagesTest, UnreadableFile) {
   std::filesystem::resize_file(study_.ct_slice(3), 700);
-  const CommandOutcome outcome = register_study();
+  const CommandOutcome outcome = register_study(study_);
   EXPECT_EQ(outcome.exit_status, 1);
   EXPECT_THAT(outcome.err, StartsWith("error: " + where(study_.ct_slice(3)) + ": cannot be read as a DICOM file: "));
 }
 
 TEST_F(ErrorMessagesTest, TruncatedPixelData) {
   std::filesystem::resize_file(study_.ct_slice(3), std::filesystem::file_size(study_.ct_slice(3)) - 100);
-  const CommandOutcome outcome = register_study();
+  const CommandOutcome outcome = register_study(study_);
   EXPECT_EQ(outcome.exit_status, 1);
   EXPECT_THAT(outcome.err, StartsWith("error: " + where(study_.ct_slice(3)) + ": cannot be read as a DICOM file: "));
 }
@@ -204,7 +198,7 @@ TEST_F(ErrorMessagesTest, TruncatedPixelData) {
 TEST_F(ErrorMessagesTest, OutputFolderAlreadyHoldingAResult) {
   std::filesystem::create_directory(study_.output());
   std::ofstream(study_.output() / "result.json") << "precious";
-  const CommandOutcome outcome = register_study();
+  const CommandOutcome outcome = register_study(study_);
   EXPECT_EQ(outcome.exit_status, 1);
   EXPECT_EQ(outcome.err, fmt::format("error: {}: the output folder is not empty.\n"
                                      "       Name another one, or replace what it holds: --overwrite\n",
@@ -233,17 +227,17 @@ TEST_F(ErrorMessagesTest, UsageErrorsHaveTheirOwnStatus) {
   EXPECT_EQ(run_command({}).exit_status, 2);
   EXPECT_EQ(run_command({"registre"}).exit_status, 2);
   EXPECT_EQ(run_command({"register", where(study_.path())}).exit_status, 2);  // no -o
-  EXPECT_EQ(register_study({"--intensity", "LINEAR"}).exit_status, 2);
-  EXPECT_EQ(register_study({"--allow", "everything=please"}).exit_status, 2);
-  EXPECT_EQ(register_study({"--allow", "gaps"}).exit_status, 2);
-  EXPECT_EQ(register_study({"--gantry-angle", "KV_G000=north"}).exit_status, 2);
-  EXPECT_EQ(register_study({"--gantry-angle", "NOBODY=0"}).exit_status, 2);
-  EXPECT_EQ(register_study({"--attenuation", "windowed", "--window", "100,-100"}).exit_status, 2);
-  EXPECT_EQ(register_study({"--gantry-angle", "KV_G000=nan"}).exit_status, 2);
-  EXPECT_EQ(register_study({"--couch-angle", "nan"}).exit_status, 2);
-  EXPECT_EQ(register_study({"--isocenter", "nan,nan,nan"}).exit_status, 2);
-  EXPECT_EQ(register_study({"--sid", "inf"}).exit_status, 2);
-  EXPECT_EQ(register_study({"--seed", "-1"}).exit_status, 2);
+  EXPECT_EQ(register_study(study_, {"--intensity", "LINEAR"}).exit_status, 2);
+  EXPECT_EQ(register_study(study_, {"--allow", "everything=please"}).exit_status, 2);
+  EXPECT_EQ(register_study(study_, {"--allow", "gaps"}).exit_status, 2);
+  EXPECT_EQ(register_study(study_, {"--gantry-angle", "KV_G000=north"}).exit_status, 2);
+  EXPECT_EQ(register_study(study_, {"--gantry-angle", "NOBODY=0"}).exit_status, 2);
+  EXPECT_EQ(register_study(study_, {"--attenuation", "windowed", "--window", "100,-100"}).exit_status, 2);
+  EXPECT_EQ(register_study(study_, {"--gantry-angle", "KV_G000=nan"}).exit_status, 2);
+  EXPECT_EQ(register_study(study_, {"--couch-angle", "nan"}).exit_status, 2);
+  EXPECT_EQ(register_study(study_, {"--isocenter", "nan,nan,nan"}).exit_status, 2);
+  EXPECT_EQ(register_study(study_, {"--sid", "inf"}).exit_status, 2);
+  EXPECT_EQ(register_study(study_, {"--seed", "-1"}).exit_status, 2);
   EXPECT_EQ(run_command({"register", "-o", where(study_.output())}).exit_status, 2);
   EXPECT_EQ(run_command({"register", where(study_.path()), "-o", ""}).exit_status, 2);
 }
@@ -259,7 +253,7 @@ TEST_F(ErrorMessagesTest, AnEmptyDrrIsAnError) {
 }
 
 TEST_F(ErrorMessagesTest, RegisteringAnEmptyDrrIsAnErrorToo) {
-  const CommandOutcome outcome = register_study({"--threshold-hu", "9000"});
+  const CommandOutcome outcome = register_study(study_, {"--threshold-hu", "9000"});
   EXPECT_EQ(outcome.exit_status, 1);
   EXPECT_THAT(outcome.err, HasSubstr("the DRR is empty"));
 }

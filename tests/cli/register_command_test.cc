@@ -17,12 +17,6 @@ using testing::HasSubstr;
 
 class RegisterCommandTest : public testing::Test {
  protected:
-  CommandOutcome register_study(std::vector<std::string> more = {}) {
-    std::vector<std::string> arguments = {"register", study_.path().string(), "-o", study_.output().string()};
-    arguments.insert(arguments.end(), more.begin(), more.end());
-    return run_command(arguments);
-  }
-
   nlohmann::json result() {
     std::ifstream file(study_.output() / "result.json");
     return nlohmann::json::parse(file);
@@ -51,7 +45,7 @@ TEST_F(RegisterCommandTest, FindsTheSetupErrorFromTheFirstFileToTheLast) {
 
 TEST_F(RegisterCommandTest, ResultFollowsItsSchema) {
   for (const auto& more : {std::vector<std::string>{}, {"--image", study_.image(0).string()}}) {
-    register_study(more);
+    register_study(study_, more);
     const CommandOutcome checked =
         run_shell(fmt::format("/usr/bin/python3 -m jsonschema -i {} {}/docs/result.schema.json",
                               (study_.output() / "result.json").string(), ISOSHIFT_SOURCE_DIR));
@@ -61,12 +55,13 @@ TEST_F(RegisterCommandTest, ResultFollowsItsSchema) {
 }
 
 TEST_F(RegisterCommandTest, JsonOnStdoutIsTheResultFile) {
-  const CommandOutcome outcome = register_study({"--json"});
+  const CommandOutcome outcome = register_study(study_, {"--json"});
   EXPECT_EQ(nlohmann::json::parse(outcome.out), result());
 }
 
 TEST_F(RegisterCommandTest, OneViewIsReviewWithoutDepthAndWithoutRegistrationObject) {
-  const CommandOutcome outcome = register_study({"--image", study_.image(0).string(), "--write-reg-for-review"});
+  const CommandOutcome outcome =
+      register_study(study_, {"--image", study_.image(0).string(), "--write-reg-for-review"});
   EXPECT_EQ(outcome.exit_status, 3);
   EXPECT_EQ(result()["verdict"], "review");
   EXPECT_TRUE(result()["setup_error"]["translation_mm"][2].is_null());  // gantry 0 looks along z
@@ -84,11 +79,11 @@ TEST_F(RegisterCommandTest, AReviewedResultIsWrittenOnlyOnRequestAndMarked) {
   }());
   const std::vector<std::string> mismatched = {
       "--ct", (other.path() / "CT").string(), "--allow", "patient-mismatch=test", "--allow", "for-mismatch=test"};
-  EXPECT_EQ(register_study(mismatched).exit_status, 3);
+  EXPECT_EQ(register_study(study_, mismatched).exit_status, 3);
   EXPECT_FALSE(std::filesystem::exists(study_.output() / "spatial_registration.dcm"));
   auto on_request = mismatched;
   on_request.insert(on_request.end(), {"--write-reg-for-review", "--overwrite"});
-  EXPECT_EQ(register_study(on_request).exit_status, 3);
+  EXPECT_EQ(register_study(study_, on_request).exit_status, 3);
   const DicomFile file = DicomFile::read(study_.output() / "spatial_registration.dcm", DicomFile::Extent::kWhole);
   EXPECT_EQ(file.dataset().text(DCM_ContentLabel), "SETUP_REVIEW");
   EXPECT_EQ(file.dataset().text(DCM_ContentDescription), "NOT ACCEPTED: REVIEW");
@@ -96,13 +91,13 @@ TEST_F(RegisterCommandTest, AReviewedResultIsWrittenOnlyOnRequestAndMarked) {
 
 TEST_F(RegisterCommandTest, AllowedFindingsAreInTheResult) {
   edit(study_.image(1), [](DicomItem d) { d.put(DCM_AcquisitionTime, "104500"); });
-  EXPECT_EQ(register_study({"--allow", "time-span=phantom does not move"}).exit_status, 0);
+  EXPECT_EQ(register_study(study_, {"--allow", "time-span=phantom does not move"}).exit_status, 0);
   EXPECT_THAT(result()["overrides"][0].get<std::string>(), HasSubstr("(allowed by time-span: phantom does not move)"));
 }
 
 TEST_F(RegisterCommandTest, TheSameXrayTwiceIsOneView) {
   std::filesystem::copy(study_.image(0), study_.path() / "RTIMAGE" / "again.dcm");
-  const CommandOutcome outcome = register_study();
+  const CommandOutcome outcome = register_study(study_);
   EXPECT_EQ(result()["views"].size(), 2U);
   EXPECT_THAT(outcome.err, HasSubstr("left aside: "));
   EXPECT_THAT(result()["left_aside"].dump(), HasSubstr("the same X-ray as"));
@@ -113,7 +108,7 @@ TEST_F(RegisterCommandTest, AViewWithoutATimeIsWarnedOfAndDoesNotHideTheOthers) 
     d.erase(DCM_AcquisitionTime);
     d.erase(DCM_ContentTime);
   });
-  register_study();
+  register_study(study_);
   EXPECT_THAT(result()["warnings"].dump(), HasSubstr("KV_G000: AcquisitionTime (0008,0032) is missing"));
 }
 
@@ -124,13 +119,13 @@ TEST_F(RegisterCommandTest, LabelsCannotForgeLines) {
     d.erase(DCM_AcquisitionTime);
     d.erase(DCM_ContentTime);
   });
-  const CommandOutcome outcome = register_study();
+  const CommandOutcome outcome = register_study(study_);
   EXPECT_THAT(outcome.err, testing::Not(HasSubstr("\nerror: forged")));
   EXPECT_THAT(outcome.out, HasSubstr("A VERDICT"));
 }
 
 TEST_F(RegisterCommandTest, LogsHoldNoPatientName) {
-  const CommandOutcome outcome = register_study();
+  const CommandOutcome outcome = register_study(study_);
   EXPECT_THAT(outcome.err, testing::Not(HasSubstr("Phantom^Digital")));
   EXPECT_THAT(outcome.err, testing::Not(HasSubstr("PHANTOM1")));
 }

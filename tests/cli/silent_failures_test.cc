@@ -17,12 +17,6 @@ using testing::HasSubstr;
 
 class SilentFailures : public testing::Test {
  protected:
-  CommandOutcome register_study(std::vector<std::string> more = {}) {
-    std::vector<std::string> arguments = {"register", study_.path().string(), "-o", study_.output().string()};
-    arguments.insert(arguments.end(), more.begin(), more.end());
-    return run_command(arguments);
-  }
-
   XrayView view() {
     Notes notes;
     return make_xray_view(carm_geometry(read_rt_image_header(study_.image(0)), notes), Beam::kKilovoltage);
@@ -33,7 +27,7 @@ class SilentFailures : public testing::Test {
 
 TEST_F(SilentFailures, ARequestForAGpuWhereThereIsNoneIsAnError) {
   if (has_hardware_gl()) GTEST_SKIP() << "there is a GPU here";
-  const CommandOutcome outcome = register_study({"--renderer", "raycast"});
+  const CommandOutcome outcome = register_study(study_, {"--renderer", "raycast"});
   EXPECT_EQ(outcome.exit_status, 1);
   EXPECT_THAT(outcome.err,
               HasSubstr("error: no hardware OpenGL: there is no GPU that EGL knows.\n"
@@ -45,7 +39,7 @@ TEST_F(SilentFailures, ARequestForAGpuWhereThereIsNoneIsAnError) {
 TEST_F(SilentFailures, AnAllZeroDrrIsAnError) {
   for (const char* renderer : {"cpu", "raycast"}) {
     const CommandOutcome outcome =
-        register_study({"--threshold-hu", "9000", "--renderer", renderer, "--gl", "software"});
+        register_study(study_, {"--threshold-hu", "9000", "--renderer", renderer, "--gl", "software"});
     EXPECT_EQ(outcome.exit_status, 1);
     EXPECT_THAT(outcome.err, HasSubstr("the DRR is empty")) << renderer;
   }

@@ -26,6 +26,12 @@ std::filesystem::path SmallStudy::image(int n) const {
   return path() / "RTIMAGE" / (n == 0 ? "KV_G000.dcm" : "KV_G090.dcm");
 }
 
+CommandOutcome register_study(const SmallStudy& study, const std::vector<std::string>& more) {
+  std::vector<std::string> arguments = {"register", study.path().string(), "-o", study.output().string()};
+  arguments.insert(arguments.end(), more.begin(), more.end());
+  return run_command(arguments);
+}
+
 void edit(const std::filesystem::path& path, const std::function<void(DicomItem)>& change) {
   DicomFile file = DicomFile::read(path, DicomFile::Extent::kWhole);
   change(file.dataset());

@@ -5,6 +5,7 @@
 
 #include "io/dicom_dataset.h"
 #include "phantom/study_writer.h"
+#include "tests/support/command.h"
 #include "tests/support/temporary_folder.h"
 
 namespace isoshift {
@@ -27,6 +28,9 @@ class SmallStudy {
  private:
   TemporaryFolder folder_;
 };
+
+// isoshift register STUDY -o OUTPUT, with more arguments.
+CommandOutcome register_study(const SmallStudy& study, const std::vector<std::string>& more = {});
 
 // Changes a DICOM file in place.
 void edit(const std::filesystem::path& path, const std::function<void(DicomItem)>& change);
