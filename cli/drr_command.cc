@@ -62,7 +62,7 @@ void add_drr_command(CLI::App& app, Console& console, int&) {
   command->add_option("-o,--output", options->output, "Folder for the images")->required()->type_name("FOLDER");
   command->add_option("--setup-error", options->setup_error, "result.json or truth.json: how the patient lies")
       ->type_name("FILE");
-  command->add_flag("--overwrite", options->overwrite, "Replace what the output folder holds");
+  command->add_flag("--overwrite", options->overwrite, "Replace an earlier output in that folder");
   add_rendering_options(*command, options->rendering);
   command->callback([options, &console] { run_drr(*options, console); });
 }

@@ -78,7 +78,7 @@ void add_phantom_command(CLI::App& app, Console& console, int&) {
   command->add_option("--photons", options->phantom.photons, "Photons per open pixel; 0 for no noise")
       ->capture_default_str();
   command->add_option("--seed", options->phantom.seed, "Of anatomy, noise and UIDs")->capture_default_str();
-  command->add_flag("--overwrite", options->overwrite, "Replace what the folder holds");
+  command->add_flag("--overwrite", options->overwrite, "Replace an earlier study in that folder");
   command->callback([options, &console] { run_phantom(*options, console); });
 }
 

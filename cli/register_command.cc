@@ -179,7 +179,7 @@ void add_register_command(CLI::App& app, Console& console, int& exit_status) {
       ->type_name("FILE");
   command->add_flag("--write-reg-for-review", options->write_reg_for_review,
                     "Write the registration object for a result that needs review, too, marked as not accepted");
-  command->add_flag("--overwrite", options->overwrite, "Replace what the output folder holds");
+  command->add_flag("--overwrite", options->overwrite, "Replace an earlier output in that folder");
   command->add_flag("--json", options->json, "Print result.json instead of the report");
   add_rendering_options(*command, options->rendering);
   command->callback([options, &console, &exit_status] { exit_status = run_register(*options, console); });
