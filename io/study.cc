@@ -38,6 +38,12 @@ std::optional<double> seconds_of(const RtImage& image) {
   return ((days * 24 + *hour) * 60 + minute) * 60 + second;
 }
 
+// Empty components at the end of a name may be written or not (PS3.5 6.2.1.1).
+std::string without_trailing_carets(std::string name) {
+  name.erase(name.find_last_not_of("^ ") + 1);
+  return name;
+}
+
 // One patient throughout: an ID is there and the same, and so are name and birth date where both files have them.
 std::vector<Finding> patient_findings(const Study& study) {
   const Identity& ct = study.ct.identity;
@@ -45,7 +51,8 @@ std::vector<Finding> patient_findings(const Study& study) {
   const auto compare = [&](const Identity& other, const std::string& where) {
     const auto differ = [&](const std::string Identity::*member, const DcmTagKey& tag, bool may_be_empty) {
       const bool is_empty = (other.*member).empty() || (ct.*member).empty();
-      if (other.*member == ct.*member && (may_be_empty || !is_empty)) return;
+      if (without_trailing_carets(other.*member) == without_trailing_carets(ct.*member) && (may_be_empty || !is_empty))
+        return;
       if (may_be_empty && is_empty) return;
       findings.push_back({"patient-mismatch",
                           is_empty ? fmt::format("{}: {} is empty in this file or in the CT: whose they are is unknown",
@@ -264,6 +271,10 @@ Study load_study(const StudyRequest& request, Notes& notes, const Progress& prog
     refused = error.what();  // said together with all that is missing
   }
   check_nothing_missing(study.rt_images, refused);
+  for (const RtImage& image : study.rt_images)
+    if (!image.reported_values_origin)
+      notes.warnings.push_back(fmt::format("{}: does not say whether its angles were measured ({} is missing)",
+                                           image.label, described(DCM_ReportedValuesOrigin)));
 
   study.ct = read_ct_series(parts.ct, request.allowed, notes, progress);
   findings = patient_findings(study);

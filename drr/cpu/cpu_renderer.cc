@@ -13,7 +13,8 @@ namespace isoshift {
 namespace {
 
 VoxelRay ray_to(std::uint32_t pixel, int columns, const Camera& camera, const Eigen::Matrix3d& mm_from_voxel_axes) {
-  const Eigen::Vector3d way = camera.way_voxel_from_pixel * Eigen::Vector3d(pixel % columns, pixel / columns, 1.0);
+  const int column = static_cast<int>(pixel) % columns, row = static_cast<int>(pixel) / columns;
+  const Eigen::Vector3d way = camera.way_voxel_from_pixel * Eigen::Vector3d(column, row, 1.0);
   return {.source = camera.source_voxel, .way = way, .length_mm = (mm_from_voxel_axes * way).norm()};
 }
 

@@ -125,6 +125,11 @@ TEST_F(ErrorMessagesTest, PatientsOfDifferentNames) {
   EXPECT_THAT(outcome.err, testing::Not(HasSubstr("Other^Person")));
 }
 
+TEST_F(ErrorMessagesTest, NamesThatDifferInEmptyComponentsAreTheSame) {
+  edit(study_.image(1), [](DicomItem d) { d.put(DCM_PatientName, "Phantom^Digital^^^"); });
+  EXPECT_EQ(register_study(study_).exit_status, 0);
+}
+
 TEST_F(ErrorMessagesTest, BlankXray) {
   edit(study_.image(0), [](DicomItem d) { d.put_pixels(std::vector<std::uint16_t>(96 * 96, 0)); });
   const CommandOutcome outcome = register_study(study_);
