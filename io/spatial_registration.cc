@@ -195,7 +195,7 @@ std::string write_spatial_registration(const Study& study, const Eigen::Isometry
   const SourceFrame source = source_frame(study, notes);
   Eigen::Isometry3d ct_from_source = ct_from_treatment(study.planned_room_from_patient, actual_room_from_patient);
   ct_from_source.translate(-source.isocenter_mm);
-  const std::string sop_instance_uid = new_uid();
+  std::string sop_instance_uid = new_uid();
   DicomFile file = registration_object(study, source, ct_from_source, sop_instance_uid, label);
   file.write(path);
   check_read_back(path, ct_from_source);

@@ -109,9 +109,9 @@ std::vector<Shape> spine_phantom(const Vector3d& center_patient_mm, std::uint64_
   body.add(Kind::kCylinder, {0, -30, 0}, {150, 95, 110}, kTissue);
   body.add(Kind::kEllipsoid, {body.vary(60, 0.2), -60, 10}, {40, 22, 30}, {.water = -0.95, .bone = 0});  // bowel gas
   body.add(Kind::kEllipsoid, {body.vary(-45, 0.2), -75, -35}, {25, 14, 40}, {.water = -0.9, .bone = 0});
-  constexpr int kVertebrae = 5;
+  constexpr int kVertebrae = 5, kMiddle = 2;
   for (int n = 0; n < kVertebrae; ++n) {
-    const double z = 36.0 * (n - kVertebrae / 2);
+    const double z = 36.0 * (n - kMiddle);
     const double bend = 5.0 * std::cos(0.6 * n);  // lordosis
     const Vector3d at(body.vary(1.0, 1.0), bend, z);
     const Vector3d half(body.vary(23, 0.06), body.vary(17, 0.06), body.vary(13, 0.06));
