@@ -50,7 +50,7 @@ void Objective::add_view(const FixedImage& image, const std::vector<std::uint32_
     for (const std::uint32_t pixel : compared)
       rendered.insert(rendered.end(), {pixel - 1, pixel + 1, pixel - columns, pixel + columns});
     std::ranges::sort(rendered);
-    rendered.erase(std::ranges::unique(rendered).begin(), rendered.end());
+    rendered.erase(std::unique(rendered.begin(), rendered.end()), rendered.end());
   }
 
   Target target;
