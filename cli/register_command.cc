@@ -93,7 +93,7 @@ Image<float> as_image(const XrayView& view, std::span<const float> line_integral
   return image;
 }
 
-// One picture per view. Throws Error for a view in which the CT does not appear at all.
+// One picture per view.
 void write_pictures(const Study& study, Renderer& renderer, const Eigen::Isometry3d& actual_room_from_patient,
                     const std::filesystem::path& folder) {
   const std::array poses = {study.planned_room_from_patient, actual_room_from_patient};

@@ -39,11 +39,9 @@ Eigen::Isometry3d setup_error_from_parameters(std::span<const double> parameters
 // field.
 int reduction(const FixedImage& image, double pixel_mm) {
   constexpr double kMinFieldPixels = 900.0;
-  const Eigen::Vector2d origin = image.view.project(Eigen::Vector3d::Zero()).value();
-  const Eigen::Vector3d across = image.view.central_direction_room().unitOrthogonal();
-  const double pixels_per_mm = (image.view.project(across).value() - origin).norm();
   const auto field_pixels = static_cast<double>(std::ranges::count_if(image.field.pixels, std::identity()));
-  return std::max(1, static_cast<int>(std::min(pixel_mm * pixels_per_mm, std::sqrt(field_pixels / kMinFieldPixels))));
+  return std::max(
+      1, static_cast<int>(std::min(pixel_mm * pixels_per_mm(image.view), std::sqrt(field_pixels / kMinFieldPixels))));
 }
 
 std::vector<FixedImage> reduced_to(std::span<const FixedImage> images, double pixel_mm) {

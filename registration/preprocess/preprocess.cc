@@ -19,13 +19,6 @@ constexpr double kMinEdgeMm = 12.0;         // the shortest edge that counts, at
 constexpr float kMinEdgeContrast = 0.916F;  // ln 2.5, of an intensity image
 constexpr float kMinEdgeShare = 0.15F;      // of the image's range, where line integrals come without a scale
 
-// Pixels per mm at the isocenter.
-double pixels_per_mm(const XrayView& view) {
-  const Eigen::Vector2d origin = view.project(Eigen::Vector3d::Zero()).value();
-  const Eigen::Vector3d along = view.central_direction_room().unitOrthogonal();
-  return (view.project(along).value() - origin).norm();
-}
-
 cv::Mat as_mat(const Image<float>& image) {
   return {image.rows, image.columns, CV_32F, const_cast<float*>(image.pixels.data())};
 }
@@ -122,6 +115,12 @@ cv::Rect innermost_field(const cv::Mat& line_integral, const cv::Point2d& isocen
 }
 
 }  // namespace
+
+double pixels_per_mm(const XrayView& view) {
+  const Eigen::Vector2d origin = view.project(Eigen::Vector3d::Zero()).value();
+  const Eigen::Vector3d along = view.central_direction_room().unitOrthogonal();
+  return (view.project(along).value() - origin).norm();
+}
 
 Image<float> line_integrals(const XrayImage& xray) {
   if (xray.meaning == XrayImage::Meaning::kLineIntegral) return xray.values;

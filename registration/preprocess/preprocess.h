@@ -9,6 +9,9 @@
 
 namespace isoshift {
 
+// Pixels of a view per mm at the isocenter, across the central ray.
+double pixels_per_mm(const XrayView& view);
+
 // Line integrals -ln(I / I_max) of an intensity image, or the values of an image that holds line integrals already.
 Image<float> line_integrals(const XrayImage& xray);
 
