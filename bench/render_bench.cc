@@ -14,7 +14,7 @@ void render_drr(benchmark::State& state, RendererKind kind, int pixels, GlDevice
     return;
   }
   static const Volume<float> ct = bench_ct();
-  const auto renderer = make_renderer(kind, ct, {}, std::array{Beam::kKilovoltage}, gl);
+  const auto renderer = make_renderer(kind, ct, {}, std::array{Beam::kKilovoltage}, {.gl = gl});
   const XrayView view = bench_view(30.0, pixels);
   const Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
   for (auto _ : state) {

@@ -70,6 +70,7 @@ SetupReport make_report(const RegisterOptions& options, const Study& study, cons
   if (model.kind == AttenuationModel::Kind::kWindowed) report.window_hu = {model.window_low_hu, model.window_high_hu};
   report.renderer = to_string(renderer.kind());
   report.device = renderer.device();
+  report.renderer_settings = options.rendering.settings();
   report.seconds_register = result.seconds;
   report.ct_series_uid = study.ct.series_instance_uid;
   report.plan_uid = study.plan ? study.plan->sop_instance_uid : "";

@@ -7,7 +7,6 @@
 #include <charconv>
 #include <cmath>
 
-#include "drr/gl/context.h"
 #include "geometry/error.h"
 
 namespace isoshift {
@@ -123,58 +122,11 @@ void add_study_options(CLI::App& command, StudyOptions& options) {
   command.add_option("--allow", options.allow, allow_keys_help())->type_name("KEY=REASON")->group(lacking);
 }
 
-RendererKind RenderingOptions::kind() const {
-  if (renderer == "auto") return has_hardware_gl() ? RendererKind::kRaycast : RendererKind::kCpu;
-  return renderer_kind_from(renderer).value();
-}
-
-GlDevice RenderingOptions::device() const { return gl == "hardware" ? GlDevice::kHardware : GlDevice::kSoftware; }
-
-AttenuationModel RenderingOptions::model() const {
-  AttenuationModel model;
-  model.kind = attenuation == "physical" ? AttenuationModel::Kind::kPhysical : AttenuationModel::Kind::kWindowed;
-  model.threshold_hu = threshold_hu;
-  if (!window.empty()) {
-    model.window_low_hu = window[0];
-    model.window_high_hu = window[1];
-  }
-  model.check();
-  return model;
-}
-
-void add_rendering_options(CLI::App& command, RenderingOptions& options) {
-  const char* group = "Rendering";
-  std::vector<std::string> names = {"auto"};
-  for (const RendererKind kind : kRendererKinds) names.emplace_back(to_string(kind));
-  command
-      .add_option("--renderer", options.renderer,
-                  "What renders the DRRs. auto: raycast on a GPU, else cpu; siddon and trilinear are slow references")
-      ->check(CLI::IsMember(names))
-      ->capture_default_str()
-      ->group(group);
-  command.add_option("--gl", options.gl, "OpenGL of --renderer raycast: a GPU, or Mesa's llvmpipe on the CPU")
-      ->check(CLI::IsMember({"hardware", "software"}))
-      ->capture_default_str()
-      ->group(group);
-  command
-      .add_option("--attenuation", options.attenuation, "From HU to attenuation: a physical curve, or the HU window")
-      ->check(CLI::IsMember({"physical", "windowed"}))
-      ->capture_default_str()
-      ->group(group);
-  command.add_option("--threshold-hu", options.threshold_hu, "Voxels below count as nothing")
-      ->type_name("HU")
-      ->capture_default_str()
-      ->group(group);
-  command.add_option("--window", options.window, "HU window of --attenuation windowed [-540,1500]")
-      ->delimiter(',')
-      ->expected(2)
-      ->type_name("LOW,HIGH")
-      ->group(group);
-}
-
 LoadedStudy load(const StudyOptions& study_options, const RenderingOptions& rendering, Notes& notes, Console& console) {
   const StudyRequest request = study_options.request();
+  const RendererKind kind = rendering.kind();
   const AttenuationModel model = rendering.model();
+  const RendererOptions options = rendering.options();
   LoadedStudy loaded;
   {
     ProgressBar bar(console, "Reading CT");
@@ -184,7 +136,7 @@ LoadedStudy load(const StudyOptions& study_options, const RenderingOptions& rend
   std::vector<Beam> beams;
   for (const XrayImage& xray : loaded.study.xrays)
     if (std::ranges::find(beams, xray.view.beam) == beams.end()) beams.push_back(xray.view.beam);
-  loaded.renderer = make_renderer(rendering.kind(), loaded.study.ct.hu, model, beams, rendering.device());
+  loaded.renderer = make_renderer(kind, loaded.study.ct.hu, model, beams, options);
   return loaded;
 }
 

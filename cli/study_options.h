@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "cli/console.h"
-#include "drr/renderer.h"
+#include "cli/rendering_options.h"
 #include "io/study.h"
 
 namespace isoshift {
@@ -29,19 +29,6 @@ struct StudyOptions {
   void check_finite() const;
 };
 void add_study_options(CLI::App& command, StudyOptions& options);
-
-struct RenderingOptions {
-  std::string renderer = "auto";
-  std::string gl = "hardware";
-  std::string attenuation = "physical";
-  double threshold_hu = AttenuationModel{}.threshold_hu;
-  std::vector<double> window;
-
-  RendererKind kind() const;  // "auto" settled: raycast on a hardware GPU, else cpu
-  GlDevice device() const;
-  AttenuationModel model() const;
-};
-void add_rendering_options(CLI::App& command, RenderingOptions& options);
 
 // Loads the study behind a progress bar and makes its renderer.
 struct LoadedStudy {

@@ -3,11 +3,16 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <random>
 
 #include "drr/cpu/raycast.h"
 #include "drr/cpu/siddon.h"
 #include "drr/cpu/trilinear.h"
+#include "drr/raycast/rasterized.h"
 #include "drr/raycast/raycast.h"
+#include "drr/splat/splat.h"
 #include "geometry/error.h"
 
 namespace isoshift {
@@ -18,6 +23,11 @@ std::string_view to_string(RendererKind kind) {
     case RendererKind::kTrilinear: return "trilinear";
     case RendererKind::kCpu: return "cpu";
     case RendererKind::kRaycast: return "raycast";
+    case RendererKind::kRaycastBox: return "raycast-box";
+    case RendererKind::kRaycastCuberille: return "raycast-cuberille";
+    case RendererKind::kSplat: return "splat";
+    case RendererKind::kSplatTexture: return "splat-texture";
+    case RendererKind::kSplatBuffers: return "splat-buffers";
   }
   return "";
 }
@@ -28,19 +38,59 @@ std::optional<RendererKind> renderer_kind_from(std::string_view name) {
   return std::nullopt;
 }
 
+bool uses_gl(RendererKind kind) { return kind != RendererKind::kCpu && !is_oracle(kind); }
+
+bool is_oracle(RendererKind kind) { return kind == RendererKind::kSiddon || kind == RendererKind::kTrilinear; }
+
+bool is_splatting(RendererKind kind) {
+  return kind == RendererKind::kSplat || kind == RendererKind::kSplatTexture || kind == RendererKind::kSplatBuffers;
+}
+
+double default_sigma_mm(SplatOptions::Wobble wobble, double largest_spacing_mm, const XrayView& view) {
+  const double blur_mm = 0.5 * largest_spacing_mm;
+  if (wobble == SplatOptions::Wobble::kVoxel) return blur_mm;
+  const double sad_by_sid = view.pixel_from_room(2, 3);  // how far on the way to the receptor the room's origin lies
+  if (!(sad_by_sid > 0.0 && sad_by_sid < 1.0))
+    throw Error(
+        "the receptor does not lie behind the isocenter, so the focal spot's wobble has no default.\n"
+        "       Give it with --wobble-sigma, or use --wobble voxel");
+  return blur_mm / (1.0 - sad_by_sid);
+}
+
 std::size_t PixelSet::count(std::span<const XrayView> views, std::size_t view) const {
   if (!of_view.empty()) return of_view[view].size();
   return static_cast<std::size_t>(views[view].columns) * views[view].rows;
 }
 
+PixelSet PixelSet::random(std::span<const XrayView> views, double fraction, std::uint64_t seed) {
+  std::mt19937_64 random(seed);
+  PixelSet pixels;
+  for (const XrayView& view : views) {
+    std::vector<std::uint32_t> all(static_cast<std::size_t>(view.columns) * view.rows);
+    std::iota(all.begin(), all.end(), 0U);
+    const auto wanted = std::llround(std::clamp(fraction, 0.0, 1.0) * static_cast<double>(all.size()));
+    std::ranges::sample(all, std::back_inserter(pixels.of_view.emplace_back()), wanted, random);
+  }
+  return pixels;
+}
+
 std::unique_ptr<Renderer> make_renderer(RendererKind kind, const Volume<float>& ct_hu, const AttenuationModel& model,
-                                        std::span<const Beam> beams, GlDevice gl) {
+                                        std::span<const Beam> beams, const RendererOptions& options) {
   model.check();
+  if (is_oracle(kind) && options.precision.value_or(VolumePrecision::kF32) != VolumePrecision::kF32)
+    throw UsageError(fmt::format("--renderer {} is a reference and keeps the volume in f32: leave --precision {} out",
+                                 to_string(kind), to_string(*options.precision)));
   switch (kind) {
     case RendererKind::kSiddon: return std::make_unique<SiddonRenderer>(ct_hu, model, beams);
     case RendererKind::kTrilinear: return std::make_unique<TrilinearRenderer>(ct_hu, model, beams);
-    case RendererKind::kCpu: return std::make_unique<RaycastCpuRenderer>(ct_hu, model, beams);
-    case RendererKind::kRaycast: return std::make_unique<RaycastGlRenderer>(ct_hu, model, beams, gl);
+    case RendererKind::kCpu: return std::make_unique<RaycastCpuRenderer>(ct_hu, model, beams, options);
+    case RendererKind::kRaycast: return std::make_unique<RaycastGlRenderer>(ct_hu, model, beams, options);
+    case RendererKind::kRaycastBox:
+    case RendererKind::kRaycastCuberille:
+      return std::make_unique<RasterizedRaycaster>(kind, ct_hu, model, beams, options);
+    case RendererKind::kSplat:
+    case RendererKind::kSplatTexture:
+    case RendererKind::kSplatBuffers: return std::make_unique<SplatRenderer>(kind, ct_hu, model, beams, options);
   }
   return nullptr;
 }

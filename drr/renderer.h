@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "drr/attenuation.h"
+#include "drr/quantized_volume.h"
 #include "geometry/volume.h"
 #include "geometry/xray_view.h"
 
@@ -24,24 +25,65 @@ namespace isoshift {
 enum class RendererKind {
   kSiddon,     // oracle, double precision: exact for voxels of constant attenuation
   kTrilinear,  // oracle, double precision: exact for trilinear interpolation between voxel centers
-  kCpu,        // trilinear ray casting in single precision on all cores
-  kRaycast,    // the same in an OpenGL compute shader
+  kCpu,        // ray casting in single precision on all cores, plane by plane
+  kRaycast,    // ray casting in an OpenGL compute shader
+  // The founding paper's, on OpenGL's rasterizer:
+  kRaycastBox,        // rays from the front to the back of the volume's box
+  kRaycastCuberille,  // rays from the first front to the last back face of the blocks above the threshold
+  kSplat,             // wobbled splatting, voxels sent for every image, random numbers computed
+  kSplatTexture,      // the same, random numbers from a small texture
+  kSplatBuffers,      // the same as kSplat, voxels kept by OpenGL
 };
 
-inline constexpr std::array kRendererKinds = {RendererKind::kSiddon, RendererKind::kTrilinear, RendererKind::kCpu,
-                                              RendererKind::kRaycast};
+inline constexpr std::array kRendererKinds = {
+    RendererKind::kSiddon,  RendererKind::kTrilinear,    RendererKind::kCpu,
+    RendererKind::kRaycast, RendererKind::kRaycastBox,   RendererKind::kRaycastCuberille,
+    RendererKind::kSplat,   RendererKind::kSplatTexture, RendererKind::kSplatBuffers};
 
 std::string_view to_string(RendererKind kind);
 std::optional<RendererKind> renderer_kind_from(std::string_view name);
+bool uses_gl(RendererKind kind);
+bool is_oracle(RendererKind kind);
+bool is_splatting(RendererKind kind);
 
 // Which OpenGL to render on: a GPU, or Mesa's llvmpipe on the CPU, which is never taken unless asked for.
 enum class GlDevice { kHardware, kSoftware };
+
+// Wobbled splatting (docs/renderers.md, "Splatting").
+struct SplatOptions {
+  enum class Wobble {
+    kFocus,  // the focal spot moves for every voxel: the blur grows with the height above the receptor
+    kVoxel,  // the voxel moves
+  };
+  enum class Deposit {
+    kNearest,   // a voxel falls into one pixel
+    kBilinear,  // into four, shared by distance
+  };
+
+  Wobble wobble = Wobble::kFocus;
+  Deposit deposit = Deposit::kNearest;
+  std::optional<double> sigma_mm;  // of the wobble, in two axes of the receptor; 0: none; unset: default_sigma_mm()
+  std::uint32_t seed = 1;          // the only source of randomness
+};
+
+// The sigma that blurs a voxel at the isocenter by half its largest edge: 0.5 * spacing * SID / (SID - SAD) for the
+// focal spot. Throws Error for a receptor that does not lie behind the isocenter, where the focal spot cannot blur it.
+double default_sigma_mm(SplatOptions::Wobble wobble, double largest_spacing_mm, const XrayView& view);
+
+struct RendererOptions {
+  GlDevice gl = GlDevice::kHardware;         // of the kinds that use OpenGL
+  std::optional<VolumePrecision> precision;  // unset: u16. The oracles keep floats
+  int block_edge = 2;                        // of kRaycastCuberille, voxels
+  SplatOptions splat;
+};
 
 // Which pixels of every view are rendered: all, or per view a list of indices (row * columns + column).
 struct PixelSet {
   std::vector<std::vector<std::uint32_t>> of_view;  // empty: all pixels of all views
 
   static PixelSet all() { return {}; }
+  // A share of every view's pixels, drawn without replacement, in rising order; the same for the same seed.
+  static PixelSet random(std::span<const XrayView> views, double fraction, std::uint64_t seed);
   std::size_t count(std::span<const XrayView> views, std::size_t view) const;
 };
 
@@ -75,13 +117,17 @@ class Renderer {
 
   // What it runs on, in words, for the log and the result.
   virtual std::string device() const = 0;
+
+  // How long the GPU was busy with the last render(), by its own clock and without transfers from it; nothing where
+  // there is no OpenGL.
+  virtual std::optional<double> gpu_seconds() const { return std::nullopt; }
 };
 
 // A renderer for views of the given beam qualities; rendering another one is a logic error. Keeps its own copy of the
-// volume. `gl` matters to the kinds that use OpenGL. Throws UsageError for a model that fails its check, and Error with
-// the reason where there is no such OpenGL or the volume exceeds its limits: never another renderer instead.
+// volume. Throws UsageError for a model or options that fail their check, and Error with the reason where there is no
+// such OpenGL or the volume exceeds its limits: never another renderer instead.
 std::unique_ptr<Renderer> make_renderer(RendererKind kind, const Volume<float>& ct_hu, const AttenuationModel& model,
-                                        std::span<const Beam> beams, GlDevice gl = GlDevice::kHardware);
+                                        std::span<const Beam> beams, const RendererOptions& options = {});
 
 // Throws Error if a DRR of a whole image is zero everywhere: a blank picture is never a result.
 void require_not_empty(std::span<const float> line_integrals, std::string_view label);

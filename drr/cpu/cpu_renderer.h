@@ -4,6 +4,7 @@
 #include <optional>
 #include <vector>
 
+#include "drr/camera.h"
 #include "drr/renderer.h"
 
 namespace isoshift {
@@ -19,16 +20,23 @@ class CpuRenderer : public Renderer {
  public:
   RenderResult render(std::span<const XrayView> views, std::span<const Eigen::Isometry3d> room_from_patient,
                       const PixelSet& pixels) final;
-  std::string device() const final;
+  std::string device() const override;
 
  protected:
-  explicit CpuRenderer(const Volume<float>& ct_hu) : voxel_from_patient_(ct_hu.patient_from_voxel.inverse()) {}
+  explicit CpuRenderer(const Volume<float>& ct_hu)
+      : voxel_from_patient_(ct_hu.patient_from_voxel.inverse()),
+        mm_from_voxel_axes_(ct_hu.patient_from_voxel.linear()) {}
 
-  // Line integral of attenuation along one ray; called from many threads.
-  virtual double integrate(const VoxelRay& ray, Beam beam) const = 0;
+  // Line integral of attenuation along each ray; called from many threads. Rays come in groups that lie close together.
+  virtual void integrate(std::span<const VoxelRay> rays, Beam beam, std::span<float> line_integrals) const = 0;
 
  private:
+  void render_all(const XrayView& view, const Camera& camera, std::span<float> drr) const;
+  void render_list(const XrayView& view, const Camera& camera, std::span<const std::uint32_t> pixels,
+                   std::span<float> drr) const;
+
   Eigen::Affine3d voxel_from_patient_;
+  Eigen::Matrix3d mm_from_voxel_axes_;
   std::vector<float> line_integrals_;
 };
 

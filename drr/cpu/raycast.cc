@@ -1,78 +1,201 @@
 #include "drr/cpu/raycast.h"
 
+#include <fmt/format.h>
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <cmath>
 
+#include "drr/cpu/march.h"
+
 namespace isoshift {
 namespace {
 
-// Trilinear value at a position at least half a voxel inside the lattice.
-inline float sample(const float* voxels, std::ptrdiff_t row, std::ptrdiff_t slice, float x, float y, float z) {
-  const int i = static_cast<int>(x);
-  const int j = static_cast<int>(y);
-  const int k = static_cast<int>(z);
-  const float fx = x - static_cast<float>(i);
-  const float fy = y - static_cast<float>(j);
-  const float fz = z - static_cast<float>(k);
-  const float* v = voxels + k * slice + j * row + i;
-  const float* w = v + slice;
-  const float v0 = v[0] + fx * (v[1] - v[0]);
-  const float v1 = v[row] + fx * (v[row + 1] - v[row]);
-  const float w0 = w[0] + fx * (w[1] - w[0]);
-  const float w1 = w[row] + fx * (w[row + 1] - w[row]);
-  const float near = v0 + fy * (v1 - v0);
-  const float far = w0 + fy * (w1 - w0);
-  return near + fz * (far - near);
+using Eigen::Vector3d;
+using Eigen::Vector3i;
+
+// For each main axis, the axes that are a plane's columns and rows.
+struct PlaneAxes {
+  int column, row;
+};
+constexpr std::array<PlaneAxes, 3> kPlaneAxes = {
+    {{.column = 1, .row = 2}, {.column = 0, .row = 2}, {.column = 0, .row = 1}}};
+
+constexpr int kReadBeyond = 4;  // a pair is loaded as 32 bits
+
+// The box with a border, x or y fastest.
+template <class T>
+std::vector<T> cropped(const std::vector<T>& voxels, const Vector3i& size, const VoxelBox& box, bool y_fastest) {
+  const Vector3i padded = box.size().array() + 3;
+  std::vector<T> result(padded.cast<std::size_t>().prod() + kReadBeyond);
+  const std::size_t slice = static_cast<std::size_t>(padded.x()) * padded.y();
+  tbb::parallel_for(box.first.z(), box.last.z() + 1, [&](int k) {
+    T* out = result.data() + static_cast<std::size_t>(k - box.first.z() + 1) * slice;
+    for (int j = box.first.y(); j <= box.last.y(); ++j) {
+      const T* in = voxels.data() + (static_cast<std::size_t>(k) * size.y() + j) * size.x();
+      const int y = j - box.first.y() + 1;
+      for (int i = box.first.x(); i <= box.last.x(); ++i) {
+        const int x = i - box.first.x() + 1;
+        out[y_fastest ? x * padded.y() + y : y * padded.x() + x] = in[i];
+      }
+    }
+  });
+  return result;
 }
+
+// Elements from one voxel to the next along each axis.
+std::array<std::ptrdiff_t, 3> strides_of(const Vector3i& size, bool y_fastest) {
+  const std::ptrdiff_t slice = static_cast<std::ptrdiff_t>(size.x()) * size.y();
+  if (y_fastest) return {size.y(), 1, slice};
+  return {1, size.x(), slice};
+}
+
+// The axis along which a ray runs fastest, in voxels; where another one is nearly as fast, that of the ray before, so
+// that neighboring rays stay together.
+int main_axis_of(const VoxelRay& ray, std::optional<int> before) {
+  constexpr double kNearly = 0.8;
+  int fastest = 0;
+  const double most = ray.way.cwiseAbs().maxCoeff(&fastest);
+  return before && std::abs(ray.way[*before]) >= kNearly * most ? *before : fastest;
+}
+
+// Collects rays of one main axis, and marches when it has enough of them.
+template <class T>
+class PacketMarcher {
+ public:
+  // `size` of the padded lattice; line integrals are its sums times `unit_per_mm` and the length per plane.
+  PacketMarcher(const PlaneLattice<T>& lattice, const Vector3i& size, int main_axis, double unit_per_mm,
+                std::span<float> line_integrals)
+      : lattice_(lattice),
+        size_(size),
+        main_axis_(main_axis),
+        axes_(kPlaneAxes[main_axis]),
+        unit_per_mm_(unit_per_mm),
+        line_integrals_(line_integrals) {}
+
+  // A ray in voxels of the padded lattice, for the line integral of this index.
+  void add(const VoxelRay& ray, std::size_t index) {
+    // The last two voxels of the border are there to be read, not to be reached.
+    const auto segment = clip_to_box(ray, Vector3d::Zero(), size_.cast<double>().array() - 2.0);
+    if (!segment) return;
+    const double source = ray.source[main_axis_];
+    const double way = ray.way[main_axis_];
+    const double at_begin = source + segment->begin * way;
+    const double at_end = source + segment->end * way;
+    const int first = static_cast<int>(std::ceil(std::min(at_begin, at_end)));
+    const int last = std::min(static_cast<int>(std::max(at_begin, at_end)), size_[main_axis_] - 2);
+    if (first > last) return;
+    if (count_ == 0) {
+      packet_.plane = first;
+      packet_.source_plane = source;
+      packet_.source_column = ray.source[axes_.column];
+      packet_.source_row = ray.source[axes_.row];
+    }
+    const double column_slope = ray.way[axes_.column] / way;
+    const double row_slope = ray.way[axes_.row] / way;
+    packet_.column_slope[count_] = static_cast<float>(column_slope);
+    packet_.row_slope[count_] = static_cast<float>(row_slope);
+    packet_.column[count_] = static_cast<float>(ray.source[axes_.column] + (packet_.plane - source) * column_slope);
+    packet_.row[count_] = static_cast<float>(ray.source[axes_.row] + (packet_.plane - source) * row_slope);
+    packet_.first_plane[count_] = first;
+    packet_.last_plane[count_] = last;
+    scale_[count_] = static_cast<float>(unit_per_mm_ * ray.length_mm / std::abs(way));
+    index_[count_] = index;
+    if (++count_ == kPacketRays) finish();
+  }
+
+  // Marches with those it has.
+  void finish() {
+    if (count_ == 0) return;
+    // Places left empty repeat the first ray, and are not looked at.
+    for (auto* values : {&packet_.column, &packet_.row, &packet_.column_slope, &packet_.row_slope})
+      std::fill(values->begin() + count_, values->end(), values->front());
+    std::fill(packet_.first_plane.begin() + count_, packet_.first_plane.end(), packet_.first_plane.front());
+    std::fill(packet_.last_plane.begin() + count_, packet_.last_plane.end(), packet_.last_plane.front());
+    const PacketSums sums = march(packet_, lattice_);
+    for (int n = 0; n < count_; ++n) line_integrals_[index_[n]] = scale_[n] * sums[n];
+    count_ = 0;
+  }
+
+ private:
+  PlaneLattice<T> lattice_;
+  Vector3i size_;
+  int main_axis_;
+  PlaneAxes axes_;
+  double unit_per_mm_;
+  std::span<float> line_integrals_;
+  RayPacket packet_;
+  std::array<float, kPacketRays> scale_;
+  std::array<std::size_t, kPacketRays> index_;
+  int count_ = 0;
+};
 
 }  // namespace
 
 RaycastCpuRenderer::RaycastCpuRenderer(const Volume<float>& ct_hu, const AttenuationModel& model,
-                                       std::span<const Beam> beams)
-    : CpuRenderer(ct_hu), step_mm_(ct_hu.spacing_mm().minCoeff()) {
-  for (const Beam beam : beams) volumes_.emplace(beam, pad(ct_hu, model, beam));
+                                       std::span<const Beam> beams, const RendererOptions& options)
+    : CpuRenderer(ct_hu) {
+  const VolumePrecision precision = options.precision.value_or(kDefaultPrecision);
+  for (const Beam beam : beams) volumes_.emplace(beam, pack(quantized_attenuation(ct_hu, model, beam, precision)));
 }
 
-RaycastCpuRenderer::PaddedVolume RaycastCpuRenderer::pad(const Volume<float>& ct_hu, const AttenuationModel& model,
-                                                         Beam beam) {
-  const Eigen::Vector3i size = ct_hu.size;
-  Volume<float> padded(size.array() + 3, ct_hu.patient_from_voxel);
-  tbb::parallel_for(0, size.z(), [&](int k) {
-    for (int j = 0; j < size.y(); ++j)
-      for (int i = 0; i < size.x(); ++i)
-        padded.at(i + 1, j + 1, k + 1) = model.attenuation_per_mm(ct_hu.at(i, j, k), beam);
-  });
-  const OccupiedBox box = occupied_box(padded);
-  return {.attenuation_per_mm = std::move(padded), .box = box};
+std::string RaycastCpuRenderer::device() const {
+  return fmt::format("{}, {}", CpuRenderer::device(), march_instruction_set());
 }
 
-double RaycastCpuRenderer::integrate(const VoxelRay& ray, Beam beam) const {
-  const PaddedVolume& volume = volumes_.at(beam);
-  VoxelRay padded_ray = ray;
-  padded_ray.source.array() += 1.0;
-  const auto segment = clip_to_box(padded_ray, volume.box.low, volume.box.high);
-  if (!segment) return 0.0;
+RaycastCpuRenderer::PackedVolume RaycastCpuRenderer::pack(const QuantizedVolume& attenuation) {
+  const VoxelBox box = occupied_voxels(attenuation);
+  if (box.is_empty()) return {};
+  PackedVolume packed{.origin = box.first.cast<double>().array() - 1.0,
+                      .size = box.size().array() + 3,
+                      .unit_per_mm = attenuation.unit_per_mm};
+  std::visit(
+      [&]<class T>(const std::vector<T>& voxels) {
+        packed.x_fastest = cropped(voxels, attenuation.size, box, false);
+        packed.y_fastest = cropped(voxels, attenuation.size, box, true);
+      },
+      attenuation.voxels);
+  packed.blocks = occupied_blocks({.size = packed.size, .voxels = packed.x_fastest}, kSkipEdge);
+  return packed;
+}
 
-  // Midpoint rule: whole steps of at most one voxel fill the segment exactly.
-  const double segment_mm = (segment->end - segment->begin) * ray.length_mm;
-  const int steps = std::max(1, static_cast<int>(std::ceil(segment_mm / step_mm_)));
-  const double step_t = (segment->end - segment->begin) / steps;
-  const Eigen::Vector3f step = (step_t * padded_ray.way).cast<float>();
-  const Eigen::Vector3d middle = padded_ray.source + (segment->begin + 0.5 * step_t) * padded_ray.way;
-  const Eigen::Vector3f first = middle.cast<float>();
+template <class T>
+PlaneLattice<T> RaycastCpuRenderer::PackedVolume::lattice(int main_axis) const {
+  const PlaneAxes axes = kPlaneAxes[main_axis];
+  const bool swizzled = main_axis == 0;
+  const std::array<std::ptrdiff_t, 3> strides = strides_of(size, swizzled);
+  const std::array<std::ptrdiff_t, 3> block_strides = strides_of(blocks.size, false);
+  return {.voxels = std::get<std::vector<T>>(swizzled ? y_fastest : x_fastest).data(),
+          .plane_stride = strides[main_axis],
+          .row_stride = strides[axes.row],
+          .columns = size[axes.column],
+          .rows = size[axes.row],
+          .occupied = blocks.occupied.data(),
+          .plane_block_stride = block_strides[main_axis],
+          .column_block_stride = block_strides[axes.column],
+          .row_block_stride = block_strides[axes.row]};
+}
 
-  const Volume<float>& lattice = volume.attenuation_per_mm;
-  const std::ptrdiff_t row = lattice.size.x();
-  const std::ptrdiff_t slice = row * lattice.size.y();
-  float sum = 0.0F;
-  for (int n = 0; n < steps; ++n) {
-    const auto steps_done = static_cast<float>(n);
-    sum += sample(lattice.voxels.data(), row, slice, first.x() + steps_done * step.x(),
-                  first.y() + steps_done * step.y(), first.z() + steps_done * step.z());
-  }
-  return sum * step_t * ray.length_mm;
+void RaycastCpuRenderer::integrate(std::span<const VoxelRay> rays, Beam beam, std::span<float> line_integrals) const {
+  const PackedVolume& volume = volumes_.at(beam);
+  std::ranges::fill(line_integrals, 0.0F);
+  if (volume.size.isZero()) return;
+  std::visit(
+      [&]<class T>(const std::vector<T>&) {
+        const auto marcher = [&](int axis) {
+          return PacketMarcher<T>(volume.lattice<T>(axis), volume.size, axis, volume.unit_per_mm, line_integrals);
+        };
+        std::array<PacketMarcher<T>, 3> marchers = {marcher(0), marcher(1), marcher(2)};
+        std::optional<int> axis;
+        for (std::size_t n = 0; n < rays.size(); ++n) {
+          VoxelRay ray = rays[n];
+          ray.source -= volume.origin;
+          axis = main_axis_of(ray, axis);
+          marchers[*axis].add(ray, n);
+        }
+        for (PacketMarcher<T>& rest : marchers) rest.finish();
+      },
+      volume.x_fastest);
 }
 
 }  // namespace isoshift

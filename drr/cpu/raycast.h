@@ -1,30 +1,43 @@
 #pragma once
-// Trilinear ray casting in single precision at a fixed step: what renders where there is no GPU.
+// Ray casting in single precision on all cores: what renders where there is no GPU. Packets of neighboring rays march
+// from voxel plane to voxel plane (march.h).
 
 #include <map>
 
 #include "drr/cpu/cpu_renderer.h"
+#include "drr/cpu/march.h"
+#include "drr/occupied_blocks.h"
+#include "drr/quantized_volume.h"
 
 namespace isoshift {
 
 class RaycastCpuRenderer final : public CpuRenderer {
  public:
-  RaycastCpuRenderer(const Volume<float>& ct_hu, const AttenuationModel& model, std::span<const Beam> beams);
+  RaycastCpuRenderer(const Volume<float>& ct_hu, const AttenuationModel& model, std::span<const Beam> beams,
+                     const RendererOptions& options);
   RendererKind kind() const override { return RendererKind::kCpu; }
+  std::string device() const override;
 
  private:
-  // Attenuation with a border of zeros, one voxel below and two above, so that no sample needs a bounds check, not even
-  // one exactly on the upper face.
-  struct PaddedVolume {
-    Volume<float> attenuation_per_mm;
-    OccupiedBox box;  // in padded voxel indices
+  // The occupied voxels with a border of zeros, one voxel below and two above, so that no sample needs a bounds check,
+  // not even one exactly on the upper face. Kept twice: a row's voxels must be neighbors in a plane across the main
+  // axis.
+  struct PackedVolume {
+    Eigen::Vector3d origin = Eigen::Vector3d::Zero();  // in voxels of the CT
+    Eigen::Vector3i size = Eigen::Vector3i::Zero();    // border included; 0 for a volume of nothing
+    double unit_per_mm = 1.0;
+    QuantizedVolume::Voxels x_fastest;  // [z][y][x], for main axes y and z
+    QuantizedVolume::Voxels y_fastest;  // [z][x][y], for main axis x
+    BlockGrid blocks;                   // of kSkipEdge voxels, border included
+
+    template <class T>
+    PlaneLattice<T> lattice(int main_axis) const;
   };
-  static PaddedVolume pad(const Volume<float>& ct_hu, const AttenuationModel& model, Beam beam);
+  static PackedVolume pack(const QuantizedVolume& attenuation);
 
-  double integrate(const VoxelRay& ray, Beam beam) const override;
+  void integrate(std::span<const VoxelRay> rays, Beam beam, std::span<float> line_integrals) const override;
 
-  std::map<Beam, PaddedVolume> volumes_;
-  double step_mm_;
+  std::map<Beam, PackedVolume> volumes_;
 };
 
 }  // namespace isoshift

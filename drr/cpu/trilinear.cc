@@ -1,5 +1,7 @@
 #include "drr/cpu/trilinear.h"
 
+#include <algorithm>
+
 #include "drr/cpu/cell_walk.h"
 
 namespace isoshift {
@@ -22,17 +24,8 @@ double interpolate(const Volume<float>& volume, const Eigen::Vector3i& corner, c
   return value;
 }
 
-}  // namespace
-
-TrilinearRenderer::TrilinearRenderer(const Volume<float>& ct_hu, const AttenuationModel& model,
-                                     std::span<const Beam> beams)
-    : CpuRenderer(ct_hu) {
-  for (const Beam beam : beams) attenuation_per_mm_.emplace(beam, attenuation_volume(ct_hu, model, beam));
-}
-
-double TrilinearRenderer::integrate(const VoxelRay& ray, Beam beam) const {
+double line_integral(const VoxelRay& ray, const Volume<float>& volume) {
   constexpr double kGaussOffset = 0.28867513459481287;  // 1 / (2 sqrt 3)
-  const Volume<float>& volume = attenuation_per_mm_.at(beam);
   // Cells lie between voxel centers, one more on each side for the way down to zero: cell c spans voxels c-1 and c.
   VoxelRay cell_ray = ray;
   cell_ray.source.array() += 1.0;
@@ -49,6 +42,20 @@ double TrilinearRenderer::integrate(const VoxelRay& ray, Beam beam) const {
     sum += 0.5 * values * (end - begin);
   });
   return sum * ray.length_mm;
+}
+
+}  // namespace
+
+TrilinearRenderer::TrilinearRenderer(const Volume<float>& ct_hu, const AttenuationModel& model,
+                                     std::span<const Beam> beams)
+    : CpuRenderer(ct_hu) {
+  for (const Beam beam : beams) attenuation_per_mm_.emplace(beam, attenuation_volume(ct_hu, model, beam));
+}
+
+void TrilinearRenderer::integrate(std::span<const VoxelRay> rays, Beam beam, std::span<float> line_integrals) const {
+  const Volume<float>& volume = attenuation_per_mm_.at(beam);
+  std::ranges::transform(rays, line_integrals.begin(),
+                         [&](const VoxelRay& ray) { return static_cast<float>(line_integral(ray, volume)); });
 }
 
 }  // namespace isoshift

@@ -16,7 +16,7 @@ class TrilinearRenderer final : public CpuRenderer {
   RendererKind kind() const override { return RendererKind::kTrilinear; }
 
  private:
-  double integrate(const VoxelRay& ray, Beam beam) const override;
+  void integrate(std::span<const VoxelRay> rays, Beam beam, std::span<float> line_integrals) const override;
 
   std::map<Beam, Volume<float>> attenuation_per_mm_;
 };

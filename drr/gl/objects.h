@@ -1,5 +1,6 @@
 #pragma once
-// Move-only OpenGL objects: a buffer, a 3D texture, a compute program. All need a current GlContext, at their end too.
+// Move-only OpenGL objects: buffers, textures, a render target, programs, a timer. All need a current GlContext, at
+// their end too.
 
 #include <Eigen/Core>
 #include <cstddef>
@@ -8,6 +9,7 @@
 #include <span>
 #include <string>
 #include <utility>
+#include <vector>
 
 namespace isoshift {
 
@@ -32,42 +34,101 @@ class GlName {
   Delete remove_;
 };
 
-// A shader storage buffer that grows as needed.
+// A buffer that grows as needed: storage for shaders, or attributes of vertices.
 class Buffer {
  public:
   Buffer();
   void upload(std::span<const std::byte> bytes);
   void reserve(std::size_t bytes);  // what it held is lost
   void download(std::span<std::byte> bytes) const;
-  void bind(std::uint32_t slot) const;
+  void bind(std::uint32_t slot) const;  // as shader storage
+  std::uint32_t get() const { return name_.get(); }
 
  private:
   GlName name_;
   std::size_t capacity_ = 0;
 };
 
-// A 3D texture of one float per voxel, linearly interpolated, 0 outside: voxel i lies at texture coordinate
-// (i + 1/2) / size.
+// A 3D texture of one value per voxel, linearly interpolated, 0 outside: voxel i lies at texture coordinate
+// (i + 1/2) / size. Integers read as 0 to 1.
 class Texture3d {
  public:
   // Throws Error where the driver's limit on edges is smaller than the volume.
+  Texture3d(const Eigen::Vector3i& size, std::span<const std::uint8_t> voxels);
+  Texture3d(const Eigen::Vector3i& size, std::span<const std::uint16_t> voxels);
   Texture3d(const Eigen::Vector3i& size, std::span<const float> voxels);
+  Texture3d(const Eigen::Vector3i& size, std::span<const Eigen::Vector2f> voxels);
   void bind(std::uint32_t slot) const;
+
+ private:
+  struct Format;
+  Texture3d(const Eigen::Vector3i& size, const void* voxels, const Format& format);
+
+  GlName name_;
+};
+
+// An image to render into: one float or four per pixel, with or without depth. Made anew when its size changes.
+class RenderTarget {
+ public:
+  enum class Pixel { kOneFloat, kFourFloats };
+  enum class Depth { kNone, kFloat };
+  RenderTarget(Pixel pixel, Depth depth);
+
+  // Makes it what is rendered into. What it held is lost. Throws Error where the driver's limit is smaller.
+  void resize_and_use(int columns, int rows);
+  void clear(float depth) const;                 // all colors to 0
+  void download(std::span<float> pixels) const;  // row by row; all of them or the first ones
+  void bind(std::uint32_t slot) const;           // as a texture
+  int columns() const { return columns_; }
+
+ private:
+  Pixel pixel_;
+  Depth depth_;
+  int columns_ = 0, rows_ = 0;
+  GlName framebuffer_, color_, depth_buffer_;
+};
+
+// How vertex buffers are read.
+class VertexArray {
+ public:
+  VertexArray();
+  enum class Type { kUint32, kUint16, kUnitUint8, kUnitUint16, kFloat };  // kUnit...: as floats from 0 to 1
+  // `components` of `type` per vertex, or per instance, tightly packed.
+  void attribute(std::uint32_t location, const Buffer& buffer, Type type, int components, bool per_instance);
+  void bind() const;
 
  private:
   GlName name_;
 };
 
-// A compute program. `source` starts after the #version line, `file` names it in messages.
+// A program. Sources start after the #version line; files are named in messages. Constructors throw Error with file,
+// line and the driver's log.
+struct ShaderSource {
+  std::string text, file;
+};
 class Program {
  public:
-  // Throws Error with file, line and the driver's log.
-  Program(const std::string& source, const std::string& file);
+  explicit Program(const ShaderSource& compute);
+  Program(const ShaderSource& vertex, const ShaderSource& fragment);
   void use() const;
   std::uint32_t get() const { return name_.get(); }
 
  private:
+  void link(const std::string& files) const;
+
   GlName name_;
+};
+
+// The time that OpenGL needs by its own clock, between start() and stop(), in all since clear().
+class GlTimer {
+ public:
+  void clear() { queries_.clear(); }
+  void start();
+  void stop();
+  double seconds() const;  // waits until it is done
+
+ private:
+  std::vector<GlName> queries_;
 };
 
 // Column by column, double to float: how host matrices reach shaders.

@@ -4,9 +4,9 @@
 
 #include <algorithm>
 #include <array>
-#include <limits>
 
 #include "drr/camera.h"
+#include "drr/occupied_blocks.h"
 #include "drr/raycast/raycast.comp.h"
 #include "geometry/error.h"
 
@@ -14,7 +14,7 @@ namespace isoshift {
 namespace {
 
 // Binding slots and uniform locations, as in raycast.comp.
-constexpr std::uint32_t kKvTexture = 0, kMvTexture = 1;
+constexpr std::uint32_t kKvTexture = 0, kMvTexture = 1, kOccupiedTexture = 2;
 constexpr std::uint32_t kCameras = 0, kViews = 1, kPixels = 2, kResult = 3;
 enum Uniform : int {
   kPoseCount = 0,
@@ -25,8 +25,10 @@ enum Uniform : int {
   kMmFromVoxelAxes = 5,
   kBoxLow = 6,
   kBoxHigh = 7,
+  kUnitPerMm = 8,
 };
 
+constexpr int kBlockEdge = 8;
 constexpr std::size_t kGroupSize = 64;
 constexpr std::size_t kMaxGroups = 65535;  // what every OpenGL 4.5 allows along each axis
 
@@ -42,52 +44,79 @@ std::span<const std::byte> bytes_of(const std::vector<T>& values) {
 }  // namespace
 
 RaycastGlRenderer::RaycastGlRenderer(const Volume<float>& ct_hu, const AttenuationModel& model,
-                                     std::span<const Beam> beams, GlDevice device)
-    : context_(device),
-      program_(kRaycastComp, "drr/raycast/raycast.comp"),
+                                     std::span<const Beam> beams, const RendererOptions& options)
+    : context_(options.gl),
+      program_(ShaderSource{kRaycastComp, "drr/raycast/raycast.comp"}),
       voxel_from_patient_(ct_hu.patient_from_voxel.inverse()),
-      step_mm_(ct_hu.spacing_mm().minCoeff()),
-      box_low_(Eigen::Vector3d::Constant(std::numeric_limits<double>::max())),
-      box_high_(Eigen::Vector3d::Constant(-1.0)) {
+      step_mm_(ct_hu.spacing_mm().minCoeff()) {
+  const VolumePrecision precision = options.precision.value_or(kDefaultPrecision);
+  VoxelBox box{.first = ct_hu.size, .last = Eigen::Vector3i::Constant(-1)};
+  BlockGrid blocks;
   for (const Beam beam : beams) {
-    const Volume<float> attenuation = attenuation_volume(ct_hu, model, beam);
-    attenuation_per_mm_.emplace(beam, Texture3d(attenuation.size, attenuation.voxels));
-    const OccupiedBox box = occupied_box(attenuation);
-    box_low_ = box_low_.cwiseMin(box.low);
-    box_high_ = box_high_.cwiseMax(box.high);
+    const QuantizedVolume volume = quantized_attenuation(ct_hu, model, beam, precision);
+    attenuation_.emplace(beam, volume);
+    const VoxelBox of_beam = occupied_voxels(volume);
+    box = {.first = box.first.cwiseMin(of_beam.first), .last = box.last.cwiseMax(of_beam.last)};
+    // Beams differ in what attenuates at all only where a value rounds to 0.
+    const BlockGrid of_this = interpolation_blocks(volume, kBlockEdge);
+    if (blocks.occupied.empty()) blocks = of_this;
+    std::ranges::transform(blocks.occupied, of_this.occupied, blocks.occupied.begin(), std::ranges::max);
   }
+  box_low_ = box.first.cast<double>().array() - 1.0;
+  box_high_ = box.last.cast<double>().array() + 1.0;
+  occupied_.emplace(blocks.size, std::span<const std::uint8_t>(blocks.occupied));
   context_.check("uploading the CT");
 }
 
 RenderResult RaycastGlRenderer::render(std::span<const XrayView> views,
                                        std::span<const Eigen::Isometry3d> room_from_patient, const PixelSet& pixels) {
   context_.make_current();
+  timer_.clear();
   std::vector<std::size_t> begins = view_begins(views, pixels);
   const std::size_t pixels_per_pose = begins.back();
   line_integrals_.resize(pixels_per_pose * room_from_patient.size());
   upload_views(views, begins, pixels);
-
-  // As many poses at once as one storage buffer can hold.
-  GLint64 max_bytes = 0;
-  glGetInteger64v(GL_MAX_SHADER_STORAGE_BLOCK_SIZE, &max_bytes);
-  const std::size_t pose_bytes = std::max<std::size_t>(1, pixels_per_pose * sizeof(float));
-  const std::size_t poses_at_once = static_cast<std::size_t>(max_bytes) / pose_bytes;
-  if (poses_at_once == 0)
-    throw Error("images of this size exceed the storage buffers of this OpenGL.\n       Use --renderer cpu");
-  for (std::size_t first = 0; first < room_from_patient.size(); first += poses_at_once) {
-    const std::size_t count = std::min(poses_at_once, room_from_patient.size() - first);
-    dispatch(views, room_from_patient.subspan(first, count), pixels_per_pose, !pixels.of_view.empty(),
-             std::span(line_integrals_).subspan(first * pixels_per_pose, count * pixels_per_pose));
+  const std::size_t at_once = poses_at_once(pixels_per_pose);
+  for (std::size_t first = 0; first < room_from_patient.size(); first += at_once) {
+    const std::size_t count = std::min(at_once, room_from_patient.size() - first);
+    dispatch(views, room_from_patient.subspan(first, count), pixels_per_pose, !pixels.of_view.empty());
+    const auto part = std::span(line_integrals_).subspan(first * pixels_per_pose, count * pixels_per_pose);
+    result_.download(std::as_writable_bytes(part));
   }
   context_.check("rendering");
   return RenderResult(line_integrals_, std::move(begins));
+}
+
+const Buffer& RaycastGlRenderer::render_on_gpu(std::span<const XrayView> views,
+                                               std::span<const Eigen::Isometry3d> room_from_patient,
+                                               const PixelSet& pixels) {
+  context_.make_current();
+  timer_.clear();
+  const std::vector<std::size_t> begins = view_begins(views, pixels);
+  if (room_from_patient.size() > poses_at_once(begins.back()))
+    throw Error("so many images exceed a storage buffer of this OpenGL");
+  upload_views(views, begins, pixels);
+  dispatch(views, room_from_patient, begins.back(), !pixels.of_view.empty());
+  context_.check("rendering");
+  return result_;
+}
+
+// As many poses as one storage buffer can hold.
+std::size_t RaycastGlRenderer::poses_at_once(std::size_t pixels_per_pose) const {
+  GLint64 max_bytes = 0;
+  glGetInteger64v(GL_MAX_SHADER_STORAGE_BLOCK_SIZE, &max_bytes);
+  const std::size_t pose_bytes = std::max<std::size_t>(1, pixels_per_pose * sizeof(float));
+  const std::size_t count = static_cast<std::size_t>(max_bytes) / pose_bytes;
+  if (count == 0)
+    throw Error("images of this size exceed the storage buffers of this OpenGL.\n       Use --renderer cpu");
+  return count;
 }
 
 void RaycastGlRenderer::upload_views(std::span<const XrayView> views, const std::vector<std::size_t>& begins,
                                      const PixelSet& pixels) {
   std::vector<GlView> gl_views;
   for (std::size_t v = 0; v < views.size(); ++v) {
-    attenuation_per_mm_.at(views[v].beam);  // a beam that was not prepared is a logic error
+    attenuation_.at(views[v].beam);  // a beam that was not prepared is a logic error
     gl_views.push_back({.first_pixel = static_cast<std::uint32_t>(begins[v]),
                         .columns = static_cast<std::uint32_t>(views[v].columns),
                         .is_mv = views[v].beam == Beam::kMegavoltage ? 1U : 0U,
@@ -103,7 +132,7 @@ void RaycastGlRenderer::upload_views(std::span<const XrayView> views, const std:
 }
 
 void RaycastGlRenderer::dispatch(std::span<const XrayView> views, std::span<const Eigen::Isometry3d> poses,
-                                 std::size_t pixels_per_pose, bool has_pixel_list, std::span<float> line_integrals) {
+                                 std::size_t pixels_per_pose, bool has_pixel_list) {
   std::vector<glm::mat4> cameras;
   for (const Eigen::Isometry3d& pose : poses)
     for (const XrayView& view : views) {
@@ -114,13 +143,14 @@ void RaycastGlRenderer::dispatch(std::span<const XrayView> views, std::span<cons
       cameras.push_back(to_glm(voxel_from_pixel));
     }
   cameras_.upload(bytes_of(cameras));
-  result_.reserve(line_integrals.size_bytes());
+  result_.reserve(poses.size() * pixels_per_pose * sizeof(float));
 
   program_.use();
-  const Texture3d& kv = attenuation_per_mm_.begin()->second;  // where a beam is absent, any texture stands in unread
-  const Texture3d& mv = attenuation_per_mm_.rbegin()->second;
-  kv.bind(kKvTexture);
-  mv.bind(kMvTexture);
+  const AttenuationTexture& kv = attenuation_.begin()->second;  // where a beam is absent, the other stands in unread
+  const AttenuationTexture& mv = attenuation_.rbegin()->second;
+  kv.texture.bind(kKvTexture);
+  mv.texture.bind(kMvTexture);
+  occupied_->bind(kOccupiedTexture);
   cameras_.bind(kCameras);
   views_.bind(kViews);
   pixels_.bind(kPixels);
@@ -135,11 +165,13 @@ void RaycastGlRenderer::dispatch(std::span<const XrayView> views, std::span<cons
   glUniformMatrix3fv(kMmFromVoxelAxes, 1, GL_FALSE, mm_from_voxel_axes.data());
   glUniform3fv(kBoxLow, 1, low.data());
   glUniform3fv(kBoxHigh, 1, high.data());
+  glUniform2f(kUnitPerMm, static_cast<GLfloat>(kv.unit_per_mm), static_cast<GLfloat>(mv.unit_per_mm));
   const std::size_t groups = (pixels_per_pose + kGroupSize - 1) / kGroupSize;
+  timer_.start();
   glDispatchCompute(static_cast<GLuint>(std::min(groups, kMaxGroups)),
                     static_cast<GLuint>(std::min(poses.size(), kMaxGroups)), 1);
-  glMemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT);
-  result_.download(std::as_writable_bytes(line_integrals));
+  glMemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT | GL_SHADER_STORAGE_BARRIER_BIT);
+  timer_.stop();
 }
 
 }  // namespace isoshift

@@ -1,11 +1,13 @@
 // raycast.comp: line integrals of attenuation along source-to-pixel rays, for all poses, views and pixels of one call.
 // Positions are continuous voxel indices, lengths mm, attenuation 1/mm. The volume is sampled trilinearly at the middle
-// of equal steps of at most step_mm; outside of it the texture's border is 0 (docs/algorithms.md, "Ray casting").
+// of equal steps of at most step_mm; outside of it the texture's border is 0. Blocks in which every sample would be 0 are
+// passed over by a walk from block to block (Amanatides and Woo, Eurographics 1987) (docs/renderers.md, "Ray casting").
 
 layout(local_size_x = 64) in;
 
-layout(binding = 0) uniform sampler3D kv_attenuation_per_mm;
-layout(binding = 1) uniform sampler3D mv_attenuation_per_mm;
+layout(binding = 0) uniform sampler3D kv_attenuation;
+layout(binding = 1) uniform sampler3D mv_attenuation;
+layout(binding = 2) uniform sampler3D occupied;  // block b covers the positions from b * kBlockEdge - 1, as many again
 
 struct View {
   uint first_pixel;  // where the view's pixels begin among those of one pose
@@ -28,10 +30,13 @@ layout(location = 4) uniform float step_mm;
 layout(location = 5) uniform mat3 mm_from_voxel_axes;
 layout(location = 6) uniform vec3 box_low;   // outside of this box, in voxel indices, every sample is 0
 layout(location = 7) uniform vec3 box_high;
+layout(location = 8) uniform vec2 unit_per_mm;  // attenuation of a texture value of 1: kV, MV
+
+const int kBlockEdge = 8;
 
 float attenuation(bool is_mv, vec3 voxel) {
-  if (is_mv) return textureLod(mv_attenuation_per_mm, (voxel + 0.5) / vec3(textureSize(mv_attenuation_per_mm, 0)), 0.0).r;
-  return textureLod(kv_attenuation_per_mm, (voxel + 0.5) / vec3(textureSize(kv_attenuation_per_mm, 0)), 0.0).r;
+  if (is_mv) return textureLod(mv_attenuation, (voxel + 0.5) / vec3(textureSize(mv_attenuation, 0)), 0.0).r;
+  return textureLod(kv_attenuation, (voxel + 0.5) / vec3(textureSize(kv_attenuation, 0)), 0.0).r;
 }
 
 float line_integral(vec3 source, vec3 way, bool is_mv) {
@@ -47,9 +52,31 @@ float line_integral(vec3 source, vec3 way, bool is_mv) {
   float way_mm = length(mm_from_voxel_axes * way);
   int steps = max(1, int(ceil((end - begin) * way_mm / step_mm)));
   float step_t = (end - begin) / float(steps);
+
+  // The walk: t at which the ray enters the next block along each axis.
+  vec3 entry = (source + begin * way + 1.0) / float(kBlockEdge);
+  ivec3 last_block = textureSize(occupied, 0) - 1;
+  ivec3 block = clamp(ivec3(floor(entry)), ivec3(0), last_block);
+  ivec3 direction = ivec3(sign(way));
+  vec3 t_per_block = float(kBlockEdge) / max(abs(way), vec3(1e-20));
+  vec3 next_face = (vec3(block + max(direction, ivec3(0))) * float(kBlockEdge) - 1.0 - source) / way;
+  vec3 next_t = mix(next_face, vec3(1e30), equal(way, vec3(0.0)));
+
   float sum = 0.0;
-  for (int n = 0; n < steps; ++n) sum += attenuation(is_mv, source + (begin + (float(n) + 0.5) * step_t) * way);
-  return sum * step_t * way_mm;
+  int done = 0;
+  while (done < steps) {
+    float exit = min(next_t.x, min(next_t.y, next_t.z));
+    // The samples before the exit: the middle of step n lies at begin + (n + 1/2) step_t.
+    int stop = clamp(int(ceil((exit - begin) / step_t - 0.5)), done, steps);
+    if (texelFetch(occupied, block, 0).r > 0.0)
+      for (int n = done; n < stop; ++n) sum += attenuation(is_mv, source + (begin + (float(n) + 0.5) * step_t) * way);
+    done = stop;
+    bvec3 leaving = bvec3(next_t.x <= exit, next_t.y <= exit, next_t.z <= exit);
+    block += direction * ivec3(leaving);
+    next_t += t_per_block * vec3(leaving);
+    if (any(lessThan(block, ivec3(0))) || any(greaterThan(block, last_block))) break;
+  }
+  return sum * step_t * way_mm * (is_mv ? unit_per_mm.y : unit_per_mm.x);
 }
 
 void main() {

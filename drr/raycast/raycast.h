@@ -1,11 +1,13 @@
 #pragma once
-// Ray casting in an OpenGL compute shader (raycast.comp): any number of poses, views and pixels in one dispatch.
+// Ray casting in an OpenGL compute shader (raycast.comp): any number of poses, views and pixels in one dispatch. What
+// an optimization needs per step can stay on the GPU.
 
 #include <map>
 #include <vector>
 
 #include "drr/gl/context.h"
 #include "drr/gl/objects.h"
+#include "drr/raycast/attenuation_texture.h"
 #include "drr/renderer.h"
 
 namespace isoshift {
@@ -14,22 +16,32 @@ class RaycastGlRenderer final : public Renderer {
  public:
   // Throws Error where there is no OpenGL 4.5 of the kind asked for, or the volume exceeds its limits.
   RaycastGlRenderer(const Volume<float>& ct_hu, const AttenuationModel& model, std::span<const Beam> beams,
-                    GlDevice device);
+                    const RendererOptions& options);
+  ~RaycastGlRenderer() override { context_.make_current(); }
 
   RenderResult render(std::span<const XrayView> views, std::span<const Eigen::Isometry3d> room_from_patient,
                       const PixelSet& pixels) override;
   RendererKind kind() const override { return RendererKind::kRaycast; }
   std::string device() const override { return context_.renderer(); }
+  std::optional<double> gpu_seconds() const override { return timer_.seconds(); }
+
+  // The same, left on the GPU: line integrals as floats, [pose][view][pixel]. The renderer keeps the buffer, until its
+  // next call or its end. Throws Error where the images exceed one storage buffer.
+  const Buffer& render_on_gpu(std::span<const XrayView> views, std::span<const Eigen::Isometry3d> room_from_patient,
+                              const PixelSet& pixels);
 
  private:
+  std::size_t poses_at_once(std::size_t pixels_per_pose) const;
   void upload_views(std::span<const XrayView> views, const std::vector<std::size_t>& begins, const PixelSet& pixels);
   void dispatch(std::span<const XrayView> views, std::span<const Eigen::Isometry3d> poses, std::size_t pixels_per_pose,
-                bool has_pixel_list, std::span<float> line_integrals);
+                bool has_pixel_list);
 
   GlContext context_;  // first: what follows lives in it
   Program program_;
-  std::map<Beam, Texture3d> attenuation_per_mm_;
+  std::map<Beam, AttenuationTexture> attenuation_;
+  std::optional<Texture3d> occupied_;
   Buffer cameras_, views_, pixels_, result_;
+  GlTimer timer_;
   Eigen::Affine3d voxel_from_patient_;
   double step_mm_;
   Eigen::Vector3d box_low_, box_high_;

@@ -81,6 +81,8 @@ std::string json_report(const SetupReport& report) {
                {"threshold_hu", report.threshold_hu},
                {"renderer", report.renderer},
                {"device", report.device}};
+  json["renderer_settings"] = Json::object();
+  for (const auto& [name, value] : report.renderer_settings) json["renderer_settings"][name] = value;
   json["window_hu"] = report.window_hu ? array_of(*report.window_hu) : Json(nullptr);
   int evaluations = 0;
   Json images = Json::array();

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "geometry/couch_shift.h"
@@ -50,6 +51,7 @@ struct SetupReport {
   double threshold_hu = 0.0;
   std::optional<std::array<double, 2>> window_hu;  // low, high; where attenuation is windowed
   std::string renderer, device;
+  std::vector<std::pair<std::string, std::string>> renderer_settings;  // name and value of what it was asked to do
   double seconds_load = 0.0, seconds_register = 0.0, seconds_total = 0.0;
 
   std::string ct_series_uid;

@@ -102,15 +102,17 @@ std::string text_report(const SetupReport& report) {
     text += fmt::format("  {:<14} {:.4f} -> {:.4f}\n", plain(view.label), view.similarity_start, view.similarity_final);
 
   text += list("WARNINGS", report.warnings) + list("OVERRIDES", report.overrides);
+  std::string settings;
+  for (const auto& [name, value] : report.renderer_settings) settings += fmt::format(", {} {}", name, value);
   text += fmt::format(
       "\nCONVENTIONS\n"
       "  IEC 61217, mm and degrees. Facing the gantry: x to the right, y toward the gantry, z up; the origin is the\n"
       "  isocenter. Setup error: anatomy planned at p is found at R p + t, R = Rz Rx Ry. Couch: the table top's axes "
       "at\n"
       "  imaging; angles are changes of the table's read-outs. Shown to 0.1; result.json has full precision.\n\n"
-      "Renderer     {} on {}; attenuation {}, threshold {:.0f} HU; seed {}\n"
+      "Renderer     {} on {}{}; attenuation {}, threshold {:.0f} HU; seed {}\n"
       "Time         {:.1f} s, of which registration {:.1f} s\n",
-      report.renderer, report.device, report.attenuation, report.threshold_hu, report.seed, report.seconds_total,
+      report.renderer, report.device, settings, report.attenuation, report.threshold_hu, report.seed, report.seconds_total,
       report.seconds_register);
   return text;
 }

@@ -34,8 +34,9 @@ TEST(Gl, SoftwareSaysThatItIs) {
 
 TEST(Gl, ShaderErrorsNameFileLineAndDriver) {
   const GlContext context(GlDevice::kSoftware);
-  const std::string error =
-      error_of([] { Program("layout(local_size_x = 1) in;\nvoid main() {\n  nonsense;\n}\n", "drr/test.comp"); });
+  const std::string error = error_of([] {
+    Program(ShaderSource{"layout(local_size_x = 1) in;\nvoid main() {\n  nonsense;\n}\n", "drr/test.comp"});
+  });
   EXPECT_THAT(error, HasSubstr("drr/test.comp: does not compile on llvmpipe"));
   EXPECT_THAT(error, HasSubstr("0:3("));  // line 3
   EXPECT_THAT(error, HasSubstr("nonsense"));
@@ -64,9 +65,10 @@ TEST(Gl, MatricesKeepTheirColumns) {
 
 TEST(Gl, AVolumeBeyondTheLimitsIsRefusedByName) {
   const Volume<float> long_ct = centered_volume({5000, 2, 2}, {0.1, 1, 1}, 0.0F);
-  EXPECT_THAT(error_of([&] { make_renderer(RendererKind::kRaycast, long_ct, {}, kBothBeams, GlDevice::kSoftware); }),
-              testing::AllOf(HasSubstr("a CT of 5000 x 2 x 2 voxels is too large for this OpenGL, whose limit is"),
-                             HasSubstr("Use --renderer cpu")));
+  EXPECT_THAT(
+      error_of([&] { make_renderer(RendererKind::kRaycast, long_ct, {}, kBothBeams, {.gl = GlDevice::kSoftware}); }),
+      testing::AllOf(HasSubstr("a CT of 5000 x 2 x 2 voxels is too large for this OpenGL, whose limit is"),
+                     HasSubstr("Use --renderer cpu")));
 }
 
 // The whole program in its own process, where the environment can be taken away from it.

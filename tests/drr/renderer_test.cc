@@ -38,26 +38,47 @@ struct Tested {
 };
 
 std::string name_of(const Tested& tested) {
-  const std::string kind(to_string(tested.kind));
-  if (tested.kind != RendererKind::kRaycast) return kind;
-  return kind + (tested.gl == GlDevice::kHardware ? "_hardware" : "_software");
+  std::string name(to_string(tested.kind));
+  std::ranges::replace(name, '-', '_');
+  if (uses_gl(tested.kind)) name += tested.gl == GlDevice::kHardware ? "_hardware" : "_software";
+  return name;
 }
 
 void PrintTo(const Tested& tested, std::ostream* out) { *out << name_of(tested); }
 
+std::vector<Tested> all_tested() {
+  std::vector<Tested> all;
+  for (const RendererKind kind : kRendererKinds) {
+    if (uses_gl(kind)) all.push_back({kind, GlDevice::kSoftware});
+    all.push_back({kind, GlDevice::kHardware});
+  }
+  return all;
+}
+
 class RendererTest : public testing::TestWithParam<Tested> {
  protected:
   void SetUp() override {
-    if (GetParam().kind == RendererKind::kRaycast && GetParam().gl == GlDevice::kHardware && !has_hardware_gl())
+    if (uses_gl(GetParam().kind) && GetParam().gl == GlDevice::kHardware && !has_hardware_gl())
       GTEST_SKIP() << "no GPU here";
   }
   std::unique_ptr<Renderer> make(const Volume<float>& ct, const AttenuationModel& model = {}) {
-    return make_renderer(GetParam().kind, ct, model, kBothBeams, GetParam().gl);
+    return make_renderer(GetParam().kind, ct, model, kBothBeams, {.gl = GetParam().gl});
   }
-  // Interpolating renderers smear an edge over one voxel; Siddon does not.
-  bool interpolates() const { return GetParam().kind != RendererKind::kSiddon; }
-  // The others are exact for their interpolation.
-  bool steps() const { return GetParam().kind == RendererKind::kCpu || GetParam().kind == RendererKind::kRaycast; }
+  // Interpolating renderers smear an edge over one voxel; Siddon and splatting do not.
+  bool interpolates() const { return GetParam().kind != RendererKind::kSiddon && !splats(); }
+  // Rays at fixed steps, not exact and not plane by plane.
+  bool steps() const { return uses_gl(GetParam().kind) && !splats(); }
+  bool splats() const { return is_splatting(GetParam().kind); }
+
+  // The line integral about a pixel. What splatting counts are voxels that fall into pixels: its noise is taken out by
+  // averaging over `half` pixels to each side, where the image is flat enough for that.
+  double value_at(const std::vector<float>& drr, int columns, int column, int row, int half) const {
+    if (!splats()) return drr[static_cast<std::size_t>(row * columns + column)];
+    double sum = 0.0;
+    for (int r = row - half; r <= row + half; ++r)
+      for (int c = column - half; c <= column + half; ++c) sum += drr[static_cast<std::size_t>(r * columns + c)];
+    return sum / ((2 * half + 1) * (2 * half + 1));
+  }
 };
 
 TEST_P(RendererTest, RayThroughUniformCubeIntegratesToPathLengthTimesAttenuation) {
@@ -67,9 +88,12 @@ TEST_P(RendererTest, RayThroughUniformCubeIntegratesToPathLengthTimesAttenuation
   for (const double gantry_deg : {0.0, 90.0, 180.0, 270.0}) {
     const XrayView view = centered_view(gantry_deg, 33, 1.0);
     const auto drr = rendered(*renderer, view, Eigen::Isometry3d::Identity());
-    EXPECT_NEAR(drr[16 * 33 + 16], 82.0 * kWater, 1e-4) << "gantry " << gantry_deg;
+    // Splatting: some 3000 voxels fall into the 31 x 31 pixels, of which those along the rim fall in or out by chance.
+    const double tolerance = splats() ? 0.02 * 82.0 * kWater : 1e-4;
+    EXPECT_NEAR(value_at(drr, 33, 16, 16, 15), 82.0 * kWater, tolerance) << "gantry " << gantry_deg;
     // A ray 10 pixels off the axis runs inclined by tan = 10/1500 between the same two faces.
-    EXPECT_NEAR(drr[16 * 33 + 26], 82.0 * kWater * std::hypot(1.0, 10.0 / 1500.0), 1e-3) << "gantry " << gantry_deg;
+    EXPECT_NEAR(value_at(drr, 33, 26, 16, 6), 82.0 * kWater * std::hypot(1.0, 10.0 / 1500.0), splats() ? 0.1 : 1e-3)
+        << "gantry " << gantry_deg;
   }
 }
 
@@ -77,6 +101,15 @@ TEST_P(RendererTest, OneVoxelIntegratesToItsEdgeLength) {
   Volume<float> ct = centered_volume(Vector3i::Constant(21), Vector3d(1.5, 2.0, 3.0), -1000.0F);
   ct.at(10, 10, 10) = 0.0F;
   const auto renderer = make(ct);
+  if (splats()) {
+    // One voxel falls into one pixel, with all that it holds: mu dV in units of a pixel's area at the isocenter.
+    const auto drr = rendered(*renderer, centered_view(0, 33, 1.0), Eigen::Isometry3d::Identity());
+    const double pixel_area_mm2 = std::pow(1000.0 / 1500.0, 2);
+    const double weight = 1.5 * 2.0 * 3.0 * kWater / pixel_area_mm2;
+    EXPECT_EQ(std::ranges::count(drr, 0.0F), 33 * 33 - 1);
+    EXPECT_NEAR(*std::ranges::max_element(drr), weight, 1e-5 * weight);
+    return;
+  }
   // The central ray meets the voxel's center along one of its axes: the interpolated tent has the voxel's own area. Two
   // or three midpoint samples of such a tent are off by up to a ninth; on a CT these errors average out.
   const double tolerance = steps() ? 0.12 : 1e-6;
@@ -99,7 +132,8 @@ TEST_P(RendererTest, SphereHasTheChordsOfASphere) {
     const Ray ray = view.ray(column, 30);
     const double chord_mm = sphere.chord_mm(ray.source_room_mm, ray.pixel_room_mm);
     // Partial volumes are sampled by 8 points: about 1 % of a voxel at each end.
-    EXPECT_NEAR(drr[static_cast<std::size_t>(30 * 65 + column)], chord_mm * kWater, 0.35 * kWater)
+    // Splatting: 49 pixels hold some 5 voxels per mm of depth.
+    EXPECT_NEAR(value_at(drr, 65, column, 30, 3), chord_mm * kWater, (splats() ? 2.0 : 0.35) * kWater)
         << "column " << column;
   }
 }
@@ -135,8 +169,54 @@ TEST_P(RendererTest, SparsePixelsEqualThoseOfTheWholeImage) {
   const auto whole = rendered(*renderer, view, pose);
   const PixelSet pixels{.of_view = {{0, 5, 820, 821, 1599}}};
   const RenderResult sparse = renderer->render(std::span(&view, 1), std::span(&pose, 1), pixels);
+  // Rays in other company are counted from another plane: they differ by the rounding of floats.
   for (std::size_t n = 0; n < pixels.of_view[0].size(); ++n)
-    EXPECT_EQ(sparse.line_integrals(0, 0)[n], whole[pixels.of_view[0][n]]);
+    EXPECT_NEAR(sparse.line_integrals(0, 0)[n], whole[pixels.of_view[0][n]], 1e-5);
+}
+
+TEST_P(RendererTest, RandomPixelsEqualThoseOfTheWholeImage) {
+  const Volume<float> ct = textured_volume();
+  const auto renderer = make(ct);
+  const std::vector<XrayView> views = {centered_view(20, 61, 3.0), centered_view(110, 40, 4.0)};
+  const Eigen::Isometry3d pose = random_poses(1).front();
+  const PixelSet pixels = PixelSet::random(views, 0.05, 1);
+  const RenderResult result = renderer->render(views, std::span(&pose, 1), pixels);
+  const std::vector<float> sparse(result.line_integrals(0, 1).begin(), result.line_integrals(0, 1).end());
+  EXPECT_EQ(sparse.size(), 80U);
+  const auto whole = rendered(*renderer, views[1], pose);
+  for (std::size_t n = 0; n < sparse.size(); ++n) ASSERT_NEAR(sparse[n], whole[pixels.of_view[1][n]], 1e-5);
+}
+
+TEST_P(RendererTest, SameSeedSameImage) {
+  const Volume<float> ct = textured_volume();
+  const XrayView view = centered_view(20, 40, 4.0);
+  const Eigen::Isometry3d pose = random_poses(1).front();
+  const auto first = rendered(*make(ct), view, pose);
+  EXPECT_EQ(rendered(*make(ct), view, pose), first);
+  const auto renderer = make(ct);
+  rendered(*renderer, centered_view(90, 24, 6.0), pose);
+  EXPECT_EQ(rendered(*renderer, view, pose), first);  // whatever was rendered before
+}
+
+TEST_P(RendererTest, VoxelsBelowTheThresholdCountAsNothing) {
+  // Two blocks of 41 mm side by side in the image, at -600 HU (right) and 0 HU (left).
+  Volume<float> ct = centered_volume(Vector3i(41, 41, 82), Vector3d::Constant(1.0), 0.0F);
+  for (int k = 0; k < 41; ++k)
+    for (int j = 0; j < 41; ++j)
+      for (int i = 0; i < 41; ++i) ct.at(i, j, k) = -600.0F;
+  const XrayView view = centered_view(90, 65, 1.5);
+  const auto without = rendered(*make(ct, {.threshold_hu = -700}), view, Eigen::Isometry3d::Identity());
+  const auto with = rendered(*make(ct, {.threshold_hu = -540}), view, Eigen::Isometry3d::Identity());
+  double faint = 0.0, nothing = 0.0, dense = 0.0;
+  for (int row = 20; row < 45; ++row)
+    for (int column = 36; column < 56; ++column) {
+      faint += without[static_cast<std::size_t>(row * 65 + column)];
+      nothing += with[static_cast<std::size_t>(row * 65 + column)];
+      dense += with[static_cast<std::size_t>(row * 65 + 64 - column)];
+    }
+  EXPECT_NEAR(faint, 500 * 41 * kWater * 0.4, 0.05 * 500 * 41 * kWater * 0.4);
+  EXPECT_EQ(nothing, 0.0);
+  EXPECT_NEAR(dense, 500 * 41 * kWater, 0.05 * 500 * 41 * kWater);
 }
 
 TEST_P(RendererTest, MovingThePatientEqualsMovingTheLattice) {
@@ -147,7 +227,10 @@ TEST_P(RendererTest, MovingThePatientEqualsMovingTheLattice) {
   const XrayView view = centered_view(45, 40, 4.0);
   const auto by_pose = rendered(*make(ct), view, motion);
   const auto by_lattice = rendered(*make(moved), view, Eigen::Isometry3d::Identity());
-  for (std::size_t n = 0; n < by_pose.size(); ++n) ASSERT_NEAR(by_pose[n], by_lattice[n], 2e-3) << "pixel " << n;
+  // Splatting: a voxel on the border of two pixels may fall to either side by rounding.
+  int differ = 0;
+  for (std::size_t n = 0; n < by_pose.size(); ++n) differ += std::abs(by_pose[n] - by_lattice[n]) > 2e-3 ? 1 : 0;
+  EXPECT_LE(differ, splats() ? 8 : 0);
 }
 
 TEST_P(RendererTest, EachBeamSeesItsOwnAttenuation) {
@@ -155,7 +238,8 @@ TEST_P(RendererTest, EachBeamSeesItsOwnAttenuation) {
   const auto renderer = make(cube);
   XrayView view = centered_view(0, 33, 1.0);
   view.beam = Beam::kMegavoltage;
-  EXPECT_NEAR(rendered(*renderer, view, Eigen::Isometry3d::Identity())[16 * 33 + 16], 82.0 * 0.0050, 1e-4);
+  const auto drr = rendered(*renderer, view, Eigen::Isometry3d::Identity());
+  EXPECT_NEAR(value_at(drr, 33, 16, 16, 15), 82.0 * 0.0050, splats() ? 0.02 * 82.0 * 0.0050 : 1e-4);
 }
 
 TEST_P(RendererTest, FollowsShearedAxes) {
@@ -166,7 +250,7 @@ TEST_P(RendererTest, FollowsShearedAxes) {
   sheared.patient_from_voxel.translation() -= 20.0 * Vector3d(0, 2.0 * std::tan(rad_from_deg(15)), 0);
   const auto renderer = make(sheared);
   const auto drr = rendered(*renderer, centered_view(0, 33, 1.0), Eigen::Isometry3d::Identity());
-  EXPECT_NEAR(drr[16 * 33 + 16], 82.0 * kWater, 2e-3);
+  EXPECT_NEAR(value_at(drr, 33, 16, 16, 15), 82.0 * kWater, splats() ? 0.02 * 82.0 * kWater : 2e-3);
 }
 
 TEST_P(RendererTest, AgreesWithItsOracle) {
@@ -176,16 +260,18 @@ TEST_P(RendererTest, AgreesWithItsOracle) {
   const auto renderer = make(ct);
   const XrayView view = centered_view(35, 96, 3.0);
   for (const Eigen::Isometry3d& pose : random_poses(3)) {
-    const double error = relative_error(rendered(*renderer, view, pose), rendered(*oracle, view, pose));
-    EXPECT_LT(error, 0.005);  // the requirement of part 1 of the project: 0.5 %
+    const auto drr = rendered(*renderer, view, pose), expected = rendered(*oracle, view, pose);
+    if (splats()) {
+      // Without any fitted factor. The default wobble blurs by half a voxel: 1 mm at the isocenter, half a pixel here.
+      EXPECT_NEAR(mean_of(drr) / mean_of(expected), 1.0, 0.01);
+      EXPECT_GT(correlation(blurred(drr, 96, 0.5), blurred(expected, 96, 0.5)), 0.99);
+    } else {
+      EXPECT_LT(relative_error(drr, expected), 0.005);  // 0.5 %
+    }
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(All, RendererTest,
-                         testing::Values(Tested{RendererKind::kSiddon}, Tested{RendererKind::kTrilinear},
-                                         Tested{RendererKind::kCpu},
-                                         Tested{RendererKind::kRaycast, GlDevice::kSoftware},
-                                         Tested{RendererKind::kRaycast, GlDevice::kHardware}),
+INSTANTIATE_TEST_SUITE_P(All, RendererTest, testing::ValuesIn(all_tested()),
                          [](const auto& param) { return name_of(param.param); });
 
 TEST(Oracles, DifferByLessThanWhatTheDocsSay) {

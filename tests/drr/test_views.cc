@@ -1,6 +1,8 @@
 #include "tests/drr/test_views.h"
 
 #include <cmath>
+#include <numeric>
+#include <opencv2/imgproc.hpp>
 #include <random>
 
 #include "geometry/rotation.h"
@@ -51,6 +53,29 @@ std::vector<Eigen::Isometry3d> random_poses(int count) {
     poses.push_back(pose);
   }
   return poses;
+}
+
+double mean_of(const std::vector<float>& pixels) {
+  return std::accumulate(pixels.begin(), pixels.end(), 0.0) / static_cast<double>(pixels.size());
+}
+
+double correlation(const std::vector<float>& a, const std::vector<float>& b) {
+  const double mean_a = mean_of(a), mean_b = mean_of(b);
+  double ab = 0.0, aa = 0.0, bb = 0.0;
+  for (std::size_t n = 0; n < a.size(); ++n) {
+    ab += (a[n] - mean_a) * (b[n] - mean_b);
+    aa += std::pow(a[n] - mean_a, 2);
+    bb += std::pow(b[n] - mean_b, 2);
+  }
+  return ab / std::sqrt(aa * bb);
+}
+
+std::vector<float> blurred(const std::vector<float>& pixels, int columns, double sigma_px) {
+  const cv::Mat image(static_cast<int>(pixels.size()) / columns, columns, CV_32F, const_cast<float*>(pixels.data()));
+  std::vector<float> result(pixels.size());
+  cv::Mat into(image.rows, image.cols, CV_32F, result.data());
+  cv::GaussianBlur(image, into, cv::Size(0, 0), sigma_px);
+  return result;
 }
 
 double relative_error(const std::vector<float>& pixels, const std::vector<float>& oracle) {

@@ -26,6 +26,14 @@ Volume<float> phantom_ct();
 // Poses within 10 mm and 10 degrees, the same in every run.
 std::vector<Eigen::Isometry3d> random_poses(int count);
 
+double mean_of(const std::vector<float>& pixels);
+
+// Pearson's correlation.
+double correlation(const std::vector<float>& a, const std::vector<float>& b);
+
+// A Gaussian blur of an image; sigma in pixels.
+std::vector<float> blurred(const std::vector<float>& pixels, int columns, double sigma_px);
+
 // rms(difference) / rms(oracle) over the pixels whose oracle value is not 0.
 double relative_error(const std::vector<float>& pixels, const std::vector<float>& oracle);
 

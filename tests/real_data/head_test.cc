@@ -77,7 +77,7 @@ TEST(HeadRenderers, AreWithinHalfAPercentOfTheirOracle) {
   const Eigen::Isometry3d pose = planned_room_from_patient(PatientPosition::kHfs, {}, Eigen::Vector3d(0, 110, 770));
   const XrayView view = centered_view(0, 128, 3.0);
   const auto rendered = [&](RendererKind kind) {
-    const auto renderer = make_renderer(kind, ct, {}, kBothBeams, GlDevice::kSoftware);
+    const auto renderer = make_renderer(kind, ct, {}, kBothBeams, {.gl = GlDevice::kSoftware});
     const RenderResult result = renderer->render(std::span(&view, 1), std::span(&pose, 1), PixelSet::all());
     const auto pixels = result.line_integrals(0, 0);
     return std::vector<float>(pixels.begin(), pixels.end());

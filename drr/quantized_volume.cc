@@ -1,0 +1,96 @@
+#include "drr/quantized_volume.h"
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <mutex>
+#include <type_traits>
+
+namespace isoshift {
+namespace {
+
+QuantizedVolume::Voxels storage(VolumePrecision precision, std::size_t count) {
+  switch (precision) {
+    case VolumePrecision::kU8: return std::vector<std::uint8_t>(count);
+    case VolumePrecision::kU16: return std::vector<std::uint16_t>(count);
+    case VolumePrecision::kF32: break;
+  }
+  return std::vector<float>(count);
+}
+
+// What the largest integer stands for.
+double full_scale_per_mm(const Volume<float>& ct_hu, const AttenuationModel& model, Beam beam) {
+  if (model.kind == AttenuationModel::Kind::kWindowed || ct_hu.voxels.empty()) return 1.0;
+  const float highest = model.attenuation_per_mm(*std::ranges::max_element(ct_hu.voxels), beam);
+  return highest > 0.0F ? highest : 1.0;
+}
+
+}  // namespace
+
+std::string_view to_string(VolumePrecision precision) {
+  switch (precision) {
+    case VolumePrecision::kU8: return "u8";
+    case VolumePrecision::kU16: return "u16";
+    case VolumePrecision::kF32: return "f32";
+  }
+  return "";
+}
+
+std::optional<VolumePrecision> volume_precision_from(std::string_view name) {
+  for (const VolumePrecision precision : kVolumePrecisions)
+    if (to_string(precision) == name) return precision;
+  return std::nullopt;
+}
+
+QuantizedVolume quantized_attenuation(const Volume<float>& ct_hu, const AttenuationModel& model, Beam beam,
+                                      VolumePrecision precision) {
+  QuantizedVolume volume{.size = ct_hu.size, .voxels = storage(precision, ct_hu.voxels.size())};
+  std::visit(
+      [&]<class T>(std::vector<T>& voxels) {
+        constexpr bool kInteger = std::is_integral_v<T>;
+        if (kInteger)
+          volume.unit_per_mm =
+              full_scale_per_mm(ct_hu, model, beam) / static_cast<double>(std::numeric_limits<T>::max());
+        const auto per_unit = static_cast<float>(1.0 / volume.unit_per_mm);
+        tbb::parallel_for(tbb::blocked_range<std::size_t>(0, voxels.size(), 1 << 16), [&](const auto& range) {
+          for (std::size_t n = range.begin(); n != range.end(); ++n) {
+            const float value = per_unit * model.attenuation_per_mm(ct_hu.voxels[n], beam);
+            voxels[n] = static_cast<T>(kInteger ? value + 0.5F : value);
+          }
+        });
+      },
+      volume.voxels);
+  return volume;
+}
+
+VoxelBox occupied_voxels(const QuantizedVolume& volume) {
+  const Eigen::Vector3i& size = volume.size;
+  VoxelBox box{.first = size, .last = Eigen::Vector3i::Constant(-1)};
+  std::mutex mutex;
+  std::visit(
+      [&]<class T>(const std::vector<T>& voxels) {
+        tbb::parallel_for(0, size.z(), [&](int k) {
+          VoxelBox of_slice{.first = size, .last = Eigen::Vector3i::Constant(-1)};
+          for (int j = 0; j < size.y(); ++j) {
+            const T* row = voxels.data() + (static_cast<std::size_t>(k) * size.y() + j) * size.x();
+            const T* const end = row + size.x();
+            const T* const first = std::find_if(row, end, [](T value) { return value != T{}; });
+            if (first == end) continue;
+            const T* last = end - 1;
+            while (*last == T{}) --last;
+            of_slice.first = of_slice.first.cwiseMin(Eigen::Vector3i(static_cast<int>(first - row), j, k));
+            of_slice.last = of_slice.last.cwiseMax(Eigen::Vector3i(static_cast<int>(last - row), j, k));
+          }
+          const std::scoped_lock lock(mutex);
+          box.first = box.first.cwiseMin(of_slice.first);
+          box.last = box.last.cwiseMax(of_slice.last);
+        });
+      },
+      volume.voxels);
+  return box;
+}
+
+}  // namespace isoshift
