@@ -152,6 +152,7 @@ RegistrationResult register_views(Renderer& renderer, std::span<const XrayImage>
   for (const XrayImage& xray : xrays) views.push_back(xray.view);
   result.unobservable_room = unobservable_directions(views);
   for (std::size_t n = 3; n < parameters.size(); ++n) parameters[n] /= kLeverMm;
+  result.renderer = renderer.kind();
   judge(parameters, options, result);
   result.seconds = seconds_since(begin);
   return result;

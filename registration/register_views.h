@@ -66,6 +66,7 @@ struct RegistrationResult {
   Verdict verdict = Verdict::kRejected;
   std::vector<std::string> reasons = {"not run"};  // why the verdict is not `accepted`
   std::vector<std::string> warnings;
+  RendererKind renderer = RendererKind::kCpu;  // what rendered the DRRs
   Eigen::Isometry3d actual_room_from_patient = Eigen::Isometry3d::Identity();
   std::vector<Eigen::Vector3d> unobservable_room;  // unit directions along which the views cannot tell
   std::vector<ViewReport> views;

@@ -132,6 +132,11 @@ void GlContext::check(const char* doing) const {
         error == GL_OUT_OF_MEMORY ? ": out of its memory" : fmt::format(": OpenGL error {:#x}", error), kInstead));
 }
 
+std::optional<double> seconds_of(const GlTimer& timer, const GlContext& context) {
+  if (context.is_software()) return std::nullopt;
+  return timer.seconds();
+}
+
 std::vector<std::string> describe_gl_devices() {
   std::vector<std::string> lines;
   for (const GlDevice device : {GlDevice::kHardware, GlDevice::kSoftware}) {

@@ -2,9 +2,11 @@
 // Headless OpenGL 4.5 through EGL. Hardware first; a software renderer only when asked for.
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "drr/gl/objects.h"
 #include "drr/renderer.h"
 
 namespace isoshift {
@@ -35,6 +37,10 @@ class GlContext {
   std::string renderer_, version_;
   bool is_software_ = false;
 };
+
+// What a timer of this context has counted; nothing on llvmpipe, whose clock stands still for compute shaders and has
+// returned the machine's uptime for others.
+std::optional<double> seconds_of(const GlTimer& timer, const GlContext& context);
 
 // What there is to render on, a line each, for people; never throws.
 std::vector<std::string> describe_gl_devices();

@@ -119,7 +119,7 @@ class Program {
   GlName name_;
 };
 
-// The time that OpenGL needs by its own clock, between start() and stop(), in all since clear().
+// The time that the GPU is busy between start() and stop(), by its own clock, in all since clear().
 class GlTimer {
  public:
   void clear() { queries_.clear(); }

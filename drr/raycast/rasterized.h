@@ -26,7 +26,7 @@ class RasterizedRaycaster final : public Renderer {
                       const PixelSet& pixels) override;
   RendererKind kind() const override { return kind_; }
   std::string device() const override { return context_.renderer(); }
-  std::optional<double> gpu_seconds() const override { return timer_.seconds(); }
+  std::optional<double> gpu_seconds() const override { return seconds_of(timer_, context_); }
 
   // The front faces as colors: position in the volume from 0 to 1 along each axis (Fig. 1 of the paper). Background:
   // NaN.

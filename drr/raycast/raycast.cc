@@ -33,7 +33,7 @@ constexpr std::size_t kGroupSize = 64;
 constexpr std::size_t kMaxGroups = 65535;  // what every OpenGL 4.5 allows along each axis
 
 struct GlView {
-  std::uint32_t first_pixel, columns, is_mv, unused;
+  std::uint32_t first_pixel, columns, is_mv, in_squares;
 };
 
 template <class T>
@@ -117,10 +117,11 @@ void RaycastGlRenderer::upload_views(std::span<const XrayView> views, const std:
   std::vector<GlView> gl_views;
   for (std::size_t v = 0; v < views.size(); ++v) {
     attenuation_.at(views[v].beam);  // a beam that was not prepared is a logic error
+    const bool in_squares = pixels.of_view.empty() && views[v].columns % 8 == 0 && views[v].rows % 8 == 0;
     gl_views.push_back({.first_pixel = static_cast<std::uint32_t>(begins[v]),
                         .columns = static_cast<std::uint32_t>(views[v].columns),
                         .is_mv = views[v].beam == Beam::kMegavoltage ? 1U : 0U,
-                        .unused = 0});
+                        .in_squares = in_squares ? 1U : 0U});
   }
   views_.upload(bytes_of(gl_views));
   std::vector<std::uint32_t> list = {0};  // never empty: a buffer without storage cannot be bound

@@ -13,7 +13,7 @@ struct View {
   uint first_pixel;  // where the view's pixels begin among those of one pose
   uint columns;
   uint is_mv;
-  uint unused;
+  uint in_squares;   // whether its pixels can be taken in squares of 8 x 8
 };
 
 // Columns 0 to 2 take (column, row, 1) to the way from source to pixel; column 3 is the source.
@@ -62,19 +62,22 @@ float line_integral(vec3 source, vec3 way, bool is_mv) {
   vec3 next_face = (vec3(block + max(direction, ivec3(0))) * float(kBlockEdge) - 1.0 - source) / way;
   vec3 next_t = mix(next_face, vec3(1e30), equal(way, vec3(0.0)));
 
+  // Whole runs of occupied blocks are sampled in one loop: neighboring rays then stay together for most of their way.
   float sum = 0.0;
-  int done = 0;
-  while (done < steps) {
-    float exit = min(next_t.x, min(next_t.y, next_t.z));
-    // The samples before the exit: the middle of step n lies at begin + (n + 1/2) step_t.
-    int stop = clamp(int(ceil((exit - begin) / step_t - 0.5)), done, steps);
-    if (texelFetch(occupied, block, 0).r > 0.0)
-      for (int n = done; n < stop; ++n) sum += attenuation(is_mv, source + (begin + (float(n) + 0.5) * step_t) * way);
-    done = stop;
-    bvec3 leaving = bvec3(next_t.x <= exit, next_t.y <= exit, next_t.z <= exit);
-    block += direction * ivec3(leaving);
-    next_t += t_per_block * vec3(leaving);
-    if (any(lessThan(block, ivec3(0))) || any(greaterThan(block, last_block))) break;
+  int next = 0;  // the first sample behind the blocks walked through; the middle of step n lies at begin + (n + 1/2) step_t
+  while (next < steps) {
+    bool run = texelFetch(occupied, block, 0).r > 0.0;
+    int first = next;
+    do {
+      float exit = min(next_t.x, min(next_t.y, next_t.z));
+      next = clamp(int(ceil((exit - begin) / step_t - 0.5)), next, steps);
+      bvec3 leaving = lessThanEqual(next_t, vec3(exit));
+      block += direction * ivec3(leaving);
+      next_t += t_per_block * vec3(leaving);
+      if (any(lessThan(block, ivec3(0))) || any(greaterThan(block, last_block))) next = steps;
+    } while (next < steps && (texelFetch(occupied, block, 0).r > 0.0) == run);
+    if (!run) continue;
+    for (int n = first; n < next; ++n) sum += attenuation(is_mv, source + (begin + (float(n) + 0.5) * step_t) * way);
   }
   return sum * step_t * way_mm * (is_mv ? unit_per_mm.y : unit_per_mm.x);
 }
@@ -85,10 +88,17 @@ void main() {
     for (uint n = gl_GlobalInvocationID.x; n < pixels_per_pose; n += gl_NumWorkGroups.x * gl_WorkGroupSize.x) {
       uint view = 0u;
       while (view + 1u < view_count && n >= views[view + 1u].first_pixel) ++view;
-      uint pixel = has_pixel_list ? pixels[n] : n - views[view].first_pixel;
-      vec3 position = vec3(float(pixel % views[view].columns), float(pixel / views[view].columns), 1.0);
+      uint place = n - views[view].first_pixel;
+      uint columns = views[view].columns;
+      // The 64 rays of a group read voxels close to each other if they make a square of pixels.
+      if (views[view].in_squares != 0u) {
+        uint square = place / 64u, inside = place % 64u;
+        place = (square / (columns / 8u) * 8u + inside / 8u) * columns + square % (columns / 8u) * 8u + inside % 8u;
+      }
+      uint pixel = has_pixel_list ? pixels[n] : place;
+      vec3 position = vec3(float(pixel % columns), float(pixel / columns), 1.0);
       mat4 camera = voxel_from_pixel[pose * view_count + view];
-      line_integrals[pose * pixels_per_pose + n] =
+      line_integrals[pose * pixels_per_pose + views[view].first_pixel + place] =
           line_integral(camera[3].xyz, mat3(camera) * position, views[view].is_mv != 0u);
     }
   }

@@ -23,7 +23,7 @@ class RaycastGlRenderer final : public Renderer {
                       const PixelSet& pixels) override;
   RendererKind kind() const override { return RendererKind::kRaycast; }
   std::string device() const override { return context_.renderer(); }
-  std::optional<double> gpu_seconds() const override { return timer_.seconds(); }
+  std::optional<double> gpu_seconds() const override { return seconds_of(timer_, context_); }
 
   // The same, left on the GPU: line integrals as floats, [pose][view][pixel]. The renderer keeps the buffer, until its
   // next call or its end. Throws Error where the images exceed one storage buffer.

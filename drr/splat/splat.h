@@ -25,7 +25,7 @@ class SplatRenderer final : public Renderer {
                       const PixelSet& pixels) override;
   RendererKind kind() const override { return kind_; }
   std::string device() const override { return context_.renderer(); }
-  std::optional<double> gpu_seconds() const override { return timer_.seconds(); }
+  std::optional<double> gpu_seconds() const override { return seconds_of(timer_, context_); }
 
  private:
   // The voxels above the threshold, as they are sent.

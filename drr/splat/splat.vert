@@ -47,7 +47,6 @@ void main() {
   uvec3 position = uvec3(voxel % size.x, voxel / size.x % size.y, voxel / (size.x * size.y));
   vec3 projected = (pixel_from_voxel * vec4(vec3(position), 1.0)).xyz;
   float w = projected.z;
-  gl_PointSize = 1.0;
   deposit = 0.0;
   gl_Position = vec4(2.0, 2.0, 2.0, 1.0);  // out of sight
   if (!(w > 0.0 && w < 1.0)) return;       // not between source and receptor

@@ -154,14 +154,36 @@ void write_comparison_png(const std::filesystem::path& path, const ViewCompariso
   write_png(path, page);
 }
 
-void write_line_integral_png(const std::filesystem::path& path, const Image<float>& line_integral) {
+Image<Rgb> radiograph(const Image<float>& line_integral) {
   const Scale scale = scale_of(line_integral.pixels);
   Image<Rgb> picture(line_integral.columns, line_integral.rows);
   std::ranges::transform(line_integral.pixels, picture.pixels.begin(), [&](float value) {
     const std::uint8_t gray = byte(scale(value));
     return Rgb{gray, gray, gray};
   });
-  write_png(path, picture);
+  return picture;
+}
+
+void write_line_integral_png(const std::filesystem::path& path, const Image<float>& line_integral) {
+  write_png(path, radiograph(line_integral));
+}
+
+void write_captioned_png(const std::filesystem::path& path, const std::vector<CaptionedPicture>& pictures,
+                         int per_row) {
+  const int rows = (static_cast<int>(pictures.size()) + per_row - 1) / per_row;
+  Image<Rgb> page(per_row * (kTilePx + kGapPx) - kGapPx, rows * (kTilePx + kCaptionPx + kGapPx) - kGapPx, Rgb{0, 0, 0});
+  for (int n = 0; n < static_cast<int>(pictures.size()); ++n) {
+    const int x = n % per_row * (kTilePx + kGapPx), y = n / per_row * (kTilePx + kCaptionPx + kGapPx);
+    const Image<Rgb>& picture = pictures[static_cast<std::size_t>(n)].picture;
+    write_caption(page, x, y, pictures[static_cast<std::size_t>(n)].caption);
+    const double zoom = static_cast<double>(std::max(picture.columns, picture.rows)) / kTilePx;
+    for (int row = 0; row < std::min(kTilePx, static_cast<int>(picture.rows / zoom)); ++row)
+      for (int column = 0; column < std::min(kTilePx, static_cast<int>(picture.columns / zoom)); ++column)
+        page.at(x + column, y + kCaptionPx + row) =
+            picture.at(std::min(picture.columns - 1, static_cast<int>((column + 0.5) * zoom)),
+                       std::min(picture.rows - 1, static_cast<int>((row + 0.5) * zoom)));
+  }
+  write_png(path, page);
 }
 
 }  // namespace isoshift

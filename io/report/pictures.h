@@ -6,9 +6,11 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "geometry/image.h"
 #include "geometry/xray_view.h"
+#include "io/image_files.h"
 
 namespace isoshift {
 
@@ -28,7 +30,15 @@ struct ViewComparison {
 // pose found; outside the field everything is dimmed. The cross marks the isocenter.
 void write_comparison_png(const std::filesystem::path& path, const ViewComparison& comparison);
 
-// One image of line integrals as radiographs are looked at: dense is bright.
+// Pictures side by side and below each other, a caption above each.
+struct CaptionedPicture {
+  std::string caption;
+  Image<Rgb> picture;
+};
+void write_captioned_png(const std::filesystem::path& path, const std::vector<CaptionedPicture>& pictures, int per_row);
+
+// An image of line integrals as radiographs are looked at: dense is bright. The second writes it.
+Image<Rgb> radiograph(const Image<float>& line_integral);
 void write_line_integral_png(const std::filesystem::path& path, const Image<float>& line_integral);
 
 }  // namespace isoshift

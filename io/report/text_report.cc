@@ -112,8 +112,8 @@ std::string text_report(const SetupReport& report) {
       "  imaging; angles are changes of the table's read-outs. Shown to 0.1; result.json has full precision.\n\n"
       "Renderer     {} on {}{}; attenuation {}, threshold {:.0f} HU; seed {}\n"
       "Time         {:.1f} s, of which registration {:.1f} s\n",
-      report.renderer, report.device, settings, report.attenuation, report.threshold_hu, report.seed, report.seconds_total,
-      report.seconds_register);
+      report.renderer, report.device, settings, report.attenuation, report.threshold_hu, report.seed,
+      report.seconds_total, report.seconds_register);
   return text;
 }
 

@@ -162,7 +162,6 @@ TEST(RaycastGl, LeavesResultsOnTheGpu) {
       const auto part = result.line_integrals(p, v);
       expected.insert(expected.end(), part.begin(), part.end());
     }
-  EXPECT_GT(renderer.gpu_seconds().value(), 0.0);
   const Buffer& left = renderer.render_on_gpu(views, poses, pixels);
   std::vector<float> found(expected.size());
   left.download(std::as_writable_bytes(std::span(found)));

@@ -40,6 +40,14 @@ TEST(Quality, AParameterAtItsBoundNeedsReview) {
   EXPECT_THAT(result.reasons, ElementsAre("the y translation ended at its bound"));
 }
 
+TEST(Quality, SplattingNeedsReview) {
+  RegistrationResult result = good_result();
+  result.renderer = RendererKind::kSplatTexture;
+  judge(kInside, {}, result);
+  EXPECT_EQ(result.verdict, Verdict::kReview);
+  EXPECT_THAT(result.reasons, ElementsAre(HasSubstr("splat-texture are too noisy")));
+}
+
 TEST(Quality, AViewThatGotWorseNeedsReview) {
   RegistrationResult result = good_result();
   result.views[1] = {.similarity_start = 0.96, .similarity_final = 0.95};

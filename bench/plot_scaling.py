@@ -1,0 +1,80 @@
+#!/usr/bin/env python3
+"""Draws how the time of a DRR grows with pixels, with random pixels and with the path, as SVG.
+
+    build/release/bench/isoshift_bench --benchmark_filter='pixels|percent|path' \\
+        --benchmark_out=scaling.json --benchmark_out_format=json
+    bench/plot_scaling.py scaling.json cpu docs/pictures/scaling-cpu.svg
+"""
+import json
+import sys
+
+PANELS = [
+    ("pixels_along_an_edge", "pixels of the image, 1000", lambda value: value * value / 1000),
+    ("percent_of_the_pixels", "random pixels of 512 x 512, 1000", lambda value: value / 100 * 512 * 512 / 1000),
+    ("mm_of_path", "path through water, voxels of 1 mm", lambda value: value),
+]
+WIDTH, HEIGHT, LEFT, TOP, GAP = 260, 200, 60, 30, 80
+
+
+def points(report, family, renderer, scale):
+    """(x, ms) of one family, in rising order."""
+    found = {}
+    for run in report["benchmarks"]:
+        name = run["name"].split("/")
+        if name[0] == family and name[1] == renderer and "error_occurred" not in run and run.get("run_type") != "aggregate":
+            found.setdefault(scale(float(name[2])), []).append(run["real_time"])
+    return [(x, min(times)) for x, times in sorted(found.items())]
+
+
+def line_through(data):
+    """Least squares of relative errors (1/ms as weight), so that small images count as much as large ones; and R^2."""
+    weights = [1 / y**2 for _, y in data]
+    total = sum(weights)
+    mean_x = sum(w * x for w, (x, _) in zip(weights, data)) / total
+    mean_y = sum(w * y for w, (_, y) in zip(weights, data)) / total
+    slope = sum(w * (x - mean_x) * (y - mean_y) for w, (x, y) in zip(weights, data)) / sum(
+        w * (x - mean_x) ** 2 for w, (x, _) in zip(weights, data))
+    offset = mean_y - slope * mean_x
+    plain_mean = sum(y for _, y in data) / len(data)
+    residual = sum((y - offset - slope * x) ** 2 for x, y in data)
+    return slope, offset, 1 - residual / sum((y - plain_mean) ** 2 for _, y in data)
+
+
+def panel(left, data, label):
+    top_x, top_y = 1.05 * max(x for x, _ in data), 1.1 * max(y for _, y in data)
+    slope, offset, r2 = line_through(data)
+    place = lambda x, y: (left + x / top_x * WIDTH, TOP + HEIGHT - y / top_y * HEIGHT)
+    svg = [f'<rect x="{left}" y="{TOP}" width="{WIDTH}" height="{HEIGHT}" fill="none" stroke="#888"/>']
+    for n in range(5):
+        x, y = place(top_x * n / 4, top_y * n / 4)
+        svg.append(f'<text x="{x:.0f}" y="{TOP + HEIGHT + 16}" text-anchor="middle">{top_x * n / 4:.0f}</text>')
+        svg.append(f'<text x="{left - 6}" y="{y + 4:.0f}" text-anchor="end">{top_y * n / 4:.1f}</text>')
+    (x0, y0), (x1, y1) = place(0, max(0, offset)), place(top_x, offset + slope * top_x)
+    svg.append(f'<line x1="{x0:.1f}" y1="{y0:.1f}" x2="{x1:.1f}" y2="{max(y1, TOP):.1f}" stroke="#c60" stroke-dasharray="4 3"/>')
+    for x, y in data:
+        px, py = place(x, y)
+        svg.append(f'<circle cx="{px:.1f}" cy="{py:.1f}" r="3.5" fill="#246"/>')
+    svg.append(f'<text x="{left + WIDTH / 2}" y="{TOP + HEIGHT + 34}" text-anchor="middle">{label}</text>')
+    svg.append(f'<text x="{left + 8}" y="{TOP + 16}">line: R&#178; = {r2:.4f}</text>')
+    return svg
+
+
+def main():
+    if len(sys.argv) != 4:
+        sys.exit(__doc__)
+    report = json.load(open(sys.argv[1], encoding="utf-8"))
+    svg = []
+    for n, (family, label, scale) in enumerate(PANELS):
+        data = points(report, family, sys.argv[2], scale)
+        if len(data) < 3:
+            sys.exit(f"error: {sys.argv[1]} holds {len(data)} runs of {family}/{sys.argv[2]}; at least 3 are needed")
+        svg += panel(LEFT + n * (WIDTH + GAP), data, label)
+    width = LEFT + len(PANELS) * (WIDTH + GAP) - GAP + 20
+    with open(sys.argv[3], "w", encoding="utf-8") as out:
+        out.write(f'<svg xmlns="http://www.w3.org/2000/svg" width="{width}" height="{TOP + HEIGHT + 50}" '
+                  f'font-family="sans-serif" font-size="12">\n<rect width="100%" height="100%" fill="white"/>\n'
+                  f'<text x="{LEFT}" y="18">{sys.argv[2]}: ms per image</text>\n' + "\n".join(svg) + "\n</svg>\n")
+
+
+if __name__ == "__main__":
+    main()

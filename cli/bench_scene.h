@@ -1,0 +1,35 @@
+#pragma once
+// What `isoshift bench` renders: volumes of the founding paper's sizes, a view, and its poses.
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "geometry/volume.h"
+#include "geometry/xray_view.h"
+
+namespace isoshift {
+
+struct BenchVolume {
+  std::string name;
+  Volume<float> hu;
+};
+
+// A lumbar spine of 512 x 512 x 202 voxels: 53 MB in 8 bit, as the paper's.
+BenchVolume bench_spine();
+
+// A head of 512 x 512 x 256 voxels: 67 MB in 8 bit, as the paper's pig. The CT of a folder, interpolated to that size,
+// or without one the phantom's head.
+BenchVolume bench_head(const std::filesystem::path& ct_folder);
+
+// A square panel of 500 mm at SID 1500 mm, SAD 1000 mm, gantry 0: the whole volume stays in view however it is turned.
+XrayView bench_view(int pixels);
+
+Eigen::Vector3d center_of(const Volume<float>& volume);
+
+// Turns about the volume's center: -180 to 168 degrees in steps of 12 about three axes, 27,000 in all (Spoerk et al.
+// 2012), of which every n-th is taken.
+inline constexpr int kBenchPoses = 27000;
+std::vector<Eigen::Isometry3d> bench_poses(const Volume<float>& volume, int every);
+
+}  // namespace isoshift

@@ -1,0 +1,95 @@
+// Renderers chosen on the command line: all of them register, and a flag that a renderer does not have is refused.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+
+#include "tests/support/command.h"
+#include "tests/support/small_study.h"
+#include "tests/support/temporary_folder.h"
+
+namespace isoshift {
+namespace {
+
+using testing::HasSubstr;
+using Json = nlohmann::json;
+
+TEST(RenderingFlags, WhatARendererDoesNotHaveIsRefused) {
+  SmallStudy study;
+  const std::vector<std::pair<std::vector<std::string>, std::string>> refused = {
+      {{"--renderer", "cpu", "--wobble", "voxel"},
+       "--wobble means something to splatting only, and the renderer is cpu"},
+      {{"--renderer", "raycast-box", "--wobble-sigma", "1"}, "--wobble-sigma means something to splatting only"},
+      {{"--renderer", "cpu", "--wobble-seed", "2"}, "--wobble-seed means something to splatting only"},
+      {{"--renderer", "raycast-box", "--deposit", "bilinear"}, "--deposit means something to splatting only"},
+      {{"--renderer", "raycast-box", "--block-edge", "4"}, "--block-edge means something to raycast-cuberille only"},
+      {{"--renderer", "siddon", "--precision", "u8"},
+       "--precision means something to renderers that are no references"},
+  };
+  for (const auto& [flags, message] : refused) {
+    const CommandOutcome outcome = register_study(study, flags);
+    EXPECT_EQ(outcome.exit_status, 2) << message;
+    EXPECT_THAT(outcome.err, HasSubstr(message));
+    EXPECT_FALSE(std::filesystem::exists(study.output()));
+  }
+  EXPECT_EQ(register_study(study, {"--renderer", "raycast-cuberille", "--block-edge", "3"}).exit_status, 2);
+}
+
+class EveryRenderer : public testing::TestWithParam<std::vector<std::string>> {};
+
+TEST_P(EveryRenderer, RegistersAndSaysWhatItUsed) {
+  SmallStudy study;
+  std::vector<std::string> flags = GetParam();
+  flags.insert(flags.end(), {"--gl", "software", "--json"});
+  const CommandOutcome outcome = register_study(study, flags);
+  const bool splats = flags[1].starts_with("splat");
+  EXPECT_EQ(outcome.exit_status, splats ? 3 : 0) << outcome.err;
+  const Json result = Json::parse(outcome.out);
+  EXPECT_EQ(result["renderer"], flags[1]);
+  for (std::size_t n = 2; n + 1 < GetParam().size(); n += 2) {
+    std::string name = flags[n].substr(2);
+    std::ranges::replace(name, '-', '_');
+    EXPECT_EQ(result["renderer_settings"][name], flags[n + 1]);
+  }
+  EXPECT_THAT(result["renderer_settings"], testing::Contains(flags[1] == "cpu" ? "u8" : "u16"));
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Flags, EveryRenderer,
+    testing::Values(std::vector<std::string>{"--renderer", "cpu", "--precision", "u8"},
+                    std::vector<std::string>{"--renderer", "raycast"},
+                    std::vector<std::string>{"--renderer", "raycast-box"},
+                    std::vector<std::string>{"--renderer", "raycast-cuberille", "--block-edge", "4"},
+                    std::vector<std::string>{"--renderer", "splat", "--wobble", "voxel"},
+                    std::vector<std::string>{"--renderer", "splat-texture", "--wobble-seed", "7"},
+                    std::vector<std::string>{"--renderer", "splat-buffers", "--deposit", "bilinear"}));
+
+TEST(Bench, PrintsEveryRowOfTheTableAsJson) {
+  // One pose of 27,000 and few pixels: what is looked at is the protocol, not the time.
+  const CommandOutcome outcome = run_command({"bench", "drr", "--renderer", "cpu", "--renderer", "splat-buffers",
+                                              "--gl", "software", "--every", "27000", "--pixels", "64", "--json"});
+  ASSERT_EQ(outcome.exit_status, 0) << outcome.err;
+  const Json result = Json::parse(outcome.out);
+  EXPECT_EQ(result["protocol"]["poses"], 1);
+  ASSERT_EQ(result["tables"].size(), 4U);  // two volumes, two thresholds
+  for (const Json& table : result["tables"]) {
+    EXPECT_GT(table["share_above"], 0.005);
+    EXPECT_LT(table["share_above"], 0.6);
+    ASSERT_EQ(table["rows"].size(), 4U);
+    for (const Json& row : table["rows"]) EXPECT_GT(row["wall_ms"]["mean"], 0.0);
+  }
+  EXPECT_GT(result["tables"][0]["share_above"], result["tables"][1]["share_above"]);
+}
+
+TEST(Bench, FiguresAreMade) {
+  TemporaryFolder folder;
+  const std::filesystem::path output = folder.path() / "figures";
+  const CommandOutcome outcome = run_command({"bench", "figures", "-o", output.string()});
+  ASSERT_EQ(outcome.exit_status, 0) << outcome.err;
+  for (const char* name : {"bounding_structures.png", "sparse_pixels.png", "renderers.png"})
+    EXPECT_GT(std::filesystem::file_size(output / name), 20000U) << name;
+}
+
+}  // namespace
+}  // namespace isoshift
