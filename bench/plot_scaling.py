@@ -2,7 +2,7 @@
 """Draws how the time of a DRR grows with pixels, with random pixels and with the path, as SVG.
 
     build/release/bench/isoshift_bench --benchmark_filter='pixels|percent|path' \\
-        --benchmark_out=scaling.json --benchmark_out_format=json
+        --benchmark_repetitions=5 --benchmark_out=scaling.json --benchmark_out_format=json
     bench/plot_scaling.py scaling.json cpu docs/pictures/scaling-cpu.svg
 """
 import json
@@ -17,7 +17,7 @@ WIDTH, HEIGHT, LEFT, TOP, GAP = 260, 200, 60, 30, 80
 
 
 def points(report, family, renderer, scale):
-    """(x, ms) of one family, in rising order."""
+    """(x, ms) of one family, in rising order; of repetitions the fastest, because others use the machine too."""
     found = {}
     for run in report["benchmarks"]:
         name = run["name"].split("/")
@@ -27,17 +27,13 @@ def points(report, family, renderer, scale):
 
 
 def line_through(data):
-    """Least squares of relative errors (1/ms as weight), so that small images count as much as large ones; and R^2."""
-    weights = [1 / y**2 for _, y in data]
-    total = sum(weights)
-    mean_x = sum(w * x for w, (x, _) in zip(weights, data)) / total
-    mean_y = sum(w * y for w, (_, y) in zip(weights, data)) / total
-    slope = sum(w * (x - mean_x) * (y - mean_y) for w, (x, y) in zip(weights, data)) / sum(
-        w * (x - mean_x) ** 2 for w, (x, _) in zip(weights, data))
+    """Slope and offset by least squares, and R^2."""
+    mean_x = sum(x for x, _ in data) / len(data)
+    mean_y = sum(y for _, y in data) / len(data)
+    slope = sum((x - mean_x) * (y - mean_y) for x, y in data) / sum((x - mean_x) ** 2 for x, _ in data)
     offset = mean_y - slope * mean_x
-    plain_mean = sum(y for _, y in data) / len(data)
     residual = sum((y - offset - slope * x) ** 2 for x, y in data)
-    return slope, offset, 1 - residual / sum((y - plain_mean) ** 2 for _, y in data)
+    return slope, offset, 1 - residual / sum((y - mean_y) ** 2 for _, y in data)
 
 
 def panel(left, data, label):

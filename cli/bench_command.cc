@@ -222,7 +222,7 @@ void run_bench_figures(const BenchFiguresOptions& options, Console& console) {
   ProgressBar bar(console, "Rendering");
   const GlDevice gl = options.gl == "hardware" ? GlDevice::kHardware : GlDevice::kSoftware;
   const BenchVolume volume = bench_head(options.ct);
-  const XrayView view = bench_view(512);
+  const XrayView view = bench_view(512, 370.0);
   Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();  // head up, turned a little to its side
   pose.linear() = rotation_x(rad_from_deg(-90)) * rotation_z(rad_from_deg(25));
   pose.translation() = -(pose.linear() * center_of(volume.hu));

@@ -69,11 +69,11 @@ BenchVolume bench_head(const std::filesystem::path& ct_folder) {
   return {"head CT", resampled(ct.hu, size)};
 }
 
-XrayView bench_view(int pixels) {
+XrayView bench_view(int pixels, double panel_mm) {
   CarmGeometry geometry;
   geometry.sad_mm = 1000.0;
   geometry.receptor_translation_mm = Vector3d(0, 0, -500);
-  geometry.column_spacing_mm = geometry.row_spacing_mm = 500.0 / pixels;
+  geometry.column_spacing_mm = geometry.row_spacing_mm = panel_mm / pixels;
   geometry.position_mm = 0.5 * (pixels - 1) * geometry.row_spacing_mm * Eigen::Vector2d(-1, 1);
   geometry.columns = geometry.rows = pixels;
   return make_xray_view(geometry, Beam::kKilovoltage);

@@ -22,8 +22,8 @@ BenchVolume bench_spine();
 // or without one the phantom's head.
 BenchVolume bench_head(const std::filesystem::path& ct_folder);
 
-// A square panel of 500 mm at SID 1500 mm, SAD 1000 mm, gantry 0: the whole volume stays in view however it is turned.
-XrayView bench_view(int pixels);
+// A square panel at SID 1500 mm, SAD 1000 mm, gantry 0. On 500 mm the whole volume stays in view however it is turned.
+XrayView bench_view(int pixels, double panel_mm = 500.0);
 
 Eigen::Vector3d center_of(const Volume<float>& volume);
 
