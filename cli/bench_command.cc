@@ -103,7 +103,7 @@ std::string processor_name() {
 
 struct BenchDrrOptions {
   std::filesystem::path ct;
-  std::string gl = "hardware";
+  std::optional<std::string> gl;
   std::vector<std::string> renderers;  // empty: all
   int every = 997;                     // not a divisor of 27,000: all axes turn
   int pixels = 512;
@@ -120,10 +120,10 @@ std::string cell(const std::optional<Statistics>& ms) {
 
 Json json_of(const Statistics& ms) { return {{"mean", ms.mean}, {"sd", ms.sd}}; }
 
-// One volume at one threshold: prints its table as it grows, and returns it.
+// One volume at one threshold: appends its table to `table`, and returns it.
 Json bench_cell(const BenchDrrOptions& options, const BenchVolume& volume, double threshold_hu,
                 const std::function<void()>& progress, std::string& table) {
-  const XrayView view = bench_view(options.pixels);
+  const XrayView view = table1_view(options.pixels);
   const std::vector<Eigen::Isometry3d> poses = bench_poses(volume.hu, options.every);
   const double above = share_above(volume.hu, threshold_hu);
   table +=
@@ -138,10 +138,9 @@ Json bench_cell(const BenchDrrOptions& options, const BenchVolume& volume, doubl
     if (!options.wants(method.kind)) continue;
     if (made_for == nullptr || made_for->kind != method.kind || made_for->block_edge != method.block_edge) {
       renderer.reset();
-      renderer = make_renderer(method.kind, volume.hu, paper_model(threshold_hu), std::array{view.beam},
-                               {.gl = options.gl == "hardware" ? GlDevice::kHardware : GlDevice::kSoftware,
-                                .precision = VolumePrecision::kU8,
-                                .block_edge = method.block_edge});
+      renderer = make_renderer(
+          method.kind, volume.hu, paper_model(threshold_hu), std::array{view.beam},
+          {.gl = gl_device_from(options.gl), .precision = VolumePrecision::kU8, .block_edge = method.block_edge});
       made_for = &method;
     }
     const PixelSet pixels = method.pixel_share == 1.0
@@ -163,7 +162,6 @@ void run_bench_drr(const BenchDrrOptions& options, Console& console) {
   const auto wanted = std::ranges::count_if(kMethods, [&](const Method& method) { return options.wants(method.kind); });
   const double work = static_cast<double>(wanted) * kThresholdsHu.size() * 2;
   double done = 0.0;
-  std::string table;
   Json json = {{"program", {{"name", "isoshift"}, {"version", kVersion}, {"commit", kCommit}}},
                {"machine", {{"processor", processor_name()}, {"threads", std::thread::hardware_concurrency()}}},
                {"protocol",
@@ -173,28 +171,28 @@ void run_bench_drr(const BenchDrrOptions& options, Console& console) {
                  {"precision", "u8"},
                  {"attenuation", "windowed"}}},
                {"tables", Json::array()}};
+  if (!options.json)
+    console.out << fmt::format("{}, {} threads; {} of {} poses, {} x {} pixels, 8 bit voxels\n", processor_name(),
+                               std::thread::hardware_concurrency(), json["protocol"]["poses"].get<int>(), kBenchPoses,
+                               options.pixels, options.pixels);
   {
     ProgressBar bar(console, "Rendering");
     const auto progress = [&] { bar.update(++done / work); };
     for (const bool spine : {true, false}) {
       const BenchVolume volume = spine ? bench_spine() : bench_head(options.ct);
-      for (const double threshold_hu : kThresholdsHu)
+      for (const double threshold_hu : kThresholdsHu) {
+        std::string table;
         json["tables"].push_back(bench_cell(options, volume, threshold_hu, progress, table));
+        if (!options.json) console.out << table << std::flush;
+      }
     }
   }
-  if (options.json) {
-    console.out << json.dump(2) << "\n";
-    return;
-  }
-  console.out << fmt::format("{}, {} threads; {} of {} poses, {} x {} pixels, 8 bit voxels\n", processor_name(),
-                             std::thread::hardware_concurrency(), json["protocol"]["poses"].get<int>(), kBenchPoses,
-                             options.pixels, options.pixels)
-              << table;
+  if (options.json) console.out << json.dump(2) << "\n";
 }
 
 struct BenchFiguresOptions {
   std::filesystem::path ct, output;
-  std::string gl = "software";
+  std::optional<std::string> gl;
   bool overwrite = false;
 };
 
@@ -220,9 +218,9 @@ Image<Rgb> colored(const Image<std::array<float, 3>>& positions) {
 void run_bench_figures(const BenchFiguresOptions& options, Console& console) {
   OutputFolder output(options.output, options.overwrite);
   ProgressBar bar(console, "Rendering");
-  const GlDevice gl = options.gl == "hardware" ? GlDevice::kHardware : GlDevice::kSoftware;
+  const GlDevice gl = gl_device_from(options.gl);
   const BenchVolume volume = bench_head(options.ct);
-  const XrayView view = bench_view(512, 370.0);
+  const XrayView view = table1_view(512, 370.0);
   Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();  // head up, turned a little to its side
   pose.linear() = rotation_x(rad_from_deg(-90)) * rotation_z(rad_from_deg(25));
   pose.translation() = -(pose.linear() * center_of(volume.hu));
@@ -281,7 +279,8 @@ void add_bench_command(CLI::App& app, Console& console, int&) {
       "memory at its end; GPU time is by the GPU's own clock. docs/renderers.md sets the paper's figures beside ours.");
   add_ct_option(*drr_command, drr->ct);
   std::vector<std::string> kinds;
-  for (const Method& method : kMethods) kinds.emplace_back(to_string(method.kind));
+  for (const RendererKind kind : kRendererKinds)
+    if (!is_oracle(kind)) kinds.emplace_back(to_string(kind));
   drr_command->add_option("--renderer", drr->renderers, "Only these; may be repeated")->check(CLI::IsMember(kinds));
   drr_command->add_option("--every", drr->every, "Of the 27,000 poses take every N-th")
       ->check(CLI::Range(1, kBenchPoses))
@@ -291,16 +290,16 @@ void add_bench_command(CLI::App& app, Console& console, int&) {
       ->check(CLI::Range(16, 4096))
       ->capture_default_str()
       ->type_name("N");
-  add_gl_option(*drr_command, drr->gl, "Rendering");
+  add_gl_option(*drr_command, drr->gl);
   drr_command->add_flag("--json", drr->json, "Print JSON instead of tables");
   drr_command->callback([drr, &console] { run_bench_drr(*drr, console); });
 
   auto figures = std::make_shared<BenchFiguresOptions>();
   CLI::App* figures_command = bench->add_subcommand("figures", "Make counterparts of the paper's Figs. 1 to 3");
-  figures_command->footer("\nExample:\n  isoshift bench figures --ct planning_ct/ -o figures");
+  figures_command->footer("\nExample:\n  isoshift bench figures --ct planning_ct/ -o figures --gl software");
   figures_command->add_option("-o,--output", figures->output, "Folder to make")->required()->type_name("FOLDER");
   add_ct_option(*figures_command, figures->ct);
-  add_gl_option(*figures_command, figures->gl, "Rendering");
+  add_gl_option(*figures_command, figures->gl);
   figures_command->add_flag("--overwrite", figures->overwrite, "Replace an earlier output in that folder");
   figures_command->callback([figures, &console] { run_bench_figures(*figures, console); });
 }

@@ -69,7 +69,7 @@ BenchVolume bench_head(const std::filesystem::path& ct_folder) {
   return {"head CT", resampled(ct.hu, size)};
 }
 
-XrayView bench_view(int pixels, double panel_mm) {
+XrayView table1_view(int pixels, double panel_mm) {
   CarmGeometry geometry;
   geometry.sad_mm = 1000.0;
   geometry.receptor_translation_mm = Vector3d(0, 0, -500);

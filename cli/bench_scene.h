@@ -22,8 +22,9 @@ BenchVolume bench_spine();
 // or without one the phantom's head.
 BenchVolume bench_head(const std::filesystem::path& ct_folder);
 
-// A square panel at SID 1500 mm, SAD 1000 mm, gantry 0. On 500 mm the whole volume stays in view however it is turned.
-XrayView bench_view(int pixels, double panel_mm = 500.0);
+// A square panel at SID 1500 mm, SAD 1000 mm, gantry 0: 333 mm wide at the isocenter, which leaves out corners of the
+// volumes in some poses but no body.
+XrayView table1_view(int pixels, double panel_mm = 500.0);
 
 Eigen::Vector3d center_of(const Volume<float>& volume);
 

@@ -31,7 +31,10 @@ void run_drr(const DrrOptions& options, Console& console) {
   const std::array pose = {setup_error * study.planned_room_from_patient};
   for (const std::string& warning : notes.warnings) console.err << "warning: " << warning << "\n";
 
-  std::string listing;
+  std::string listing = fmt::format("rendered by {} on {}", to_string(renderer->kind()), renderer->device());
+  for (const auto& [name, value] : options.rendering.settings()) listing += fmt::format(", {} {}", name, value);
+  listing += fmt::format("; attenuation {}, threshold {:.0f} HU\n", options.rendering.attenuation,
+                         options.rendering.threshold_hu);
   for (std::size_t n = 0; n < study.xrays.size(); ++n) {
     const XrayView& view = study.xrays[n].view;
     const RenderResult drrs = renderer->render(std::span(&view, 1), pose, PixelSet::all());

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <cmath>
+
 #include "drr/gl/context.h"
 #include "geometry/error.h"
 
@@ -19,7 +21,8 @@ void refuse(bool given, const char* flag, const char* of, RendererKind kind) {
 }  // namespace
 
 RendererKind RenderingOptions::kind() const {
-  if (renderer == "auto") return has_hardware_gl() ? RendererKind::kRaycast : RendererKind::kCpu;
+  if (renderer == "auto")
+    return gl_device_from(gl) == GlDevice::kHardware && has_hardware_gl() ? RendererKind::kRaycast : RendererKind::kCpu;
   return renderer_kind_from(renderer).value();
 }
 
@@ -27,6 +30,8 @@ AttenuationModel RenderingOptions::model() const {
   AttenuationModel model;
   model.kind = attenuation == "physical" ? AttenuationModel::Kind::kPhysical : AttenuationModel::Kind::kWindowed;
   model.threshold_hu = threshold_hu;
+  if (!window.empty() && attenuation != "windowed")
+    throw UsageError("--window means something to --attenuation windowed only");
   if (!window.empty()) {
     model.window_low_hu = window[0];
     model.window_high_hu = window[1];
@@ -38,15 +43,20 @@ AttenuationModel RenderingOptions::model() const {
 RendererOptions RenderingOptions::options() const {
   const RendererKind chosen = kind();
   const bool splats = is_splatting(chosen);
-  refuse(precision && is_oracle(chosen), "--precision", "renderers that are no references", chosen);
+  refuse(gl && !uses_gl(chosen), "--gl", "renderers on OpenGL", chosen);
+  refuse(precision.value_or("f32") != "f32" && is_oracle(chosen), "--precision below f32",
+         "renderers other than references", chosen);
   refuse(block_edge && chosen != RendererKind::kRaycastCuberille, "--block-edge", "raycast-cuberille", chosen);
   refuse(wobble && !splats, "--wobble", "splatting", chosen);
   refuse(wobble_sigma_mm && !splats, "--wobble-sigma", "splatting", chosen);
   refuse(wobble_seed && !splats, "--wobble-seed", "splatting", chosen);
   refuse(deposit && !splats, "--deposit", "splatting", chosen);
 
+  if (wobble_sigma_mm && !(std::isfinite(*wobble_sigma_mm) && *wobble_sigma_mm >= 0.0))
+    throw UsageError(fmt::format("--wobble-sigma {}: expected 0 mm or more", *wobble_sigma_mm));
+
   RendererOptions result;
-  result.gl = gl == "hardware" ? GlDevice::kHardware : GlDevice::kSoftware;
+  result.gl = gl_device_from(gl);
   if (precision) result.precision = volume_precision_from(*precision);
   if (block_edge) result.block_edge = *block_edge;
   if (wobble) result.splat.wobble = *wobble == "focus" ? SplatOptions::Wobble::kFocus : SplatOptions::Wobble::kVoxel;
@@ -66,7 +76,8 @@ std::vector<std::pair<std::string, std::string>> RenderingOptions::settings() co
   if (chosen == RendererKind::kRaycastCuberille) settings.emplace_back("block_edge", fmt::to_string(used.block_edge));
   if (is_splatting(chosen)) {
     settings.emplace_back("wobble", used.splat.wobble == SplatOptions::Wobble::kFocus ? "focus" : "voxel");
-    settings.emplace_back("wobble_sigma_mm", used.splat.sigma_mm ? fmt::to_string(*used.splat.sigma_mm) : "default");
+    settings.emplace_back("wobble_sigma_mm", used.splat.sigma_mm ? fmt::to_string(*used.splat.sigma_mm)
+                                                                 : "blurs by half a voxel at the isocenter");
     settings.emplace_back("wobble_seed", fmt::to_string(used.splat.seed));
     settings.emplace_back("deposit", used.splat.deposit == SplatOptions::Deposit::kNearest ? "nearest" : "bilinear");
   }
@@ -85,7 +96,7 @@ void add_rendering_options(CLI::App& command, RenderingOptions& options) {
       ->check(CLI::IsMember(names))
       ->capture_default_str()
       ->group(kGroup);
-  add_gl_option(command, options.gl, kGroup);
+  add_gl_option(command, options.gl);
   command
       .add_option("--attenuation", options.attenuation, "From HU to attenuation: a physical curve, or the HU window")
       ->check(CLI::IsMember({"physical", "windowed"}))
@@ -124,11 +135,14 @@ void add_rendering_options(CLI::App& command, RenderingOptions& options) {
       ->group(kGroup);
 }
 
-void add_gl_option(CLI::App& command, std::string& gl, const char* group) {
-  command.add_option("--gl", gl, "OpenGL of renderers that use it: a GPU, or Mesa's llvmpipe on the CPU")
+void add_gl_option(CLI::App& command, std::optional<std::string>& gl) {
+  command.add_option("--gl", gl, "Of renderers on OpenGL: a GPU, or Mesa's llvmpipe on the CPU [hardware]")
       ->check(CLI::IsMember({"hardware", "software"}))
-      ->capture_default_str()
-      ->group(group);
+      ->group(kGroup);
+}
+
+GlDevice gl_device_from(const std::optional<std::string>& gl) {
+  return gl.value_or("hardware") == "hardware" ? GlDevice::kHardware : GlDevice::kSoftware;
 }
 
 }  // namespace isoshift

@@ -13,25 +13,25 @@ namespace isoshift {
 
 struct RenderingOptions {
   std::string renderer = "auto";
-  std::string gl = "hardware";
   std::string attenuation = "physical";
   double threshold_hu = AttenuationModel{}.threshold_hu;
   std::vector<double> window;
   // Unset unless asked for: what the chosen renderer does not have is refused, not ignored.
-  std::optional<std::string> precision, wobble, deposit;
+  std::optional<std::string> gl, precision, wobble, deposit;
   std::optional<double> wobble_sigma_mm;
   std::optional<std::uint32_t> wobble_seed;
   std::optional<int> block_edge;
 
   RendererKind kind() const;  // "auto" settled: raycast on a hardware GPU, else cpu
+  // Both throw UsageError for a flag that means nothing to what was chosen.
   AttenuationModel model() const;
-  // Throws UsageError for a flag that means nothing to kind().
   RendererOptions options() const;
   // What options() came to, by name, for the result.
   std::vector<std::pair<std::string, std::string>> settings() const;
 };
 void add_rendering_options(CLI::App& command, RenderingOptions& options);
 
-void add_gl_option(CLI::App& command, std::string& gl, const char* group);
+void add_gl_option(CLI::App& command, std::optional<std::string>& gl);
+GlDevice gl_device_from(const std::optional<std::string>& gl);  // unset: hardware
 
 }  // namespace isoshift

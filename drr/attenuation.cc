@@ -46,21 +46,4 @@ Volume<float> attenuation_volume(const Volume<float>& ct_hu, const AttenuationMo
   return volume;
 }
 
-OccupiedBox occupied_box(const Volume<float>& attenuation_per_mm) {
-  const Eigen::Vector3i& size = attenuation_per_mm.size;
-  Eigen::Vector3i low = size, high = Eigen::Vector3i::Constant(-1);
-  for (int k = 0; k < size.z(); ++k)
-    for (int j = 0; j < size.y(); ++j) {
-      const float* row = &attenuation_per_mm.at(0, j, k);
-      const float* const end = row + size.x();
-      const float* const first = std::find_if(row, end, [](float value) { return value != 0.0F; });
-      if (first == end) continue;
-      const float* last = end - 1;
-      while (*last == 0.0F) --last;
-      low = low.cwiseMin(Eigen::Vector3i(static_cast<int>(first - row), j, k));
-      high = high.cwiseMax(Eigen::Vector3i(static_cast<int>(last - row), j, k));
-    }
-  return {.low = low.cast<double>().array() - 1.0, .high = high.cast<double>().array() + 1.0};
-}
-
 }  // namespace isoshift

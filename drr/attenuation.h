@@ -27,11 +27,4 @@ struct AttenuationModel {
 // The whole CT seen by one beam quality.
 Volume<float> attenuation_volume(const Volume<float>& ct_hu, const AttenuationModel& model, Beam beam);
 
-// The box, in continuous voxel indices, outside of which every trilinear sample is 0: one voxel around all that is not.
-// Empty (low above high) for a volume of nothing.
-struct OccupiedBox {
-  Eigen::Vector3d low, high;
-};
-OccupiedBox occupied_box(const Volume<float>& attenuation_per_mm);
-
 }  // namespace isoshift

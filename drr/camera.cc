@@ -1,5 +1,7 @@
 #include "drr/camera.h"
 
+#include <stdexcept>
+
 namespace isoshift {
 
 Camera make_camera(const XrayView& view, const Eigen::Isometry3d& room_from_patient,
@@ -10,7 +12,17 @@ Camera make_camera(const XrayView& view, const Eigen::Isometry3d& room_from_pati
           .way_voxel_from_pixel = voxel_from_room_axes * view.pixel_from_room.leftCols<3>().inverse()};
 }
 
-std::vector<std::size_t> view_begins(std::span<const XrayView> views, const PixelSet& pixels) {
+std::vector<std::size_t> checked_view_begins(std::span<const XrayView> views,
+                                             std::span<const Eigen::Isometry3d> room_from_patient,
+                                             const PixelSet& pixels) {
+  for (const Eigen::Isometry3d& pose : room_from_patient)
+    if (!pose.matrix().allFinite()) throw std::invalid_argument("a pose to render is not finite");
+  if (!pixels.of_view.empty() && pixels.of_view.size() != views.size())
+    throw std::invalid_argument("there is not one list of pixels per view");
+  for (std::size_t v = 0; v < pixels.of_view.size(); ++v)
+    for (const std::uint32_t pixel : pixels.of_view[v])
+      if (pixel >= static_cast<std::uint64_t>(views[v].columns) * views[v].rows)
+        throw std::invalid_argument("a pixel to render lies outside of its view");
   std::vector<std::size_t> begins = {0};
   for (std::size_t v = 0; v < views.size(); ++v) begins.push_back(begins.back() + pixels.count(views, v));
   return begins;

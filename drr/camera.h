@@ -18,7 +18,10 @@ struct Camera {
 Camera make_camera(const XrayView& view, const Eigen::Isometry3d& room_from_patient,
                    const Eigen::Affine3d& voxel_from_patient);
 
-// Where each view's pixels begin among those of one pose; the last entry is their number.
-std::vector<std::size_t> view_begins(std::span<const XrayView> views, const PixelSet& pixels);
+// Where each view's pixels begin among those of one pose; the last entry is their number. What every render() begins
+// with: throws std::invalid_argument for a pose that is not finite or a pixel outside of its view.
+std::vector<std::size_t> checked_view_begins(std::span<const XrayView> views,
+                                             std::span<const Eigen::Isometry3d> room_from_patient,
+                                             const PixelSet& pixels);
 
 }  // namespace isoshift

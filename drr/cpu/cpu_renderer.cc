@@ -40,6 +40,7 @@ int tiles_along(int pixels) { return (pixels + kTileEdge - 1) / kTileEdge; }
 // The places in a list of pixels, ordered so that rays which follow each other lie close together: by bands of rows, so
 // high that kBlockPixels neighbors fill a square, and in a band by column. Sorted by counting.
 std::vector<std::uint32_t> neighbors_together(std::span<const std::uint32_t> pixels, const XrayView& view) {
+  if (pixels.empty()) return {};
   const double pixels_per_ray = static_cast<double>(view.columns) * view.rows / static_cast<double>(pixels.size());
   const int band = std::max(1, static_cast<int>(std::lround(std::sqrt(kBlockPixels * pixels_per_ray))));
   const auto bucket_of = [&](std::uint32_t pixel) {
@@ -62,9 +63,12 @@ std::string CpuRenderer::device() const {
 
 RenderResult CpuRenderer::render(std::span<const XrayView> views, std::span<const Eigen::Isometry3d> room_from_patient,
                                  const PixelSet& pixels) {
-  std::vector<std::size_t> begins = view_begins(views, pixels);
+  std::vector<std::size_t> begins = checked_view_begins(views, room_from_patient, pixels);
   line_integrals_.resize(begins.back() * room_from_patient.size());
 
+  std::vector<std::vector<std::uint32_t>> orders;
+  for (std::size_t v = 0; v < pixels.of_view.size(); ++v)
+    orders.push_back(neighbors_together(pixels.of_view[v], views[v]));
   for (std::size_t p = 0; p < room_from_patient.size(); ++p)
     for (std::size_t v = 0; v < views.size(); ++v) {
       const Camera camera = make_camera(views[v], room_from_patient[p], voxel_from_patient_);
@@ -72,7 +76,7 @@ RenderResult CpuRenderer::render(std::span<const XrayView> views, std::span<cons
       if (pixels.of_view.empty())
         render_all(views[v], camera, drr);
       else
-        render_list(views[v], camera, pixels.of_view[v], drr);
+        render_list(views[v], camera, pixels.of_view[v], orders[v], drr);
     }
   return RenderResult(line_integrals_, std::move(begins));
 }
@@ -97,13 +101,12 @@ void CpuRenderer::render_all(const XrayView& view, const Camera& camera, std::sp
 }
 
 void CpuRenderer::render_list(const XrayView& view, const Camera& camera, std::span<const std::uint32_t> pixels,
-                              std::span<float> drr) const {
+                              std::span<const std::uint32_t> places, std::span<float> drr) const {
   // Groups of fixed size: which rays go together must not depend on how the work is spread, or rounding would.
   constexpr int kListGroup = 4 * kBlockPixels;
-  const std::vector<std::uint32_t> places = neighbors_together(pixels, view);
   const int groups = (static_cast<int>(places.size()) + kListGroup - 1) / kListGroup;
   tbb::parallel_for(0, groups, [&](int group) {
-    const auto in_group = std::span(places).subspan(static_cast<std::size_t>(group) * kListGroup);
+    const auto in_group = places.subspan(static_cast<std::size_t>(group) * kListGroup);
     const std::size_t count = std::min<std::size_t>(kListGroup, in_group.size());
     std::array<VoxelRay, kListGroup> rays;
     std::array<float, kListGroup> values;

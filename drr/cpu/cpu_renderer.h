@@ -32,8 +32,9 @@ class CpuRenderer : public Renderer {
 
  private:
   void render_all(const XrayView& view, const Camera& camera, std::span<float> drr) const;
+  // `places`: the order in which the list is gone through.
   void render_list(const XrayView& view, const Camera& camera, std::span<const std::uint32_t> pixels,
-                   std::span<float> drr) const;
+                   std::span<const std::uint32_t> places, std::span<float> drr) const;
 
   Eigen::Affine3d voxel_from_patient_;
   Eigen::Matrix3d mm_from_voxel_axes_;

@@ -1,4 +1,6 @@
-// Compiled once per instruction set by Highway, which chooses among them at run time.
+// Compiled once per instruction set by Highway, which chooses among them at run time. Not for vectors whose length is
+// known only then: they cannot be members.
+#define HWY_DISABLED_TARGETS (HWY_SVE | HWY_SVE2 | HWY_SVE_256 | HWY_SVE2_128 | HWY_RVV)
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "drr/cpu/march.cc"
 #include <hwy/foreach_target.h>
@@ -63,8 +65,8 @@ class Pyramid {
       : plane_(packet.source_plane), column_(packet.source_column), row_(packet.source_row) {
     const auto [column_min, column_max] = std::minmax_element(packet.column_slope.begin(), packet.column_slope.end());
     const auto [row_min, row_max] = std::minmax_element(packet.row_slope.begin(), packet.row_slope.end());
-    // Planes before the source are reached by going backwards, where the sides change places.
-    const bool forward = packet.plane > packet.source_plane;
+    // Rays against the main axis reach planes before the source, where the sides have changed places.
+    const bool forward = packet.forward;
     column_low_ = forward ? *column_min : *column_max;
     column_high_ = forward ? *column_max : *column_min;
     row_low_ = forward ? *row_min : *row_max;

@@ -24,10 +24,12 @@ struct PlaneLattice {
   std::ptrdiff_t plane_block_stride = 0, column_block_stride = 0, row_block_stride = 0;
 };
 
-// Rays from one source. In plane p, ray n meets column[n] + (p - plane) * column_slope[n], and likewise its row. A ray
-// counts from first_plane to last_plane; none does for a ray that is not there.
+// Rays from one source, all with or all against their main axis. In plane p, ray n meets column[n] + (p - plane) *
+// column_slope[n], and likewise its row. A ray counts from first_plane to last_plane; none does for a ray that is not
+// there.
 struct RayPacket {
   int plane = 0;
+  bool forward = true;  // with the main axis
   double source_plane = 0.0, source_column = 0.0, source_row = 0.0;
   alignas(64) std::array<float, kPacketRays> column, row, column_slope, row_slope;
   alignas(64) std::array<std::int32_t, kPacketRays> first_plane, last_plane;

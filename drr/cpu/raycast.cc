@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "drr/cpu/march.h"
+#include "geometry/error.h"
 
 namespace isoshift {
 namespace {
@@ -50,16 +51,7 @@ std::array<std::ptrdiff_t, 3> strides_of(const Vector3i& size, bool y_fastest) {
   return {1, size.x(), slice};
 }
 
-// The axis along which a ray runs fastest, in voxels; where another one is nearly as fast, that of the ray before, so
-// that neighboring rays stay together.
-int main_axis_of(const VoxelRay& ray, std::optional<int> before) {
-  constexpr double kNearly = 0.8;
-  int fastest = 0;
-  const double most = ray.way.cwiseAbs().maxCoeff(&fastest);
-  return before && std::abs(ray.way[*before]) >= kNearly * most ? *before : fastest;
-}
-
-// Collects rays of one main axis, and marches when it has enough of them.
+// Collects rays along one main axis, all in one direction, and marches when it has enough of them.
 template <class T>
 class PacketMarcher {
  public:
@@ -87,6 +79,7 @@ class PacketMarcher {
     if (first > last) return;
     if (count_ == 0) {
       packet_.plane = first;
+      packet_.forward = way > 0.0;
       packet_.source_plane = source;
       packet_.source_column = ray.source[axes_.column];
       packet_.source_row = ray.source[axes_.row];
@@ -146,6 +139,14 @@ std::string RaycastCpuRenderer::device() const {
 RaycastCpuRenderer::PackedVolume RaycastCpuRenderer::pack(const QuantizedVolume& attenuation) {
   const VoxelBox box = occupied_voxels(attenuation);
   if (box.is_empty()) return {};
+  // Indices are 32 bit numbers of bytes.
+  constexpr std::size_t kMaxVoxels = std::size_t{1} << 30;
+  const auto voxels_kept = (box.size().array() + 3).cast<std::size_t>().prod();
+  if (voxels_kept > kMaxVoxels)
+    throw Error(
+        fmt::format("what the CT holds above the threshold fills a box of {} voxels; --renderer cpu can take {}.\n"
+                    "       Crop the CT, or use --renderer raycast",
+                    voxels_kept, kMaxVoxels));
   PackedVolume packed{.origin = box.first.cast<double>().array() - 1.0,
                       .size = box.size().array() + 3,
                       .unit_per_mm = attenuation.unit_per_mm};
@@ -185,13 +186,14 @@ void RaycastCpuRenderer::integrate(std::span<const VoxelRay> rays, Beam beam, st
         const auto marcher = [&](int axis) {
           return PacketMarcher<T>(volume.lattice<T>(axis), volume.size, axis, volume.unit_per_mm, line_integrals);
         };
-        std::array<PacketMarcher<T>, 3> marchers = {marcher(0), marcher(1), marcher(2)};
-        std::optional<int> axis;
+        // Of each main axis one for rays with it and one for those against it.
+        std::array marchers = {marcher(0), marcher(0), marcher(1), marcher(1), marcher(2), marcher(2)};
         for (std::size_t n = 0; n < rays.size(); ++n) {
           VoxelRay ray = rays[n];
           ray.source -= volume.origin;
-          axis = main_axis_of(ray, axis);
-          marchers[*axis].add(ray, n);
+          int main_axis = 0;  // along which it runs fastest, in voxels
+          ray.way.cwiseAbs().maxCoeff(&main_axis);
+          marchers[static_cast<std::size_t>(2 * main_axis + (ray.way[main_axis] > 0.0 ? 1 : 0))].add(ray, n);
         }
         for (PacketMarcher<T>& rest : marchers) rest.finish();
       },

@@ -134,6 +134,7 @@ void GlContext::check(const char* doing) const {
 
 std::optional<double> seconds_of(const GlTimer& timer, const GlContext& context) {
   if (context.is_software()) return std::nullopt;
+  context.make_current();
   return timer.seconds();
 }
 

@@ -226,14 +226,15 @@ void Program::link(const std::string& files) const {
 
 void Program::use() const { glUseProgram(name_.get()); }
 
-void GlTimer::start() {
+GlTimer::Running::~Running() { glEndQuery(GL_TIME_ELAPSED); }
+
+GlTimer::Running GlTimer::run() {
   GLuint name = 0;
   glCreateQueries(GL_TIME_ELAPSED, 1, &name);
   queries_.emplace_back(name, [](std::uint32_t old) { glDeleteQueries(1, &old); });
   glBeginQuery(GL_TIME_ELAPSED, name);
+  return {};
 }
-
-void GlTimer::stop() { glEndQuery(GL_TIME_ELAPSED); }
 
 double GlTimer::seconds() const {
   double sum = 0.0;

@@ -119,12 +119,19 @@ class Program {
   GlName name_;
 };
 
-// The time that the GPU is busy between start() and stop(), by its own clock, in all since clear().
+// The time that the GPU is busy while a Running exists, by its own clock, in all since clear(). One at a time.
 class GlTimer {
  public:
+  class Running {
+   public:
+    Running() = default;
+    ~Running();
+    Running(const Running&) = delete;
+    Running& operator=(const Running&) = delete;
+  };
+
   void clear() { queries_.clear(); }
-  void start();
-  void stop();
+  [[nodiscard]] Running run();
   double seconds() const;  // waits until it is done
 
  private:

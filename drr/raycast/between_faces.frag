@@ -27,12 +27,13 @@ void main() {
   ivec2 position = ivec2(pixel % columns, pixel / columns);
   vec4 first = texelFetch(front, position, 0);
   vec4 last = texelFetch(back, position, 0);
-  if (first.a == 0.0 || last.a == 0.0) return;
+  if (last.a == 0.0) return;
 
   // How far on the way from source (0) to pixel (1) the faces lie; what is behind the receptor does not count.
   vec3 source = voxel_from_pixel[3].xyz;
   vec3 way = mat3(voxel_from_pixel) * vec3(position, 1.0);
-  float begin = max(dot(first.xyz - source, way) / dot(way, way), 0.0);
+  // A source inside the structure has no front face.
+  float begin = first.a == 0.0 ? 0.0 : max(dot(first.xyz - source, way) / dot(way, way), 0.0);
   float end = min(dot(last.xyz - source, way) / dot(way, way), 1.0);
   if (!(begin < end)) return;
 

@@ -108,17 +108,20 @@ RenderResult RasterizedRaycaster::render(std::span<const XrayView> views,
                                          std::span<const Eigen::Isometry3d> room_from_patient, const PixelSet& pixels) {
   context_.make_current();
   timer_.clear();
-  std::vector<std::size_t> begins = view_begins(views, pixels);
+  std::vector<std::size_t> begins = checked_view_begins(views, room_from_patient, pixels);
   line_integrals_.resize(begins.back() * room_from_patient.size());
   for (std::size_t p = 0; p < room_from_patient.size(); ++p)
     for (std::size_t v = 0; v < views.size(); ++v) {
       const auto drr = std::span(line_integrals_).subspan(p * begins.back() + begins[v], begins[v + 1] - begins[v]);
       if (drr.empty()) continue;
-      timer_.start();
-      draw_faces(views[v], room_from_patient[p], false);
-      draw_faces(views[v], room_from_patient[p], true);
-      draw_line_integrals(views[v], room_from_patient[p],
-                          pixels.of_view.empty() ? std::span<const std::uint32_t>() : pixels.of_view[v], drr);
+      {
+        const auto running = timer_.run();
+        draw_faces(views[v], room_from_patient[p], false);
+        draw_faces(views[v], room_from_patient[p], true);
+        draw_line_integrals(views[v], room_from_patient[p],
+                            pixels.of_view.empty() ? std::span<const std::uint32_t>() : pixels.of_view[v], drr.size());
+      }
+      result_.download(drr);
     }
   context_.check("rendering");
   return RenderResult(line_integrals_, std::move(begins));
@@ -144,11 +147,10 @@ void RasterizedRaycaster::draw_faces(const XrayView& view, const Eigen::Isometry
 }
 
 void RasterizedRaycaster::draw_line_integrals(const XrayView& view, const Eigen::Isometry3d& room_from_patient,
-                                              std::span<const std::uint32_t> pixel_list,
-                                              std::span<float> line_integrals) {
+                                              std::span<const std::uint32_t> pixel_list, std::size_t count) {
   const bool has_list = !pixel_list.empty();
-  const int columns = has_list ? std::min(kListColumns, static_cast<int>(line_integrals.size())) : view.columns;
-  const int rows = (static_cast<int>(line_integrals.size()) + columns - 1) / columns;
+  const int columns = has_list ? std::min(kListColumns, static_cast<int>(count)) : view.columns;
+  const int rows = (static_cast<int>(count) + columns - 1) / columns;
   const std::uint32_t none = 0;
   pixels_.upload(std::as_bytes(has_list ? pixel_list : std::span(&none, 1)));
   const Camera camera = make_camera(view, room_from_patient, voxel_from_patient_);
@@ -171,13 +173,11 @@ void RasterizedRaycaster::draw_line_integrals(const XrayView& view, const Eigen:
   glUniform1f(kUnitPerMm, static_cast<GLfloat>(attenuation.unit_per_mm));
   glUniform1ui(kColumns, static_cast<GLuint>(view.columns));
   glUniform1ui(kOutputColumns, static_cast<GLuint>(columns));
-  glUniform1ui(kPixelCount, static_cast<GLuint>(line_integrals.size()));
+  glUniform1ui(kPixelCount, static_cast<GLuint>(count));
   glUniform1i(kHasPixelList, has_list ? 1 : 0);
   glDisable(GL_DEPTH_TEST);
   glDisable(GL_BLEND);
   glDrawArrays(GL_TRIANGLES, 0, 3);
-  timer_.stop();
-  result_.download(line_integrals);
 }
 
 Image<std::array<float, 3>> RasterizedRaycaster::front_positions(const XrayView& view,

@@ -41,7 +41,7 @@ class RasterizedRaycaster final : public Renderer {
 
   void draw_faces(const XrayView& view, const Eigen::Isometry3d& room_from_patient, bool front);
   void draw_line_integrals(const XrayView& view, const Eigen::Isometry3d& room_from_patient,
-                           std::span<const std::uint32_t> pixel_list, std::span<float> line_integrals);
+                           std::span<const std::uint32_t> pixel_list, std::size_t count);
 
   GlContext context_;  // first: what follows lives in it
   RendererKind kind_;

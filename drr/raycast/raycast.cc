@@ -72,7 +72,7 @@ RenderResult RaycastGlRenderer::render(std::span<const XrayView> views,
                                        std::span<const Eigen::Isometry3d> room_from_patient, const PixelSet& pixels) {
   context_.make_current();
   timer_.clear();
-  std::vector<std::size_t> begins = view_begins(views, pixels);
+  std::vector<std::size_t> begins = checked_view_begins(views, room_from_patient, pixels);
   const std::size_t pixels_per_pose = begins.back();
   line_integrals_.resize(pixels_per_pose * room_from_patient.size());
   upload_views(views, begins, pixels);
@@ -92,7 +92,7 @@ const Buffer& RaycastGlRenderer::render_on_gpu(std::span<const XrayView> views,
                                                const PixelSet& pixels) {
   context_.make_current();
   timer_.clear();
-  const std::vector<std::size_t> begins = view_begins(views, pixels);
+  const std::vector<std::size_t> begins = checked_view_begins(views, room_from_patient, pixels);
   if (room_from_patient.size() > poses_at_once(begins.back()))
     throw Error("so many images exceed a storage buffer of this OpenGL");
   upload_views(views, begins, pixels);
@@ -124,7 +124,7 @@ void RaycastGlRenderer::upload_views(std::span<const XrayView> views, const std:
                         .in_squares = in_squares ? 1U : 0U});
   }
   views_.upload(bytes_of(gl_views));
-  std::vector<std::uint32_t> list = {0};  // never empty: a buffer without storage cannot be bound
+  std::vector<std::uint32_t> list = {0};  // stands in where all pixels are meant
   if (!pixels.of_view.empty()) {
     list.clear();
     for (const auto& of_view : pixels.of_view) list.insert(list.end(), of_view.begin(), of_view.end());
@@ -168,11 +168,10 @@ void RaycastGlRenderer::dispatch(std::span<const XrayView> views, std::span<cons
   glUniform3fv(kBoxHigh, 1, high.data());
   glUniform2f(kUnitPerMm, static_cast<GLfloat>(kv.unit_per_mm), static_cast<GLfloat>(mv.unit_per_mm));
   const std::size_t groups = (pixels_per_pose + kGroupSize - 1) / kGroupSize;
-  timer_.start();
+  const auto running = timer_.run();
   glDispatchCompute(static_cast<GLuint>(std::min(groups, kMaxGroups)),
                     static_cast<GLuint>(std::min(poses.size(), kMaxGroups)), 1);
   glMemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT | GL_SHADER_STORAGE_BARRIER_BIT);
-  timer_.stop();
 }
 
 }  // namespace isoshift

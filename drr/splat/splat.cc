@@ -118,14 +118,12 @@ RenderResult SplatRenderer::render(std::span<const XrayView> views,
                                    std::span<const Eigen::Isometry3d> room_from_patient, const PixelSet& pixels) {
   context_.make_current();
   timer_.clear();
-  std::vector<std::size_t> begins = view_begins(views, pixels);
+  std::vector<std::size_t> begins = checked_view_begins(views, room_from_patient, pixels);
   line_integrals_.resize(begins.back() * room_from_patient.size());
   for (std::size_t p = 0; p < room_from_patient.size(); ++p)
     for (std::size_t v = 0; v < views.size(); ++v) {
       const auto drr = std::span(line_integrals_).subspan(p * begins.back() + begins[v], begins[v + 1] - begins[v]);
-      timer_.start();
       draw(views[v], room_from_patient[p]);
-      timer_.stop();
       if (pixels.of_view.empty()) {
         image_.download(drr);
         continue;
@@ -176,6 +174,7 @@ void SplatRenderer::draw(const XrayView& view, const Eigen::Isometry3d& room_fro
   glEnable(GL_BLEND);
   glBlendEquation(GL_FUNC_ADD);
   glBlendFunc(GL_ONE, GL_ONE);
+  const auto running = timer_.run();
   glDrawArraysInstanced(GL_POINTS, 0, static_cast<GLsizei>(voxels.index.size()), bilinear ? 4 : 1);
 }
 
