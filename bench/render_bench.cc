@@ -1,10 +1,9 @@
 // One DRR of a head CT by every renderer, and how the time of `cpu` and `raycast` grows: with the pixels, with the
-// share of pixels drawn at random, with the path through the body, with the bits per voxel. bench/plot_scaling.py draws
-// it.
+// share of pixels drawn at random, with the path through the body, with the bits per voxel and the instruction set.
+// bench/plot_scaling.py draws it.
 
 #include <benchmark/benchmark.h>
-
-#include <map>
+#include <hwy/highway.h>
 
 #include "bench/scene.h"
 #include "drr/gl/context.h"
@@ -87,6 +86,19 @@ void bits_per_voxel(benchmark::State& state, VolumePrecision precision) {
               PixelSet::all());
 }
 
+// What processors without this machine's best vectors would take, as far as one can tell from here.
+void instruction_set(benchmark::State& state, std::int64_t target) {
+  hwy::SetSupportedTargetsForTest(target);
+  hwy::GetChosenTarget().DeInit();
+  const auto renderer = make(RendererKind::kCpu, GlDevice::kHardware, head());
+  if (renderer->device().ends_with(hwy::TargetName(target)))
+    time_render(state, *renderer, bench_view(30.0, 512), PixelSet::all());
+  else
+    state.SkipWithError("not compiled for this one");
+  hwy::SetSupportedTargetsForTest(0);
+  hwy::GetChosenTarget().DeInit();
+}
+
 // 64 poses x 2 views x 5 % of 512 x 512 pixels: in one call, and in 128.
 void batch(benchmark::State& state, RendererKind kind, GlDevice gl, bool in_one_call) {
   if (lacks_gl(state, kind, gl)) return;
@@ -124,6 +136,9 @@ const bool kRegistered = [] {
   for (const VolumePrecision precision : kVolumePrecisions)
     add("bits_per_voxel/cpu_" + std::string(to_string(precision)),
         [=](auto& state) { bits_per_voxel(state, precision); });
+  for (std::int64_t rest = hwy::SupportedTargets(); rest != 0; rest &= rest - 1)
+    add(std::string("instruction_set/cpu_") + hwy::TargetName(rest & -rest),
+        [target = rest & -rest](auto& state) { instruction_set(state, target); });
   struct Scaled {
     const char* name;
     RendererKind kind;
