@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "drr/gl/context.h"
@@ -87,8 +88,9 @@ std::vector<std::pair<std::string, std::string>> RenderingOptions::settings() co
 void add_rendering_options(CLI::App& command, RenderingOptions& options) {
   std::vector<std::string> names = {"auto"};
   for (const RendererKind kind : kRendererKinds) names.emplace_back(to_string(kind));
-  std::vector<std::string> precisions;
-  for (const VolumePrecision precision : kVolumePrecisions) precisions.emplace_back(to_string(precision));
+  std::vector<std::string> precisions(kVolumePrecisions.size());
+  std::ranges::transform(kVolumePrecisions, precisions.begin(),
+                         [](VolumePrecision precision) { return std::string(to_string(precision)); });
   command
       .add_option("--renderer", options.renderer,
                   "What renders the DRRs. auto: raycast on a GPU, else cpu; siddon and trilinear are slow references; "

@@ -111,13 +111,13 @@ class PacketMarcher {
   }
 
  private:
+  RayPacket packet_;
   PlaneLattice<T> lattice_;
   Vector3i size_;
   int main_axis_;
   PlaneAxes axes_;
   double unit_per_mm_;
   std::span<float> line_integrals_;
-  RayPacket packet_;
   std::array<float, kPacketRays> scale_;
   std::array<std::size_t, kPacketRays> index_;
   int count_ = 0;
@@ -193,7 +193,8 @@ void RaycastCpuRenderer::integrate(std::span<const VoxelRay> rays, Beam beam, st
           ray.source -= volume.origin;
           int main_axis = 0;  // along which it runs fastest, in voxels
           ray.way.cwiseAbs().maxCoeff(&main_axis);
-          marchers[static_cast<std::size_t>(2 * main_axis + (ray.way[main_axis] > 0.0 ? 1 : 0))].add(ray, n);
+          const int against = ray.way[main_axis] < 0.0 ? 1 : 0;
+          marchers[2 * main_axis + against].add(ray, n);
         }
         for (PacketMarcher<T>& rest : marchers) rest.finish();
       },
