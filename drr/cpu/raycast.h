@@ -33,7 +33,7 @@ class RaycastCpuRenderer final : public CpuRenderer {
     template <class T>
     PlaneLattice<T> lattice(int main_axis) const;
   };
-  static PackedVolume pack(const QuantizedVolume& attenuation);
+  static PackedVolume pack(QuantizedVolume attenuation);
 
   void integrate(std::span<const VoxelRay> rays, Beam beam, std::span<float> line_integrals) const override;
 
