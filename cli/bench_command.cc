@@ -196,12 +196,6 @@ struct BenchFiguresOptions {
   bool overwrite = false;
 };
 
-Image<float> image_of(const XrayView& view, std::span<const float> line_integrals) {
-  Image<float> image(view.columns, view.rows);
-  std::ranges::copy(line_integrals, image.pixels.begin());
-  return image;
-}
-
 // Position on the bounding structure as red, green and blue; white where there is none.
 Image<Rgb> colored(const Image<std::array<float, 3>>& positions) {
   Image<Rgb> picture(positions.columns, positions.rows, Rgb{255, 255, 255});

@@ -38,8 +38,7 @@ void run_drr(const DrrOptions& options, Console& console) {
   for (std::size_t n = 0; n < study.xrays.size(); ++n) {
     const XrayView& view = study.xrays[n].view;
     const RenderResult drrs = renderer->render(std::span(&view, 1), pose, PixelSet::all());
-    Image<float> image(view.columns, view.rows);
-    std::ranges::copy(drrs.line_integrals(0, 0), image.pixels.begin());
+    const Image<float> image = image_of(view, drrs.line_integrals(0, 0));
     require_not_empty(image.pixels, study.xrays[n].label);
     const std::string name = fmt::format("drr{}", n + 1);
     const Eigen::Vector2d spacing_mm = study.rt_images[n].pixel_spacing_mm.value();

@@ -88,12 +88,6 @@ SpatialRegistrationLabel label_of(Verdict verdict) {
   return {.content_label = "SETUP_REVIEW", .content_description = "NOT ACCEPTED: REVIEW"};
 }
 
-Image<float> as_image(const XrayView& view, std::span<const float> line_integrals) {
-  Image<float> image(view.columns, view.rows);
-  std::ranges::copy(line_integrals, image.pixels.begin());
-  return image;
-}
-
 // One picture per view.
 void write_pictures(const Study& study, Renderer& renderer, const Eigen::Isometry3d& actual_room_from_patient,
                     const std::filesystem::path& folder) {
@@ -102,8 +96,8 @@ void write_pictures(const Study& study, Renderer& renderer, const Eigen::Isometr
     const XrayImage& xray = study.xrays[n];
     const RenderResult drrs = renderer.render(std::span(&xray.view, 1), poses, PixelSet::all());
     const FixedImage compared = prepare(xray);
-    const Image<float> planned = as_image(xray.view, drrs.line_integrals(0, 0));
-    const Image<float> found = as_image(xray.view, drrs.line_integrals(1, 0));
+    const Image<float> planned = image_of(xray.view, drrs.line_integrals(0, 0));
+    const Image<float> found = image_of(xray.view, drrs.line_integrals(1, 0));
     write_comparison_png(folder / fmt::format("view{}.png", n + 1),
                          {.label = xray.label,
                           .xray = compared.line_integral,

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 
 #include "drr/gl/context.h"
 #include "geometry/error.h"
@@ -53,9 +52,6 @@ RendererOptions RenderingOptions::options() const {
   refuse(wobble_seed && !splats, "--wobble-seed", "splatting", chosen);
   refuse(deposit && !splats, "--deposit", "splatting", chosen);
 
-  if (wobble_sigma_mm && !(std::isfinite(*wobble_sigma_mm) && *wobble_sigma_mm >= 0.0))
-    throw UsageError(fmt::format("--wobble-sigma {}: expected 0 mm or more", *wobble_sigma_mm));
-
   RendererOptions result;
   result.gl = gl_device_from(gl);
   if (precision) result.precision = volume_precision_from(*precision);
@@ -65,6 +61,7 @@ RendererOptions RenderingOptions::options() const {
     result.splat.deposit = *deposit == "nearest" ? SplatOptions::Deposit::kNearest : SplatOptions::Deposit::kBilinear;
   if (wobble_seed) result.splat.seed = *wobble_seed;
   result.splat.sigma_mm = wobble_sigma_mm;
+  result.check(chosen);
   return result;
 }
 

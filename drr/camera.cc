@@ -4,6 +4,13 @@
 
 namespace isoshift {
 
+Eigen::Matrix4d Camera::matrix() const {
+  Eigen::Matrix4d voxel_from_pixel = Eigen::Matrix4d::Identity();
+  voxel_from_pixel.topLeftCorner<3, 3>() = way_voxel_from_pixel;
+  voxel_from_pixel.topRightCorner<3, 1>() = source_voxel;
+  return voxel_from_pixel;
+}
+
 Camera make_camera(const XrayView& view, const Eigen::Isometry3d& room_from_patient,
                    const Eigen::Affine3d& voxel_from_patient) {
   const Eigen::Isometry3d patient_from_room = room_from_patient.inverse();

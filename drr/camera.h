@@ -13,6 +13,9 @@ namespace isoshift {
 struct Camera {
   Eigen::Vector3d source_voxel;          // in continuous voxel indices
   Eigen::Matrix3d way_voxel_from_pixel;  // (column, row, 1) to the way from the source to that pixel's center
+
+  // As shaders take it: (column, row, 1, 0) to the way, (0, 0, 0, 1) to the source.
+  Eigen::Matrix4d matrix() const;
 };
 
 Camera make_camera(const XrayView& view, const Eigen::Isometry3d& room_from_patient,

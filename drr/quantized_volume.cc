@@ -22,7 +22,7 @@ QuantizedVolume::Voxels storage(VolumePrecision precision, std::size_t count) {
 }
 
 // What the largest integer stands for.
-double full_scale_per_mm(const Volume<float>& ct_hu, const AttenuationModel& model, Beam beam) {
+double largest_attenuation_per_mm(const Volume<float>& ct_hu, const AttenuationModel& model, Beam beam) {
   if (model.kind == AttenuationModel::Kind::kWindowed || ct_hu.voxels.empty()) return 1.0;
   const float highest = model.attenuation_per_mm(*std::ranges::max_element(ct_hu.voxels), beam);
   return highest > 0.0F ? highest : 1.0;
@@ -45,6 +45,14 @@ std::optional<VolumePrecision> volume_precision_from(std::string_view name) {
   return std::nullopt;
 }
 
+double QuantizedVolume::full_scale_per_mm() const {
+  return std::visit(
+      [&]<class T>(const std::vector<T>&) {
+        return std::is_integral_v<T> ? unit_per_mm * static_cast<double>(std::numeric_limits<T>::max()) : unit_per_mm;
+      },
+      voxels);
+}
+
 QuantizedVolume quantized_attenuation(const Volume<float>& ct_hu, const AttenuationModel& model, Beam beam,
                                       VolumePrecision precision) {
   QuantizedVolume volume{.size = ct_hu.size, .voxels = storage(precision, ct_hu.voxels.size())};
@@ -53,7 +61,7 @@ QuantizedVolume quantized_attenuation(const Volume<float>& ct_hu, const Attenuat
         constexpr bool kInteger = std::is_integral_v<T>;
         if (kInteger)
           volume.unit_per_mm =
-              full_scale_per_mm(ct_hu, model, beam) / static_cast<double>(std::numeric_limits<T>::max());
+              largest_attenuation_per_mm(ct_hu, model, beam) / static_cast<double>(std::numeric_limits<T>::max());
         const auto per_unit = static_cast<float>(1.0 / volume.unit_per_mm);
         tbb::parallel_for(tbb::blocked_range<std::size_t>(0, voxels.size(), 1 << 16), [&](const auto& range) {
           for (std::size_t n = range.begin(); n != range.end(); ++n) {

@@ -33,6 +33,9 @@ struct QuantizedVolume {
   Eigen::Vector3i size = Eigen::Vector3i::Zero();
   Voxels voxels;
   double unit_per_mm = 1.0;  // attenuation that a stored 1 stands for
+
+  // Attenuation that 1 stands for to OpenGL, which reads the largest integer as 1 and floats as they are.
+  double full_scale_per_mm() const;
 };
 
 // Attenuation of a whole CT. Integers span 0 to the CT's largest attenuation, or with a HU window 0 to 1, and are

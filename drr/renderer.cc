@@ -57,6 +57,17 @@ double default_sigma_mm(SplatOptions::Wobble wobble, double largest_spacing_mm, 
   return blur_mm / (1.0 - sad_by_sid);
 }
 
+void RendererOptions::check(RendererKind kind) const {
+  if (is_oracle(kind) && precision.value_or(VolumePrecision::kF32) != VolumePrecision::kF32)
+    throw UsageError(fmt::format("--renderer {} is a reference and keeps the volume in f32: leave --precision {} out",
+                                 to_string(kind), to_string(*precision)));
+  if (kind == RendererKind::kRaycastCuberille && block_edge != 1 && block_edge != 2 && block_edge != 4 &&
+      block_edge != 8)
+    throw UsageError(fmt::format("--block-edge {}: expected 1, 2, 4 or 8 voxels", block_edge));
+  if (splat.sigma_mm && !(std::isfinite(*splat.sigma_mm) && *splat.sigma_mm >= 0.0))
+    throw UsageError(fmt::format("--wobble-sigma {}: expected 0 mm or more", *splat.sigma_mm));
+}
+
 std::size_t PixelSet::count(std::span<const XrayView> views, std::size_t view) const {
   if (!of_view.empty()) return of_view[view].size();
   return static_cast<std::size_t>(views[view].columns) * views[view].rows;
@@ -77,9 +88,7 @@ PixelSet PixelSet::random(std::span<const XrayView> views, double fraction, std:
 std::unique_ptr<Renderer> make_renderer(RendererKind kind, const Volume<float>& ct_hu, const AttenuationModel& model,
                                         std::span<const Beam> beams, const RendererOptions& options) {
   model.check();
-  if (is_oracle(kind) && options.precision.value_or(VolumePrecision::kF32) != VolumePrecision::kF32)
-    throw UsageError(fmt::format("--renderer {} is a reference and keeps the volume in f32: leave --precision {} out",
-                                 to_string(kind), to_string(*options.precision)));
+  options.check(kind);
   switch (kind) {
     case RendererKind::kSiddon: return std::make_unique<SiddonRenderer>(ct_hu, model, beams);
     case RendererKind::kTrilinear: return std::make_unique<TrilinearRenderer>(ct_hu, model, beams);
@@ -93,6 +102,12 @@ std::unique_ptr<Renderer> make_renderer(RendererKind kind, const Volume<float>& 
     case RendererKind::kSplatBuffers: return std::make_unique<SplatRenderer>(kind, ct_hu, model, beams, options);
   }
   return nullptr;
+}
+
+Image<float> image_of(const XrayView& view, std::span<const float> line_integrals) {
+  Image<float> image(view.columns, view.rows);
+  std::ranges::copy(line_integrals, image.pixels.begin());
+  return image;
 }
 
 void require_not_empty(std::span<const float> line_integrals, std::string_view label) {

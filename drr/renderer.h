@@ -17,6 +17,7 @@
 
 #include "drr/attenuation.h"
 #include "drr/quantized_volume.h"
+#include "geometry/image.h"
 #include "geometry/volume.h"
 #include "geometry/xray_view.h"
 
@@ -75,6 +76,9 @@ struct RendererOptions {
   std::optional<VolumePrecision> precision;  // unset: u16. The oracles keep floats
   int block_edge = 2;                        // of kRaycastCuberille, voxels
   SplatOptions splat;
+
+  // Throws UsageError for what a renderer of this kind cannot do.
+  void check(RendererKind kind) const;
 };
 
 // Which pixels of every view are rendered: all, or per view a list of indices (row * columns + column).
@@ -128,6 +132,9 @@ class Renderer {
 // such OpenGL or the volume exceeds its limits: never another renderer instead.
 std::unique_ptr<Renderer> make_renderer(RendererKind kind, const Volume<float>& ct_hu, const AttenuationModel& model,
                                         std::span<const Beam> beams, const RendererOptions& options = {});
+
+// All pixels of a view as an image.
+Image<float> image_of(const XrayView& view, std::span<const float> line_integrals);
 
 // Throws Error if a DRR of a whole image is zero everywhere: a blank picture is never a result.
 void require_not_empty(std::span<const float> line_integrals, std::string_view label);

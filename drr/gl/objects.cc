@@ -253,4 +253,19 @@ glm::mat4 to_glm(const Eigen::Matrix4d& matrix) {
   return result;
 }
 
+void set_uniform(int location, const Eigen::Matrix4d& matrix) {
+  const Eigen::Matrix4f values = matrix.cast<float>();
+  glUniformMatrix4fv(location, 1, GL_FALSE, values.data());
+}
+
+void set_uniform(int location, const Eigen::Matrix3d& matrix) {
+  const Eigen::Matrix3f values = matrix.cast<float>();
+  glUniformMatrix3fv(location, 1, GL_FALSE, values.data());
+}
+
+void set_uniform(int location, const Eigen::Vector3d& vector) {
+  const Eigen::Vector3f values = vector.cast<float>();
+  glUniform3fv(location, 1, values.data());
+}
+
 }  // namespace isoshift

@@ -141,4 +141,9 @@ class GlTimer {
 // Column by column, double to float: how host matrices reach shaders.
 glm::mat4 to_glm(const Eigen::Matrix4d& matrix);
 
+// Sets a uniform of the program in use.
+void set_uniform(int location, const Eigen::Matrix4d& matrix);
+void set_uniform(int location, const Eigen::Matrix3d& matrix);
+void set_uniform(int location, const Eigen::Vector3d& vector);
+
 }  // namespace isoshift

@@ -1,10 +1,8 @@
 #include "drr/raycast/rasterized.h"
 
 #include <epoxy/gl.h>
-#include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 #include <limits>
 
 #include "drr/camera.h"
@@ -13,7 +11,6 @@
 #include "drr/raycast/faces.frag.h"
 #include "drr/raycast/faces.vert.h"
 #include "drr/raycast/screen.vert.h"
-#include "geometry/error.h"
 
 namespace isoshift {
 namespace {
@@ -57,16 +54,6 @@ Eigen::Matrix4d clip_from_voxel(const XrayView& view, const Eigen::Isometry3d& r
   return clip;
 }
 
-void set_matrix(int location, const Eigen::Matrix4d& matrix) {
-  const glm::mat4 values = to_glm(matrix);
-  glUniformMatrix4fv(location, 1, GL_FALSE, &values[0][0]);
-}
-
-void set_vector(int location, const Eigen::Vector3d& vector) {
-  const Eigen::Vector3f values = vector.cast<float>();
-  glUniform3fv(location, 1, values.data());
-}
-
 }  // namespace
 
 RasterizedRaycaster::RasterizedRaycaster(RendererKind kind, const Volume<float>& ct_hu, const AttenuationModel& model,
@@ -84,9 +71,6 @@ RasterizedRaycaster::RasterizedRaycaster(RendererKind kind, const Volume<float>&
       size_(ct_hu.size),
       step_mm_(ct_hu.spacing_mm().minCoeff()) {
   const bool is_box = kind == RendererKind::kRaycastBox;
-  if (!is_box && options.block_edge != 1 && options.block_edge != 2 && options.block_edge != 4 &&
-      options.block_edge != 8)
-    throw UsageError(fmt::format("--block-edge {}: expected 1, 2, 4 or 8 voxels", options.block_edge));
   block_edge_ =
       is_box ? Eigen::Vector3d(size_.cast<double>().array() + 1.0) : Eigen::Vector3d::Constant(options.block_edge);
   for (const Beam beam : beams) {
@@ -135,10 +119,10 @@ void RasterizedRaycaster::draw_faces(const XrayView& view, const Eigen::Isometry
   if (structure.face_count == 0) return;
   faces_program_.use();
   structure.vertices.bind();
-  set_matrix(kClipFromVoxel, clip_from_voxel(view, room_from_patient, patient_from_voxel_));
-  set_vector(kSourceVoxel, make_camera(view, room_from_patient, voxel_from_patient_).source_voxel);
-  set_vector(kEdge, block_edge_);
-  set_vector(kHighest, size_.cast<double>());
+  set_uniform(kClipFromVoxel, clip_from_voxel(view, room_from_patient, patient_from_voxel_));
+  set_uniform(kSourceVoxel, make_camera(view, room_from_patient, voxel_from_patient_).source_voxel);
+  set_uniform(kEdge, block_edge_);
+  set_uniform(kHighest, Eigen::Vector3d(size_.cast<double>()));
   glUniform1i(kTowardSource, front ? 1 : 0);
   glDisable(GL_BLEND);
   glEnable(GL_DEPTH_TEST);
@@ -153,11 +137,6 @@ void RasterizedRaycaster::draw_line_integrals(const XrayView& view, const Eigen:
   const int rows = (static_cast<int>(count) + columns - 1) / columns;
   const std::uint32_t none = 0;
   pixels_.upload(std::as_bytes(has_list ? pixel_list : std::span(&none, 1)));
-  const Camera camera = make_camera(view, room_from_patient, voxel_from_patient_);
-  Eigen::Matrix4d voxel_from_pixel = Eigen::Matrix4d::Identity();
-  voxel_from_pixel.topLeftCorner<3, 3>() = camera.way_voxel_from_pixel;
-  voxel_from_pixel.topRightCorner<3, 1>() = camera.source_voxel;
-  const Eigen::Matrix3f mm_from_voxel_axes = patient_from_voxel_.linear().cast<float>();
   const AttenuationTexture& attenuation = attenuation_.at(view.beam);
 
   result_.resize_and_use(columns, rows);
@@ -167,8 +146,8 @@ void RasterizedRaycaster::draw_line_integrals(const XrayView& view, const Eigen:
   front_.bind(kFront);
   back_.bind(kBack);
   pixels_.bind(kPixels);
-  set_matrix(kVoxelFromPixel, voxel_from_pixel);
-  glUniformMatrix3fv(kMmFromVoxelAxes, 1, GL_FALSE, mm_from_voxel_axes.data());
+  set_uniform(kVoxelFromPixel, make_camera(view, room_from_patient, voxel_from_patient_).matrix());
+  set_uniform(kMmFromVoxelAxes, Eigen::Matrix3d(patient_from_voxel_.linear()));
   glUniform1f(kStepMm, static_cast<GLfloat>(step_mm_));
   glUniform1f(kUnitPerMm, static_cast<GLfloat>(attenuation.unit_per_mm));
   glUniform1ui(kColumns, static_cast<GLuint>(view.columns));

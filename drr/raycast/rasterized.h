@@ -16,7 +16,7 @@ namespace isoshift {
 
 class RasterizedRaycaster final : public Renderer {
  public:
-  // `kind` is kRaycastBox or kRaycastCuberille. Throws UsageError for a block edge that is not 1, 2, 4 or 8, and Error
+  // `kind` is kRaycastBox or kRaycastCuberille. Throws Error
   // where there is no OpenGL 4.5 of the kind asked for, or the volume exceeds its limits.
   RasterizedRaycaster(RendererKind kind, const Volume<float>& ct_hu, const AttenuationModel& model,
                       std::span<const Beam> beams, const RendererOptions& options);

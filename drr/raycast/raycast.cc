@@ -136,13 +136,7 @@ void RaycastGlRenderer::dispatch(std::span<const XrayView> views, std::span<cons
                                  std::size_t pixels_per_pose, bool has_pixel_list) {
   std::vector<glm::mat4> cameras;
   for (const Eigen::Isometry3d& pose : poses)
-    for (const XrayView& view : views) {
-      const Camera camera = make_camera(view, pose, voxel_from_patient_);
-      Eigen::Matrix4d voxel_from_pixel = Eigen::Matrix4d::Identity();
-      voxel_from_pixel.topLeftCorner<3, 3>() = camera.way_voxel_from_pixel;
-      voxel_from_pixel.topRightCorner<3, 1>() = camera.source_voxel;
-      cameras.push_back(to_glm(voxel_from_pixel));
-    }
+    for (const XrayView& view : views) cameras.push_back(to_glm(make_camera(view, pose, voxel_from_patient_).matrix()));
   cameras_.upload(bytes_of(cameras));
   result_.reserve(poses.size() * pixels_per_pose * sizeof(float));
 
@@ -156,16 +150,14 @@ void RaycastGlRenderer::dispatch(std::span<const XrayView> views, std::span<cons
   views_.bind(kViews);
   pixels_.bind(kPixels);
   result_.bind(kResult);
-  const Eigen::Matrix3f mm_from_voxel_axes = voxel_from_patient_.linear().inverse().cast<float>();
-  const Eigen::Vector3f low = box_low_.cast<float>(), high = box_high_.cast<float>();
   glUniform1ui(kPoseCount, static_cast<GLuint>(poses.size()));
   glUniform1ui(kViewCount, static_cast<GLuint>(views.size()));
   glUniform1ui(kPixelsPerPose, static_cast<GLuint>(pixels_per_pose));
   glUniform1i(kHasPixelList, has_pixel_list ? 1 : 0);
   glUniform1f(kStepMm, static_cast<GLfloat>(step_mm_));
-  glUniformMatrix3fv(kMmFromVoxelAxes, 1, GL_FALSE, mm_from_voxel_axes.data());
-  glUniform3fv(kBoxLow, 1, low.data());
-  glUniform3fv(kBoxHigh, 1, high.data());
+  set_uniform(kMmFromVoxelAxes, Eigen::Matrix3d(voxel_from_patient_.linear().inverse()));
+  set_uniform(kBoxLow, box_low_);
+  set_uniform(kBoxHigh, box_high_);
   glUniform2f(kUnitPerMm, static_cast<GLfloat>(kv.unit_per_mm), static_cast<GLfloat>(mv.unit_per_mm));
   const std::size_t groups = (pixels_per_pose + kGroupSize - 1) / kGroupSize;
   const auto running = timer_.run();

@@ -1,7 +1,6 @@
 #include "drr/splat/splat.h"
 
 #include <epoxy/gl.h>
-#include <fmt/format.h>
 
 #include <cmath>
 #include <limits>
@@ -80,15 +79,13 @@ SplatRenderer::SplatRenderer(RendererKind kind, const Volume<float>& ct_hu, cons
       patient_from_voxel_(ct_hu.patient_from_voxel),
       voxel_from_patient_(ct_hu.patient_from_voxel.inverse()),
       size_(ct_hu.size) {
-  if (options_.sigma_mm && !(std::isfinite(*options_.sigma_mm) && *options_.sigma_mm >= 0.0))
-    throw UsageError(fmt::format("--wobble-sigma {}: expected 0 mm or more", *options_.sigma_mm));
   if (ct_hu.voxels.size() > std::numeric_limits<std::uint32_t>::max())
     throw Error("a CT of more than 4294967295 voxels cannot be splatted.\n       Use --renderer cpu");
   for (const Beam beam : beams) {
     const QuantizedVolume volume =
         quantized_attenuation(ct_hu, model, beam, options.precision.value_or(kDefaultPrecision));
     Voxels& kept = voxels_[beam];
-    kept.unit_per_mm = volume.unit_per_mm;
+    kept.unit_per_mm = volume.full_scale_per_mm();
     std::visit(
         [&]<class T>(const std::vector<T>& values) {
           std::vector<T> above;
@@ -97,7 +94,6 @@ SplatRenderer::SplatRenderer(RendererKind kind, const Volume<float>& ct_hu, cons
             kept.index.push_back(static_cast<std::uint32_t>(n));
             above.push_back(values[n]);
           }
-          if (std::is_integral_v<T>) kept.unit_per_mm *= static_cast<double>(std::numeric_limits<T>::max());
           kept.attenuation = std::move(above);
           constexpr auto kType = std::is_same_v<T, float>          ? VertexArray::Type::kFloat
                                  : std::is_same_v<T, std::uint8_t> ? VertexArray::Type::kUnitUint8
@@ -145,10 +141,6 @@ void SplatRenderer::draw(const XrayView& view, const Eigen::Isometry3d& room_fro
   const double voxel_mm3 = std::abs(patient_from_voxel_.linear().determinant());
   Eigen::Matrix4d pixel_from_voxel = Eigen::Matrix4d::Identity();
   pixel_from_voxel.topRows<3>() = view.pixel_from_room * room_from_patient.matrix() * patient_from_voxel_.matrix();
-  const glm::mat4 matrix = to_glm(pixel_from_voxel);
-  const Eigen::Vector3f source_voxel =
-      make_camera(view, room_from_patient, voxel_from_patient_).source_voxel.cast<float>();
-  const Eigen::Matrix3f mm_from_voxel_axes = patient_from_voxel_.linear().cast<float>();
 
   image_.resize_and_use(view.columns, view.rows);
   image_.clear(0.0F);
@@ -158,9 +150,9 @@ void SplatRenderer::draw(const XrayView& view, const Eigen::Isometry3d& room_fro
   voxels.vertices.bind();
   if (noise_) noise_->bind(kNoise);
   glUniform3ui(kSize, static_cast<GLuint>(size_.x()), static_cast<GLuint>(size_.y()), static_cast<GLuint>(size_.z()));
-  glUniformMatrix4fv(kPixelFromVoxel, 1, GL_FALSE, &matrix[0][0]);
-  glUniform3fv(kSourceVoxel, 1, source_voxel.data());
-  glUniformMatrix3fv(kMmFromVoxelAxes, 1, GL_FALSE, mm_from_voxel_axes.data());
+  set_uniform(kPixelFromVoxel, pixel_from_voxel);
+  set_uniform(kSourceVoxel, make_camera(view, room_from_patient, voxel_from_patient_).source_voxel);
+  set_uniform(kMmFromVoxelAxes, Eigen::Matrix3d(patient_from_voxel_.linear()));
   glUniform1f(kSidMm, static_cast<GLfloat>(receptor.sid_mm));
   glUniform1f(kWeight, static_cast<GLfloat>(voxels.unit_per_mm * voxel_mm3 / receptor.pixel_area_mm2()));
   glUniform2f(kSigmaPx, static_cast<GLfloat>(sigma_mm / receptor.column_step_mm.norm()),

@@ -15,7 +15,7 @@ namespace isoshift {
 
 class SplatRenderer final : public Renderer {
  public:
-  // `kind` is one of the three splatting kinds. Throws UsageError for a sigma that is negative or not finite, and Error
+  // `kind` is one of the three splatting kinds. Throws Error
   // where there is no OpenGL 4.5 of the kind asked for, or the volume has 2^32 voxels or more.
   SplatRenderer(RendererKind kind, const Volume<float>& ct_hu, const AttenuationModel& model,
                 std::span<const Beam> beams, const RendererOptions& options);
