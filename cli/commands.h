@@ -11,6 +11,7 @@ void add_inspect_command(CLI::App& app, Console& console, int& exit_status);
 void add_register_command(CLI::App& app, Console& console, int& exit_status);
 void add_drr_command(CLI::App& app, Console& console, int& exit_status);
 void add_phantom_command(CLI::App& app, Console& console, int& exit_status);
+void add_evaluate_command(CLI::App& app, Console& console, int& exit_status);
 void add_bench_command(CLI::App& app, Console& console, int& exit_status);
 
 // The whole program: parses, runs, and turns every exception into a message and an exit status.

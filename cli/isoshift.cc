@@ -38,14 +38,15 @@ int run_isoshift(int argc, const char* const* argv, Console& console) {
   add_register_command(app, console, exit_status);
   add_drr_command(app, console, exit_status);
   add_phantom_command(app, console, exit_status);
+  add_evaluate_command(app, console, exit_status);
   add_bench_command(app, console, exit_status);
   try {
     // CLI11 would say only that a command is missing.
     const auto commands = app.get_subcommands({});
     const auto is_chosen = [&](const CLI::App* command) { return command->get_name() == argv[1]; };
     if (argc > 1 && argv[1][0] != '-' && std::ranges::none_of(commands, is_chosen))
-      throw UsageError(
-          fmt::format("there is no command {}; the commands are inspect, register, drr, phantom and bench", argv[1]));
+      throw UsageError(fmt::format(
+          "there is no command {}; the commands are inspect, register, drr, phantom, evaluate and bench", argv[1]));
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() == 0) return app.exit(error, console.out, console.err);

@@ -50,7 +50,7 @@ SetupReport make_report(const RegisterOptions& options, const Study& study, cons
   report.table = study.table;
   report.setup_error = setup_error_from_poses(study.planned_room_from_patient, result.actual_room_from_patient);
   report.unobservable_room = result.unobservable_room;
-  report.translation_only = options.registration.dof == Dof::kTranslation;
+  report.translation_only = options.search.dof == "translation";
   for (std::size_t n = 0; n < study.rt_images.size(); ++n)
     report.views.push_back({.label = study.rt_images[n].label,
                             .sop_instance_uid = study.rt_images[n].sop_instance_uid,
@@ -63,7 +63,7 @@ SetupReport make_report(const RegisterOptions& options, const Study& study, cons
                              .evaluations = stage.evaluations,
                              .seconds = stage.seconds,
                              .termination = stage.termination});
-  report.seed = options.registration.seed;
+  report.seed = options.search.seed;
   report.attenuation = options.rendering.attenuation;
   const AttenuationModel model = options.rendering.model();
   report.threshold_hu = model.threshold_hu;
@@ -110,9 +110,7 @@ void write_pictures(const Study& study, Renderer& renderer, const Eigen::Isometr
 
 }  // namespace
 
-int run_register(const RegisterOptions& given, Console& console) {
-  RegisterOptions options = given;
-  options.registration.dof = options.dof == "rigid" ? Dof::kRigid : Dof::kTranslation;
+int run_register(const RegisterOptions& options, Console& console) {
   const Stopwatch total;
   OutputFolder output(options.output, options.overwrite);
   std::optional<Eigen::Isometry3d> truth;
@@ -124,7 +122,7 @@ int run_register(const RegisterOptions& given, Console& console) {
   RegistrationResult result;
   {
     ProgressBar bar(console, "Registering");
-    result = register_views(*renderer, study.xrays, study.planned_room_from_patient, options.registration,
+    result = register_views(*renderer, study.xrays, study.planned_room_from_patient, options.search.registration(),
                             [&](double share) { bar.update(share); });
   }
 
@@ -164,18 +162,13 @@ void add_register_command(CLI::App& app, Console& console, int& exit_status) {
       "Exit status: 0 accepted, 1 failed, 2 usage, 3 review, 4 rejected.");
   add_study_options(*command, options->study);
   command->add_option("-o,--output", options->output, "Folder for the results")->required()->type_name("FOLDER");
-  command->add_option("--dof", options->dof, "Degrees of freedom: six, or the three translations")
-      ->check(CLI::IsMember({"rigid", "translation"}))
-      ->capture_default_str();
-  command->add_option("--seed", options->registration.seed, "Draws the pixels compared; the only randomness")
-      ->check(CLI::NonNegativeNumber)
-      ->capture_default_str();
   command->add_option("--truth", options->truth, "truth.json of a phantom study: print the result beside it")
       ->type_name("FILE");
   command->add_flag("--write-reg-for-review", options->write_reg_for_review,
                     "Write the registration object for a result that needs review, too, marked as not accepted");
   command->add_flag("--overwrite", options->overwrite, "Replace an earlier output in that folder");
   command->add_flag("--json", options->json, "Print result.json instead of the report");
+  add_search_options(*command, options->search);
   add_rendering_options(*command, options->rendering);
   command->callback([options, &console, &exit_status] { exit_status = run_register(*options, console); });
 }

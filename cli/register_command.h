@@ -6,16 +6,15 @@
 #include <string>
 
 #include "cli/console.h"
+#include "cli/search_options.h"
 #include "cli/study_options.h"
-#include "registration/register_views.h"
 
 namespace isoshift {
 
 struct RegisterOptions {
   StudyOptions study;
   RenderingOptions rendering;
-  RegistrationOptions registration;
-  std::string dof = "rigid";
+  SearchOptions search;
   std::filesystem::path output;
   std::filesystem::path truth;  // empty: unknown
   bool overwrite = false;

@@ -9,6 +9,7 @@
 
 #include "geometry/error.h"
 #include "geometry/rotation.h"
+#include "geometry/target_error.h"
 
 namespace isoshift {
 
@@ -29,17 +30,6 @@ Eigen::Isometry3d read_setup_error(const std::filesystem::path& path) {
     throw Error(fmt::format("{}: holds no complete setup error (a result.json or truth.json is needed): {}",
                             path.string(), error.what()));
   }
-}
-
-double mean_target_registration_error_mm(const Eigen::Isometry3d& found, const Eigen::Isometry3d& truth) {
-  double sum_mm = 0.0;
-  for (const double x : {-50.0, 0.0, 50.0})
-    for (const double y : {-50.0, 0.0, 50.0})
-      for (const double z : {-50.0, 0.0, 50.0}) {
-        const Eigen::Vector3d target(x, y, z);
-        sum_mm += (found * target - truth * target).norm();
-      }
-  return sum_mm / 27.0;
 }
 
 namespace {
@@ -67,7 +57,7 @@ std::string compared_with_truth(const Eigen::Isometry3d& found_error, const Eige
                          known, unsigned_zero(found - known));
   }
   table += fmt::format("  mean target registration error, 27 points within 50 mm: {:.2f} mm\n",
-                       mean_target_registration_error_mm(found_error, true_error));
+                       mean_target_registration_error_mm(found_error, true_error, standard_targets_mm()));
   return table;
 }
 

@@ -91,20 +91,20 @@ struct PixelSet {
   std::size_t count(std::span<const XrayView> views, std::size_t view) const;
 };
 
-// Borrowed pixels of one render() call: valid until the renderer's next render() or its end.
+// The pixels of one render() call.
 class RenderResult {
  public:
-  RenderResult(std::span<const float> values, std::vector<std::size_t> view_begins)
-      : values_(values), view_begins_(std::move(view_begins)) {}
+  RenderResult(std::vector<float> values, std::vector<std::size_t> view_begins)
+      : values_(std::move(values)), view_begins_(std::move(view_begins)) {}
 
   // Line integrals of one pose and view, in the order of the pixel set (row-major for all pixels).
   std::span<const float> line_integrals(std::size_t pose, std::size_t view) const {
     const std::size_t begin = pose * view_begins_.back() + view_begins_[view];
-    return values_.subspan(begin, view_begins_[view + 1] - view_begins_[view]);
+    return std::span(values_).subspan(begin, view_begins_[view + 1] - view_begins_[view]);
   }
 
  private:
-  std::span<const float> values_;
+  std::vector<float> values_;
   std::vector<std::size_t> view_begins_;  // within one pose; the last entry is the pose's total
 };
 
@@ -113,7 +113,8 @@ class Renderer {
   virtual ~Renderer() = default;
 
   // Line integrals of attenuation (dimensionless) from source to pixel center; 0 where a ray misses the volume.
-  // Images come pose by pose and, within a pose, view by view. A volume outside what the ray passes is air.
+  // Images come pose by pose and, within a pose, view by view. A volume outside what the ray passes is air. Renderers
+  // on the CPU may be called from several threads at once; those on OpenGL from one.
   virtual RenderResult render(std::span<const XrayView> views, std::span<const Eigen::Isometry3d> room_from_patient,
                               const PixelSet& pixels) = 0;
 

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <chrono>
 #include <numeric>
 #include <random>
 
@@ -74,11 +75,16 @@ double Objective::compare(const Target& target, std::span<const float> drr) cons
 }
 
 std::vector<std::vector<double>> Objective::per_view(std::span<const Eigen::Isometry3d> room_from_patient) {
+  using Clock = std::chrono::steady_clock;
+  const auto begin = Clock::now();
   const RenderResult drrs = renderer_.render(views_, room_from_patient, pixels_);
+  const auto rendered = Clock::now();
   std::vector<std::vector<double>> similarity(room_from_patient.size());
   for (std::size_t pose = 0; pose < room_from_patient.size(); ++pose)
     for (std::size_t view = 0; view < views_.size(); ++view)
       similarity[pose].push_back(compare(targets_[view], drrs.line_integrals(pose, view)));
+  seconds_.rendering += std::chrono::duration<double>(rendered - begin).count();
+  seconds_.similarity += std::chrono::duration<double>(Clock::now() - rendered).count();
   return similarity;
 }
 

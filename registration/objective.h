@@ -26,6 +26,12 @@ class Objective {
   // Similarity per view, in [-1, 1]. Result [pose][view].
   std::vector<std::vector<double>> per_view(std::span<const Eigen::Isometry3d> room_from_patient);
 
+  // Where the time went so far.
+  struct Seconds {
+    double rendering = 0.0, similarity = 0.0;
+  };
+  const Seconds& seconds() const { return seconds_; }
+
   // The mean over the views, one per pose.
   std::vector<double> values(std::span<const Eigen::Isometry3d> room_from_patient);
 
@@ -45,6 +51,7 @@ class Objective {
   std::vector<XrayView> views_;
   PixelSet pixels_;
   std::vector<Target> targets_;
+  Seconds seconds_;
 };
 
 }  // namespace isoshift

@@ -136,6 +136,8 @@ RegistrationResult register_views(Renderer& renderer, std::span<const XrayImage>
         },
         optimizer_options(stage, options, parameters));
     parameters = found.best;
+    result.seconds_rendering += objective.seconds().rendering;
+    result.seconds_similarity += objective.seconds().similarity;
     result.stages.push_back({.name = stage.name,
                              .similarity = std::string(to_string(stage.similarity)),
                              .evaluations = found.evaluations,

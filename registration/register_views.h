@@ -71,7 +71,7 @@ struct RegistrationResult {
   std::vector<Eigen::Vector3d> unobservable_room;  // unit directions along which the views cannot tell
   std::vector<ViewReport> views;
   std::vector<StageReport> stages;
-  double seconds = 0.0;
+  double seconds = 0.0, seconds_rendering = 0.0, seconds_similarity = 0.0;  // in all, and of that
 
   int evaluations() const;
 };

@@ -55,6 +55,14 @@ std::vector<std::uint32_t> neighbors_together(std::span<const std::uint32_t> pix
   return places;
 }
 
+// Groups of fixed size: which rays go together must not depend on how the work is spread, or rounding would.
+constexpr std::size_t kListGroup = 4 * kBlockPixels;
+int groups_of(std::size_t pixels) { return static_cast<int>((pixels + kListGroup - 1) / kListGroup); }
+std::span<const std::uint32_t> group_of(std::span<const std::uint32_t> places, int group) {
+  const auto from_group = places.subspan(static_cast<std::size_t>(group) * kListGroup);
+  return from_group.first(std::min(kListGroup, from_group.size()));
+}
+
 }  // namespace
 
 std::string CpuRenderer::device() const {
@@ -64,59 +72,64 @@ std::string CpuRenderer::device() const {
 RenderResult CpuRenderer::render(std::span<const XrayView> views, std::span<const Eigen::Isometry3d> room_from_patient,
                                  const PixelSet& pixels) {
   std::vector<std::size_t> begins = checked_view_begins(views, room_from_patient, pixels);
-  line_integrals_.resize(begins.back() * room_from_patient.size());
+  std::vector<float> line_integrals(begins.back() * room_from_patient.size());
+  const bool all = pixels.of_view.empty();
 
+  // The work of one pose: tiles or groups of every view, one after the other.
+  std::vector<int> group_begins = {0};
   std::vector<std::vector<std::uint32_t>> orders;
-  for (std::size_t v = 0; v < pixels.of_view.size(); ++v)
-    orders.push_back(neighbors_together(pixels.of_view[v], views[v]));
-  for (std::size_t p = 0; p < room_from_patient.size(); ++p)
-    for (std::size_t v = 0; v < views.size(); ++v) {
-      const Camera camera = make_camera(views[v], room_from_patient[p], voxel_from_patient_);
-      const auto drr = std::span(line_integrals_).subspan(p * begins.back() + begins[v], begins[v + 1] - begins[v]);
-      if (pixels.of_view.empty())
-        render_all(views[v], camera, drr);
-      else
-        render_list(views[v], camera, pixels.of_view[v], orders[v], drr);
-    }
-  return RenderResult(line_integrals_, std::move(begins));
+  for (std::size_t v = 0; v < views.size(); ++v) {
+    if (!all) orders.push_back(neighbors_together(pixels.of_view[v], views[v]));
+    group_begins.push_back(group_begins.back() + (all ? tiles_along(views[v].columns) * tiles_along(views[v].rows)
+                                                      : groups_of(orders[v].size())));
+  }
+  std::vector<Camera> cameras;
+  for (const Eigen::Isometry3d& pose : room_from_patient)
+    for (const XrayView& view : views) cameras.push_back(make_camera(view, pose, voxel_from_patient_));
+
+  const auto poses = static_cast<int>(room_from_patient.size());
+  tbb::parallel_for(0, poses * group_begins.back(), [&](int work) {
+    const std::size_t p = work / group_begins.back();
+    const int in_pose = work % group_begins.back();
+    const std::size_t v = std::ranges::upper_bound(group_begins, in_pose) - group_begins.begin() - 1;
+    const int group = in_pose - group_begins[v];
+    const Camera& camera = cameras[p * views.size() + v];
+    const auto drr = std::span(line_integrals).subspan(p * begins.back() + begins[v], begins[v + 1] - begins[v]);
+    if (all)
+      render_tile(views[v], camera, group, drr);
+    else
+      render_group(views[v], camera, pixels.of_view[v], group_of(orders[v], group), drr);
+  });
+  return RenderResult(std::move(line_integrals), std::move(begins));
 }
 
-void CpuRenderer::render_all(const XrayView& view, const Camera& camera, std::span<float> drr) const {
+void CpuRenderer::render_tile(const XrayView& view, const Camera& camera, int tile, std::span<float> drr) const {
   const int tiles_per_row = tiles_along(view.columns);
-  tbb::parallel_for(0, tiles_per_row * tiles_along(view.rows), [&](int tile) {
-    const int first_column = tile % tiles_per_row * kTileEdge, first_row = tile / tiles_per_row * kTileEdge;
-    std::array<VoxelRay, kGroup> rays;
-    std::array<float, kGroup> values;
-    for (int n = 0; n < kGroup; ++n) {
-      const PixelInTile pixel = pixel_in_tile(n);
-      rays[n] = ray_to(first_column + pixel.column, first_row + pixel.row, camera, mm_from_voxel_axes_);
-    }
-    integrate(rays, view.beam, values);
-    for (int n = 0; n < kGroup; ++n) {
-      const auto [column, row] = pixel_in_tile(n);  // the last tiles reach beyond the image
-      if (first_column + column < view.columns && first_row + row < view.rows)
-        drr[static_cast<std::size_t>(first_row + row) * view.columns + first_column + column] = values[n];
-    }
-  });
+  const int first_column = tile % tiles_per_row * kTileEdge, first_row = tile / tiles_per_row * kTileEdge;
+  std::array<VoxelRay, kGroup> rays;
+  std::array<float, kGroup> values;
+  for (int n = 0; n < kGroup; ++n) {
+    const PixelInTile pixel = pixel_in_tile(n);
+    rays[n] = ray_to(first_column + pixel.column, first_row + pixel.row, camera, mm_from_voxel_axes_);
+  }
+  integrate(rays, view.beam, values);
+  for (int n = 0; n < kGroup; ++n) {
+    const auto [column, row] = pixel_in_tile(n);  // the last tiles reach beyond the image
+    if (first_column + column < view.columns && first_row + row < view.rows)
+      drr[static_cast<std::size_t>(first_row + row) * view.columns + first_column + column] = values[n];
+  }
 }
 
-void CpuRenderer::render_list(const XrayView& view, const Camera& camera, std::span<const std::uint32_t> pixels,
-                              std::span<const std::uint32_t> places, std::span<float> drr) const {
-  // Groups of fixed size: which rays go together must not depend on how the work is spread, or rounding would.
-  constexpr int kListGroup = 4 * kBlockPixels;
-  const int groups = (static_cast<int>(places.size()) + kListGroup - 1) / kListGroup;
-  tbb::parallel_for(0, groups, [&](int group) {
-    const auto in_group = places.subspan(static_cast<std::size_t>(group) * kListGroup);
-    const std::size_t count = std::min<std::size_t>(kListGroup, in_group.size());
-    std::array<VoxelRay, kListGroup> rays;
-    std::array<float, kListGroup> values;
-    for (std::size_t n = 0; n < count; ++n) {
-      const int pixel = static_cast<int>(pixels[in_group[n]]);
-      rays[n] = ray_to(pixel % view.columns, pixel / view.columns, camera, mm_from_voxel_axes_);
-    }
-    integrate(std::span(rays).first(count), view.beam, std::span(values).first(count));
-    for (std::size_t n = 0; n < count; ++n) drr[in_group[n]] = values[n];
-  });
+void CpuRenderer::render_group(const XrayView& view, const Camera& camera, std::span<const std::uint32_t> pixels,
+                               std::span<const std::uint32_t> places, std::span<float> drr) const {
+  std::array<VoxelRay, kListGroup> rays;
+  std::array<float, kListGroup> values;
+  for (std::size_t n = 0; n < places.size(); ++n) {
+    const int pixel = static_cast<int>(pixels[places[n]]);
+    rays[n] = ray_to(pixel % view.columns, pixel / view.columns, camera, mm_from_voxel_axes_);
+  }
+  integrate(std::span(rays).first(places.size()), view.beam, std::span(values).first(places.size()));
+  for (std::size_t n = 0; n < places.size(); ++n) drr[places[n]] = values[n];
 }
 
 std::optional<RaySegment> clip_to_box(const VoxelRay& ray, const Eigen::Vector3d& low, const Eigen::Vector3d& high) {

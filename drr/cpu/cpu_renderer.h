@@ -31,14 +31,13 @@ class CpuRenderer : public Renderer {
   virtual void integrate(std::span<const VoxelRay> rays, Beam beam, std::span<float> line_integrals) const = 0;
 
  private:
-  void render_all(const XrayView& view, const Camera& camera, std::span<float> drr) const;
-  // `places`: the order in which the list is gone through.
-  void render_list(const XrayView& view, const Camera& camera, std::span<const std::uint32_t> pixels,
-                   std::span<const std::uint32_t> places, std::span<float> drr) const;
+  void render_tile(const XrayView& view, const Camera& camera, int tile, std::span<float> drr) const;
+  // `places`: those of the list that go together.
+  void render_group(const XrayView& view, const Camera& camera, std::span<const std::uint32_t> pixels,
+                    std::span<const std::uint32_t> places, std::span<float> drr) const;
 
   Eigen::Affine3d voxel_from_patient_;
   Eigen::Matrix3d mm_from_voxel_axes_;
-  std::vector<float> line_integrals_;
 };
 
 // The part of a ray inside an axis-aligned box, as an interval of t within [0, 1]; nothing where it misses.

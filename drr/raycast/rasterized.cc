@@ -93,10 +93,10 @@ RenderResult RasterizedRaycaster::render(std::span<const XrayView> views,
   context_.make_current();
   timer_.clear();
   std::vector<std::size_t> begins = checked_view_begins(views, room_from_patient, pixels);
-  line_integrals_.resize(begins.back() * room_from_patient.size());
+  std::vector<float> line_integrals(begins.back() * room_from_patient.size());
   for (std::size_t p = 0; p < room_from_patient.size(); ++p)
     for (std::size_t v = 0; v < views.size(); ++v) {
-      const auto drr = std::span(line_integrals_).subspan(p * begins.back() + begins[v], begins[v + 1] - begins[v]);
+      const auto drr = std::span(line_integrals).subspan(p * begins.back() + begins[v], begins[v + 1] - begins[v]);
       if (drr.empty()) continue;
       {
         const auto running = timer_.run();
@@ -108,7 +108,7 @@ RenderResult RasterizedRaycaster::render(std::span<const XrayView> views,
       result_.download(drr);
     }
   context_.check("rendering");
-  return RenderResult(line_integrals_, std::move(begins));
+  return RenderResult(std::move(line_integrals), std::move(begins));
 }
 
 void RasterizedRaycaster::draw_faces(const XrayView& view, const Eigen::Isometry3d& room_from_patient, bool front) {

@@ -55,7 +55,6 @@ class RasterizedRaycaster final : public Renderer {
   Eigen::Vector3i size_;
   Eigen::Vector3d block_edge_;  // voxels
   double step_mm_;
-  std::vector<float> line_integrals_;
 };
 
 }  // namespace isoshift

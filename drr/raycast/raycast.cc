@@ -74,17 +74,17 @@ RenderResult RaycastGlRenderer::render(std::span<const XrayView> views,
   timer_.clear();
   std::vector<std::size_t> begins = checked_view_begins(views, room_from_patient, pixels);
   const std::size_t pixels_per_pose = begins.back();
-  line_integrals_.resize(pixels_per_pose * room_from_patient.size());
+  std::vector<float> line_integrals(pixels_per_pose * room_from_patient.size());
   upload_views(views, begins, pixels);
   const std::size_t at_once = poses_at_once(pixels_per_pose);
   for (std::size_t first = 0; first < room_from_patient.size(); first += at_once) {
     const std::size_t count = std::min(at_once, room_from_patient.size() - first);
     dispatch(views, room_from_patient.subspan(first, count), pixels_per_pose, !pixels.of_view.empty());
-    const auto part = std::span(line_integrals_).subspan(first * pixels_per_pose, count * pixels_per_pose);
+    const auto part = std::span(line_integrals).subspan(first * pixels_per_pose, count * pixels_per_pose);
     result_.download(std::as_writable_bytes(part));
   }
   context_.check("rendering");
-  return RenderResult(line_integrals_, std::move(begins));
+  return RenderResult(std::move(line_integrals), std::move(begins));
 }
 
 const Buffer& RaycastGlRenderer::render_on_gpu(std::span<const XrayView> views,

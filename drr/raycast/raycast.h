@@ -45,7 +45,6 @@ class RaycastGlRenderer final : public Renderer {
   Eigen::Affine3d voxel_from_patient_;
   double step_mm_;
   Eigen::Vector3d box_low_, box_high_;
-  std::vector<float> line_integrals_;
 };
 
 }  // namespace isoshift

@@ -115,10 +115,10 @@ RenderResult SplatRenderer::render(std::span<const XrayView> views,
   context_.make_current();
   timer_.clear();
   std::vector<std::size_t> begins = checked_view_begins(views, room_from_patient, pixels);
-  line_integrals_.resize(begins.back() * room_from_patient.size());
+  std::vector<float> line_integrals(begins.back() * room_from_patient.size());
   for (std::size_t p = 0; p < room_from_patient.size(); ++p)
     for (std::size_t v = 0; v < views.size(); ++v) {
-      const auto drr = std::span(line_integrals_).subspan(p * begins.back() + begins[v], begins[v + 1] - begins[v]);
+      const auto drr = std::span(line_integrals).subspan(p * begins.back() + begins[v], begins[v + 1] - begins[v]);
       draw(views[v], room_from_patient[p]);
       if (pixels.of_view.empty()) {
         image_.download(drr);
@@ -130,7 +130,7 @@ RenderResult SplatRenderer::render(std::span<const XrayView> views,
       for (std::size_t n = 0; n < drr.size(); ++n) drr[n] = whole_image_[pixels.of_view[v][n]];
     }
   context_.check("rendering");
-  return RenderResult(line_integrals_, std::move(begins));
+  return RenderResult(std::move(line_integrals), std::move(begins));
 }
 
 void SplatRenderer::draw(const XrayView& view, const Eigen::Isometry3d& room_from_patient) {

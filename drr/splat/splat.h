@@ -51,7 +51,7 @@ class SplatRenderer final : public Renderer {
   SplatOptions options_;
   Eigen::Affine3d patient_from_voxel_, voxel_from_patient_;
   Eigen::Vector3i size_;
-  std::vector<float> line_integrals_, whole_image_;
+  std::vector<float> whole_image_;
 };
 
 }  // namespace isoshift

@@ -1,0 +1,219 @@
+// isoshift evaluate: many registrations from published starts, their errors against a known truth.
+
+#include <fmt/format.h>
+#include <tbb/task_arena.h>
+
+#include <atomic>
+#include <exception>
+#include <memory>
+#include <mutex>
+#include <thread>
+
+#include "cli/commands.h"
+#include "cli/evaluation_files.h"
+#include "cli/search_options.h"
+#include "cli/study_options.h"
+#include "cli/truth.h"
+#include "geometry/couch_shift.h"
+#include "geometry/error.h"
+#include "geometry/rotation.h"
+#include "geometry/target_error.h"
+#include "io/version.h"
+#include "registration/quality.h"
+
+namespace isoshift {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+struct EvaluateOptions {
+  StudyOptions study;
+  RenderingOptions rendering;
+  SearchOptions search;
+  std::string series = "bins";
+  std::optional<int> starts;
+  std::optional<double> distance_mm;
+  std::uint64_t start_seed = 1;
+  int jobs = 0;
+  std::filesystem::path truth, output;
+  std::vector<std::filesystem::path> table;
+};
+
+StartProtocol protocol_of(const EvaluateOptions& options) {
+  StartProtocol protocol = options.series == "paper" ? StartProtocol::paper() : StartProtocol{};
+  protocol.count = options.starts.value_or(protocol.count);
+  protocol.distance_mm = options.distance_mm.value_or(protocol.distance_mm);
+  protocol.seed = options.start_seed;
+  protocol.check();
+  return protocol;
+}
+
+// All that the runs depend on: an evaluation is continued only where it is the same.
+Json configuration_of(const EvaluateOptions& options, const Study& study, const Renderer& renderer,
+                      const Eigen::Isometry3d& truth, const StartProtocol& protocol) {
+  Json images = Json::array(), settings = Json::object(), matrix = Json::array();
+  for (const RtImage& image : study.rt_images) images.push_back(image.sop_instance_uid);
+  for (const auto& [name, value] : options.rendering.settings()) settings[name] = value;
+  for (int row = 0; row < 3; ++row)
+    for (int column = 0; column < 4; ++column) matrix.push_back(truth.matrix()(row, column));
+  std::vector<XrayView> views;
+  for (const XrayImage& xray : study.xrays) views.push_back(xray.view);
+  return {{"program", fmt::format("isoshift {} ({})", kVersion, kCommit)},
+          {"ct_series", study.ct.series_instance_uid},
+          {"images", images},
+          {"truth", matrix},
+          {"renderer", to_string(renderer.kind())},
+          {"renderer_settings", settings},
+          {"attenuation", options.rendering.attenuation},
+          {"threshold_hu", options.rendering.threshold_hu},
+          {"preset", "setup"},
+          {"dof", options.search.dof},
+          {"seed", options.search.seed},
+          {"series", options.series},
+          {"start_seed", protocol.seed},
+          {"starts", protocol.count},
+          {"distance_mm", protocol.distance_mm},
+          {"success_by", unobservable_directions(views).empty() ? "mTRE" : "mRPD"}};
+}
+
+std::string joined(const std::vector<std::string>& reasons) {
+  std::string text;
+  for (const std::string& reason : reasons) text += (text.empty() ? "" : "; ") + reason;
+  return text;
+}
+
+EvaluatedRun evaluated(int number, const StartPose& start, const Eigen::Isometry3d& truth, const Study& study,
+                       const RegistrationResult& result) {
+  const std::vector<Eigen::Vector3d> targets_mm = standard_targets_mm();
+  const Eigen::Isometry3d found =
+      setup_error_from_poses(study.planned_room_from_patient, result.actual_room_from_patient);
+  EvaluatedRun run{.number = number, .start_mtre_mm = start.mtre_mm};
+  run.mtre_mm = mean_target_registration_error_mm(found, truth, targets_mm);
+  for (const XrayImage& xray : study.xrays) {
+    const auto views = static_cast<double>(study.xrays.size());
+    run.mpd_mm += mean_projection_distance_mm(found, truth, targets_mm, xray.view) / views;
+    run.mrpd_mm += mean_reprojection_distance_mm(found, truth, targets_mm, xray.view) / views;
+  }
+  run.rotation_share = rotation_share(found, truth, targets_mm);
+  const Eigen::Isometry3d error = found * truth.inverse();
+  const Eigen::AngleAxisd turn(error.linear());
+  for (int axis = 0; axis < 3; ++axis) {
+    run.error[axis] = error.translation()[axis];
+    run.error[axis + 3] = deg_from_rad(turn.angle()) * turn.axis()[axis];
+  }
+  run.verdict = result.verdict;
+  run.reasons = joined(result.reasons);
+  run.evaluations = result.evaluations();
+  run.seconds = result.seconds;
+  run.seconds_rendering = result.seconds_rendering;
+  run.seconds_similarity = result.seconds_similarity;
+  return run;
+}
+
+// Runs what is missing, several at a time, each on one thread; alone, one uses all. What it finds does not depend on
+// that.
+void run_missing(EvaluationFolder& folder, const EvaluateOptions& options, const Study& study, Renderer& renderer,
+                 const Eigen::Isometry3d& truth, const std::vector<StartPose>& starts, int jobs, ProgressBar& bar) {
+  std::vector<int> missing;
+  for (int number = 0; number < static_cast<int>(starts.size()); ++number)
+    if (!folder.has(number)) missing.push_back(number);
+  std::atomic<std::size_t> next = 0;
+  std::mutex mutex;
+  std::exception_ptr failure;
+  const auto work = [&] {
+    for (std::size_t n = next++; n < missing.size(); n = next++) try {
+        const int number = missing[n];
+        const Eigen::Isometry3d start = starts[number].setup_error * study.planned_room_from_patient;
+        const RegistrationResult result = register_views(renderer, study.xrays, start, options.search.registration());
+        const std::lock_guard lock(mutex);
+        folder.append(evaluated(number, starts[number], truth, study, result));
+        bar.update(folder.runs().size(), starts.size());
+      } catch (...) {
+        const std::lock_guard lock(mutex);
+        failure = std::current_exception();
+        next = missing.size();
+      }
+  };
+  if (jobs == 1) {
+    work();
+  } else {
+    std::vector<std::jthread> threads;
+    for (int job = 0; job < jobs; ++job) threads.emplace_back([&] { tbb::task_arena(1).execute(work); });
+  }
+  if (failure) std::rethrow_exception(failure);
+}
+
+int print_table(const EvaluateOptions& options, Console& console) {
+  std::vector<std::pair<std::string, EvaluationSummary>> rows;
+  for (const std::filesystem::path& path : options.table) {
+    const EvaluationFolder folder(path);
+    rows.emplace_back(path.filename().empty() ? path.parent_path().filename().string() : path.filename().string(),
+                      summarized(folder.runs(), folder.judged_by_mrpd()));
+  }
+  console.out << evaluation_table(rows);
+  return kExitAccepted;
+}
+
+int run_evaluate(const EvaluateOptions& options, Console& console) {
+  if (!options.table.empty()) return print_table(options, console);
+  if (options.truth.empty() || options.output.empty())
+    throw UsageError("an evaluation needs --truth and -o (or --table to look at earlier ones)");
+  const StartProtocol protocol = protocol_of(options);
+  const RendererKind kind = options.rendering.kind();
+  if (uses_gl(kind) && options.jobs > 1)
+    throw UsageError(
+        fmt::format("--jobs {}: {} renders for one registration at a time", options.jobs, to_string(kind)));
+  const int cores = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+  const int jobs = uses_gl(kind) ? 1 : options.jobs > 0 ? options.jobs : cores;
+  const Eigen::Isometry3d truth = read_setup_error(options.truth);
+
+  Notes notes;
+  const auto [study, renderer] = load(options.study, options.rendering, notes, console);
+  EvaluationFolder folder(options.output, configuration_of(options, study, *renderer, truth, protocol));
+  {
+    ProgressBar bar(console, "Evaluating");
+    run_missing(folder, options, study, *renderer, truth, start_poses(truth, protocol), jobs, bar);
+  }
+  folder.write_summary();
+  for (const std::string& warning : notes.warnings) console.err << "warning: " << warning << "\n";
+  console.out << evaluation_table(
+      {{options.output.filename().string(), summarized(folder.runs(), folder.judged_by_mrpd())}});
+  return kExitAccepted;
+}
+
+}  // namespace
+
+void add_evaluate_command(CLI::App& app, Console& console, int& exit_status) {
+  auto options = std::make_shared<EvaluateOptions>();
+  CLI::App* command = app.add_subcommand("evaluate", "Measure how good registration is, from many starts");
+  command->footer(
+      "\nExample:\n  isoshift evaluate exported/ --truth exported/truth.json -o evaluation\n"
+      "  isoshift evaluate --table evaluation other_evaluation\n\n"
+      "Writes runs.csv, summary.json, success.svg and errors.svg. Started again on the same folder, it goes on where "
+      "it "
+      "was\nstopped. The protocol is that of van de Kraats et al. (2005): docs/evaluation.md.");
+  add_study_options(*command, options->study);
+  command->add_option("--truth", options->truth, "truth.json of the study: the true setup error")->type_name("FILE");
+  command->add_option("-o,--output", options->output, "Folder for the results")->type_name("FOLDER");
+  command
+      ->add_option("--series", options->series,
+                   "bins: 200 starts spread over 0 to 20 mm of mTRE; paper: 150 starts 25 mm away")
+      ->check(CLI::IsMember({"bins", "paper"}))
+      ->capture_default_str();
+  command->add_option("--starts", options->starts, "How many starts")->type_name("N");
+  command->add_option("--distance", options->distance_mm, "bins: the largest mTRE at the start; paper: the translation")
+      ->type_name("MM");
+  command->add_option("--start-seed", options->start_seed, "Draws the starts")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
+  command
+      ->add_option("--jobs", options->jobs,
+                   "Registrations at a time, each on one thread; 1: one on all cores, for its time (default: cores)")
+      ->check(CLI::PositiveNumber);
+  command->add_option("--table", options->table, "Print a table of evaluations made earlier")->type_name("FOLDER...");
+  add_search_options(*command, options->search);
+  add_rendering_options(*command, options->rendering);
+  command->callback([options, &console, &exit_status] { exit_status = run_evaluate(*options, console); });
+}
+
+}  // namespace isoshift

@@ -1,0 +1,200 @@
+#include "registration/evaluate.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <random>
+
+#include "geometry/error.h"
+#include "geometry/rotation.h"
+#include "geometry/target_error.h"
+
+namespace isoshift {
+namespace {
+
+using Eigen::Isometry3d;
+using Eigen::Vector3d;
+
+using Random = std::mt19937_64;
+
+double uniform(double low, double high, Random& random) {
+  return std::uniform_real_distribution<double>(low, high)(random);
+}
+
+Vector3d random_direction(Random& random) {
+  std::normal_distribution<double> gaussian;
+  for (;;) {
+    const Vector3d direction(gaussian(random), gaussian(random), gaussian(random));
+    if (direction.norm() > 1e-6) return direction.normalized();
+  }
+}
+
+// The pose with this rotation whose translation along `direction` brings the mTRE to what is wanted; nothing where the
+// rotation alone exceeds that. From there on the mTRE grows, so that halving finds the length.
+std::optional<Isometry3d> at_distance(const Isometry3d& truth, const Eigen::AngleAxisd& rotation,
+                                      const Vector3d& direction, double wanted_mm,
+                                      std::span<const Vector3d> targets_mm) {
+  const auto pose = [&](double length_mm) {
+    Isometry3d moved = rotation * truth;
+    moved.translation() = truth.translation() + length_mm * direction;
+    return moved;
+  };
+  const auto is_short = [&](double length_mm) {
+    return mean_target_registration_error_mm(pose(length_mm), truth, targets_mm) < wanted_mm;
+  };
+  if (!is_short(0.0)) return std::nullopt;
+  double low = 0.0, high = 1.0;
+  while (is_short(high)) high *= 2.0;
+  for (int halvings = 0; halvings < 60; ++halvings) {
+    const double middle = 0.5 * (low + high);
+    (is_short(middle) ? low : high) = middle;
+  }
+  return pose(low);
+}
+
+Isometry3d start_in_bin(const Isometry3d& truth, const StartProtocol& protocol, int number,
+                        std::span<const Vector3d> targets_mm, Random& random) {
+  const int bins = std::max(1, static_cast<int>(std::floor(protocol.distance_mm)));
+  const double width_mm = protocol.distance_mm / bins;
+  for (;;) {
+    const double wanted_mm = (number % bins + uniform(0.0, 1.0, random)) * width_mm;
+    const Eigen::AngleAxisd rotation(uniform(-protocol.max_rotation_rad, protocol.max_rotation_rad, random),
+                                     random_direction(random));
+    if (const auto pose = at_distance(truth, rotation, random_direction(random), wanted_mm, targets_mm)) return *pose;
+  }
+}
+
+Isometry3d start_of_paper(const Isometry3d& truth, const StartProtocol& protocol, Random& random) {
+  const auto angle_rad = [&] { return uniform(-protocol.max_rotation_rad, protocol.max_rotation_rad, random); };
+  const ZxyAngles angles{.z_rad = angle_rad(), .x_rad = angle_rad(), .y_rad = angle_rad()};
+  Isometry3d pose;
+  pose.linear() = rotation_from_zxy(angles) * truth.linear();
+  pose.translation() = truth.translation() + protocol.distance_mm * random_direction(random);
+  return pose;
+}
+
+bool is_success(const EvaluatedRun& run, bool by_mrpd) { return (by_mrpd ? run.mrpd_mm : run.mtre_mm) < kSuccessMm; }
+
+double mean_of(std::span<const double> values) {
+  double sum = 0.0;
+  for (const double value : values) sum += value;
+  return values.empty() ? 0.0 : sum / static_cast<double>(values.size());
+}
+
+double median_of(std::vector<double> values) {
+  if (values.empty()) return 0.0;
+  std::ranges::sort(values);
+  const std::size_t half = values.size() / 2;
+  return values.size() % 2 == 1 ? values[half] : 0.5 * (values[half - 1] + values[half]);
+}
+
+template <class Value>
+std::vector<double> values_of(std::span<const EvaluatedRun> runs, Value EvaluatedRun::*field) {
+  std::vector<double> values;
+  for (const EvaluatedRun& run : runs) values.push_back(static_cast<double>(run.*field));
+  return values;
+}
+
+std::optional<std::array<double, 6>> share_within(std::span<const EvaluatedRun> runs, double sigmas) {
+  std::array<double, 6> share = {};
+  double counted = 0.0;
+  for (const EvaluatedRun& run : runs) {
+    if (!run.sigma) continue;
+    counted += 1.0;
+    for (std::size_t axis = 0; axis < share.size(); ++axis)
+      share[axis] += std::abs(run.error[axis]) <= sigmas * (*run.sigma)[axis] ? 1.0 : 0.0;
+  }
+  if (counted == 0.0) return std::nullopt;
+  for (double& of_axis : share) of_axis /= counted;
+  return share;
+}
+
+}  // namespace
+
+StartProtocol StartProtocol::paper() {
+  return {.series = Series::kPaper, .distance_mm = 25.0, .max_rotation_rad = rad_from_deg(5.0), .count = 150};
+}
+
+void StartProtocol::check() const {
+  if (!(distance_mm > 0.0 && distance_mm <= 200.0))
+    throw UsageError(fmt::format("start distance of {} mm: expected more than 0, at most 200", distance_mm));
+  if (!(max_rotation_rad >= 0.0 && max_rotation_rad <= rad_from_deg(90.0)))
+    throw UsageError(fmt::format("start rotation of {} degrees: expected 0 to 90", deg_from_rad(max_rotation_rad)));
+  if (count < 1) throw UsageError(fmt::format("{} starts: expected at least 1", count));
+}
+
+std::vector<StartPose> start_poses(const Isometry3d& truth, const StartProtocol& protocol) {
+  protocol.check();
+  const std::vector<Vector3d> targets_mm = standard_targets_mm();
+  std::vector<StartPose> starts;
+  for (int number = 0; number < protocol.count; ++number) {
+    std::seed_seq seed = {static_cast<std::uint32_t>(protocol.seed), static_cast<std::uint32_t>(protocol.seed >> 32),
+                          static_cast<std::uint32_t>(number)};
+    Random random(seed);
+    const Isometry3d pose = protocol.series == StartProtocol::Series::kPaper
+                                ? start_of_paper(truth, protocol, random)
+                                : start_in_bin(truth, protocol, number, targets_mm, random);
+    starts.push_back({.setup_error = pose, .mtre_mm = mean_target_registration_error_mm(pose, truth, targets_mm)});
+  }
+  return starts;
+}
+
+std::vector<SuccessBin> success_bins(std::span<const EvaluatedRun> runs, bool by_mrpd) {
+  std::map<int, SuccessBin> bins;
+  for (const EvaluatedRun& run : runs) {
+    const int start_mm = static_cast<int>(run.start_mtre_mm);
+    SuccessBin& bin = bins.try_emplace(start_mm, SuccessBin{.start_mm = start_mm}).first->second;
+    ++bin.runs;
+    bin.successes += is_success(run, by_mrpd) ? 1 : 0;
+  }
+  std::vector<SuccessBin> list;
+  for (const auto& [start_mm, bin] : bins) list.push_back(bin);
+  return list;
+}
+
+EvaluationSummary summarized(std::span<const EvaluatedRun> runs, bool by_mrpd) {
+  EvaluationSummary summary;
+  std::vector<EvaluatedRun> found;
+  std::vector<double> failed_rotation_share;
+  for (const EvaluatedRun& run : runs) {
+    if (is_success(run, by_mrpd))
+      found.push_back(run);
+    else
+      failed_rotation_share.push_back(run.rotation_share);
+    const bool accepted = run.verdict == Verdict::kAccepted;
+    if (run.mtre_mm < 1.0) {
+      ++summary.within_1_mm;
+      summary.within_1_mm_accepted += accepted ? 1 : 0;
+    } else if (run.mtre_mm > 2.0) {
+      ++summary.beyond_2_mm;
+      summary.beyond_2_mm_accepted += accepted ? 1 : 0;
+    }
+  }
+  summary.runs = static_cast<int>(runs.size());
+  summary.successes = static_cast<int>(found.size());
+  const std::vector<double> mtre_mm = values_of(std::span<const EvaluatedRun>(found), &EvaluatedRun::mtre_mm);
+  summary.mean_mm = mean_of(mtre_mm);
+  summary.median_mm = median_of(mtre_mm);
+  for (const double mm : mtre_mm) summary.sd_mm += std::pow(mm - summary.mean_mm, 2);
+  summary.sd_mm = mtre_mm.size() > 1 ? std::sqrt(summary.sd_mm / static_cast<double>(mtre_mm.size() - 1)) : 0.0;
+  summary.mean_mpd_mm = mean_of(values_of(std::span<const EvaluatedRun>(found), &EvaluatedRun::mpd_mm));
+  summary.mean_mrpd_mm = mean_of(values_of(std::span<const EvaluatedRun>(found), &EvaluatedRun::mrpd_mm));
+  for (const SuccessBin& bin : success_bins(runs, by_mrpd)) {
+    if (bin.successes < 0.95 * bin.runs) break;
+    summary.capture_range_mm = bin.start_mm + 1;
+  }
+  summary.rotation_share_of_failures = mean_of(failed_rotation_share);
+  summary.median_seconds = median_of(values_of(runs, &EvaluatedRun::seconds));
+  summary.mean_evaluations = mean_of(values_of(runs, &EvaluatedRun::evaluations));
+  if (const double seconds = mean_of(values_of(runs, &EvaluatedRun::seconds)); seconds > 0.0) {
+    summary.rendering_share = mean_of(values_of(runs, &EvaluatedRun::seconds_rendering)) / seconds;
+    summary.similarity_share = mean_of(values_of(runs, &EvaluatedRun::seconds_similarity)) / seconds;
+  }
+  summary.within_one_sigma = share_within(runs, 1.0);
+  summary.within_two_sigma = share_within(runs, 2.0);
+  return summary;
+}
+
+}  // namespace isoshift

@@ -1,0 +1,92 @@
+#pragma once
+// How good a registration is, by the protocol of van de Kraats et al. (IEEE TMI 24, 2005): starts at known distances
+// from the truth, errors at target points, success, capture range (docs/evaluation.md).
+
+#include <Eigen/Geometry>
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "geometry/verdict.h"
+#include "geometry/xray_view.h"
+
+namespace isoshift {
+
+// Where the searches begin.
+struct StartProtocol {
+  enum class Series {
+    kBins,   // start mTRE spread evenly over bins of 1 mm: rotation axis uniform, angle uniform within the limit,
+             // translation direction uniform and as long as the bin needs; drawn again where the rotation alone exceeds
+             // it
+    kPaper,  // Spoerk et al. 2012: translations of one length, three rotations uniform within the limit
+  };
+
+  Series series = Series::kBins;
+  double distance_mm = 20.0;  // kBins: the largest start mTRE; kPaper: the length of the translation
+  double max_rotation_rad = 0.1745329251994330;
+  int count = 200;
+  std::uint64_t seed = 1;
+
+  // The founding paper's: 25 mm, 5 degrees, 150 starts.
+  static StartProtocol paper();
+
+  // Throws UsageError naming the field and its value.
+  void check() const;
+};
+
+struct StartPose {
+  Eigen::Isometry3d setup_error = Eigen::Isometry3d::Identity();
+  double mtre_mm = 0.0;
+};
+
+// The same for the same seed. Every start is drawn from a generator of its own, so that fewer are the first of more.
+std::vector<StartPose> start_poses(const Eigen::Isometry3d& truth, const StartProtocol& protocol);
+
+// One registration of an evaluation. Errors are found * truth^-1: translation at the isocenter and rotation vector.
+struct EvaluatedRun {
+  int number = 0;
+  double start_mtre_mm = 0.0;
+  double mtre_mm = 0.0;
+  double mpd_mm = 0.0, mrpd_mm = 0.0;  // means over the views
+  double rotation_share = 0.0;
+  std::array<double, 6> error = {};            // x, y, z in mm, about x, y, z in degrees
+  std::optional<std::array<double, 6>> sigma;  // what the registration gave as its uncertainty, the same units
+  Verdict verdict = Verdict::kRejected;
+  std::string reasons;  // why it is not accepted
+  int evaluations = 0;
+  double seconds = 0.0, seconds_rendering = 0.0, seconds_similarity = 0.0;
+};
+
+// A registration counts as successful below this mTRE (mRPD where one view cannot tell depth).
+inline constexpr double kSuccessMm = 2.0;
+
+struct EvaluationSummary {
+  int runs = 0, successes = 0;
+  double mean_mm = 0.0, sd_mm = 0.0, median_mm = 0.0;  // mTRE of the successes
+  double mean_mpd_mm = 0.0, mean_mrpd_mm = 0.0;        // of the successes
+  // The last bin of 1 mm of start mTRE before success falls below 95 %: its upper end.
+  int capture_range_mm = 0;
+  double rotation_share_of_failures = 0.0;  // mean
+  double median_seconds = 0.0, mean_evaluations = 0.0;
+  double rendering_share = 0.0, similarity_share = 0.0;  // of all time
+  int within_1_mm = 0, within_1_mm_accepted = 0;         // runs that ended there, and those of them accepted
+  int beyond_2_mm = 0, beyond_2_mm_accepted = 0;
+  // Share of runs whose true error lies within one and two sigma, per axis; nothing without sigmas.
+  std::optional<std::array<double, 6>> within_one_sigma, within_two_sigma;
+
+  double success_share() const { return runs > 0 ? static_cast<double>(successes) / runs : 0.0; }
+};
+// `by_mrpd`: success is judged by mRPD, for a single view.
+EvaluationSummary summarized(std::span<const EvaluatedRun> runs, bool by_mrpd);
+
+// Success per bin of 1 mm of start mTRE, of the bins that have runs.
+struct SuccessBin {
+  int start_mm = 0;  // its lower end
+  int runs = 0, successes = 0;
+};
+std::vector<SuccessBin> success_bins(std::span<const EvaluatedRun> runs, bool by_mrpd);
+
+}  // namespace isoshift
