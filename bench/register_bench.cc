@@ -3,13 +3,13 @@
 #include <benchmark/benchmark.h>
 
 #include "bench/scene.h"
-#include "registration/register_views.h"
+#include "registration/presets.h"
 
 namespace isoshift {
 namespace {
 
 void register_two_views(benchmark::State& state) {
-  const auto renderer = make_renderer(RendererKind::kCpu, bench_ct(), {}, std::array{Beam::kKilovoltage});
+  const RendererPyramid renderers(RendererKind::kCpu, bench_ct(), {}, std::array{Beam::kKilovoltage});
   Placement placement;
   placement.translation_mm = Eigen::Vector3d(6, -6, 5);
   placement.rotation_deg = Eigen::Vector3d(2, -1.5, 1.5);
@@ -25,7 +25,7 @@ void register_two_views(benchmark::State& state) {
   planned.linear() << 1, 0, 0, 0, 0, 1, 0, -1, 0;
   double evaluations = 0.0;
   for (auto _ : state) {
-    const RegistrationResult result = register_views(*renderer, xrays, planned, {});
+    const RegistrationResult result = register_views(renderers, xrays, planned, preset("setup"));
     evaluations = result.evaluations();
     benchmark::DoNotOptimize(result);
   }

@@ -4,6 +4,7 @@
 #include <memory>
 
 #include "cli/commands.h"
+#include "cli/rendering_options.h"
 #include "cli/study_options.h"
 #include "cli/truth.h"
 #include "geometry/error.h"
@@ -27,7 +28,10 @@ void run_drr(const DrrOptions& options, Console& console) {
   const Eigen::Isometry3d setup_error =
       options.setup_error.empty() ? Eigen::Isometry3d::Identity() : read_setup_error(options.setup_error);
   Notes notes;
-  const auto [study, renderer] = load(options.study, options.rendering, notes, console);
+  options.rendering.check();
+  const Study study = load(options.study, notes, console);
+  const auto renderer = make_renderer(options.rendering.kind(), study.ct.hu, options.rendering.model(), beams_of(study),
+                                      options.rendering.options());
   const std::array pose = {setup_error * study.planned_room_from_patient};
   for (const std::string& warning : notes.warnings) console.err << "warning: " << warning << "\n";
 

@@ -11,7 +11,8 @@
 
 #include "cli/commands.h"
 #include "cli/evaluation_files.h"
-#include "cli/search_options.h"
+#include "cli/rendering_options.h"
+#include "cli/search_switches.h"
 #include "cli/study_options.h"
 #include "cli/truth.h"
 #include "geometry/couch_shift.h"
@@ -19,7 +20,7 @@
 #include "geometry/rotation.h"
 #include "geometry/target_error.h"
 #include "io/version.h"
-#include "registration/quality.h"
+#include "registration/quality/judge.h"
 
 namespace isoshift {
 namespace {
@@ -29,7 +30,7 @@ using Json = nlohmann::ordered_json;
 struct EvaluateOptions {
   StudyOptions study;
   RenderingOptions rendering;
-  SearchOptions search;
+  SearchSwitches search;
   std::string series = "bins";
   std::optional<int> starts;
   std::optional<double> distance_mm;
@@ -66,7 +67,7 @@ Json configuration_of(const EvaluateOptions& options, const Study& study, const 
           {"renderer_settings", settings},
           {"attenuation", options.rendering.attenuation},
           {"threshold_hu", options.rendering.threshold_hu},
-          {"preset", "setup"},
+          {"preset", options.search.preset},
           {"dof", options.search.dof},
           {"seed", options.search.seed},
           {"series", options.series},
@@ -101,6 +102,14 @@ EvaluatedRun evaluated(int number, const StartPose& start, const Eigen::Isometry
     run.error[axis] = error.translation()[axis];
     run.error[axis + 3] = deg_from_rad(turn.angle()) * turn.axis()[axis];
   }
+  if (result.uncertainty) {
+    run.sigma.emplace();
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const auto n = static_cast<Eigen::Index>(axis);
+      (*run.sigma)[axis] = result.uncertainty->translation_mm[n];
+      (*run.sigma)[axis + 3] = deg_from_rad(result.uncertainty->rotation_rad[n]);
+    }
+  }
   run.verdict = result.verdict;
   run.reasons = joined(result.reasons);
   run.evaluations = result.evaluations();
@@ -112,8 +121,9 @@ EvaluatedRun evaluated(int number, const StartPose& start, const Eigen::Isometry
 
 // Runs what is missing, several at a time, each on one thread; alone, one uses all. What it finds does not depend on
 // that.
-void run_missing(EvaluationFolder& folder, const EvaluateOptions& options, const Study& study, Renderer& renderer,
-                 const Eigen::Isometry3d& truth, const std::vector<StartPose>& starts, int jobs, ProgressBar& bar) {
+void run_missing(EvaluationFolder& folder, const EvaluateOptions& options, const Study& study,
+                 const RendererPyramid& renderers, const Eigen::Isometry3d& truth, const std::vector<StartPose>& starts,
+                 int jobs, ProgressBar& bar) {
   std::vector<int> missing;
   for (int number = 0; number < static_cast<int>(starts.size()); ++number)
     if (!folder.has(number)) missing.push_back(number);
@@ -124,7 +134,7 @@ void run_missing(EvaluationFolder& folder, const EvaluateOptions& options, const
     for (std::size_t n = next++; n < missing.size(); n = next++) try {
         const int number = missing[n];
         const Eigen::Isometry3d start = starts[number].setup_error * study.planned_room_from_patient;
-        const RegistrationResult result = register_views(renderer, study.xrays, start, options.search.registration());
+        const RegistrationResult result = register_views(renderers, study.xrays, start, options.search.registration());
         const std::lock_guard lock(mutex);
         folder.append(evaluated(number, starts[number], truth, study, result));
         bar.update(folder.runs().size(), starts.size());
@@ -168,11 +178,14 @@ int run_evaluate(const EvaluateOptions& options, Console& console) {
   const Eigen::Isometry3d truth = read_setup_error(options.truth);
 
   Notes notes;
-  const auto [study, renderer] = load(options.study, options.rendering, notes, console);
-  EvaluationFolder folder(options.output, configuration_of(options, study, *renderer, truth, protocol));
+  options.rendering.check();
+  const Study study = load(options.study, notes, console);
+  const RendererPyramid renderers(options.rendering.kind(), study.ct.hu, options.rendering.model(), beams_of(study),
+                                  options.rendering.options());
+  EvaluationFolder folder(options.output, configuration_of(options, study, renderers.finest(), truth, protocol));
   {
     ProgressBar bar(console, "Evaluating");
-    run_missing(folder, options, study, *renderer, truth, start_poses(truth, protocol), jobs, bar);
+    run_missing(folder, options, study, renderers, truth, start_poses(truth, protocol), jobs, bar);
   }
   folder.write_summary();
   for (const std::string& warning : notes.warnings) console.err << "warning: " << warning << "\n";
@@ -211,7 +224,7 @@ void add_evaluate_command(CLI::App& app, Console& console, int& exit_status) {
                    "Registrations at a time, each on one thread; 1: one on all cores, for its time (default: cores)")
       ->check(CLI::PositiveNumber);
   command->add_option("--table", options->table, "Print a table of evaluations made earlier")->type_name("FOLDER...");
-  add_search_options(*command, options->search);
+  add_search_switches(*command, options->search);
   add_rendering_options(*command, options->rendering);
   command->callback([options, &console, &exit_status] { exit_status = run_evaluate(*options, console); });
 }

@@ -9,6 +9,7 @@
 #include "cli/commands.h"
 #include "cli/truth.h"
 #include "geometry/error.h"
+#include "geometry/rotation.h"
 #include "io/output_folder.h"
 #include "io/report/pictures.h"
 #include "io/report/setup_report.h"
@@ -37,6 +38,31 @@ int exit_status_of(Verdict verdict) {
   return kExitFailed;
 }
 
+SetupReport::Stage stage_in_report(const Stage& stage, const StageReport& done) {
+  SetupReport::Stage shown{.name = done.name,
+                           .similarity = done.similarity,
+                           .optimizer = std::string(to_string(stage.optimizer)),
+                           .parameters = {{"pixel_mm", stage.pixel_mm},
+                                          {"voxel_mm", stage.voxel_mm},
+                                          {"pixel_fraction", stage.pixel_fraction},
+                                          {"min_pixels", stage.min_pixels},
+                                          {"candidates", stage.candidates},
+                                          {"starts", stage.starts},
+                                          {"reach_mm", stage.reach_mm},
+                                          {"reach_deg", deg_from_rad(stage.reach_rad)},
+                                          {"initial_step_mm", stage.initial_step_mm},
+                                          {"initial_step_deg", deg_from_rad(stage.initial_step_rad)},
+                                          {"relative_tolerance", stage.relative_tolerance},
+                                          {"max_evaluations", stage.max_evaluations}},
+                           .evaluations = done.evaluations,
+                           .seconds = done.seconds,
+                           .value = done.value,
+                           .termination = done.termination,
+                           .spread_mm = done.spread_mm};
+  if (done.spread_rad) shown.spread_deg = deg_from_rad(*done.spread_rad);
+  return shown;
+}
+
 SetupReport make_report(const RegisterOptions& options, const Study& study, const Renderer& renderer,
                         const RegistrationResult& result) {
   SetupReport report;
@@ -56,13 +82,21 @@ SetupReport make_report(const RegisterOptions& options, const Study& study, cons
                             .sop_instance_uid = study.rt_images[n].sop_instance_uid,
                             .gantry_deg = study.rt_images[n].gantry_angle_deg.value(),
                             .similarity_start = result.views[n].similarity_start,
-                            .similarity_final = result.views[n].similarity_final});
-  for (const StageReport& stage : result.stages)
-    report.stages.push_back({.name = stage.name,
-                             .similarity = stage.similarity,
-                             .evaluations = stage.evaluations,
-                             .seconds = stage.seconds,
-                             .termination = stage.termination});
+                            .similarity_final = result.views[n].similarity_final,
+                            .parts_with_signal = result.views[n].consistency.with_signal(),
+                            .parts_disagreeing = result.views[n].consistency.disagreeing()});
+  const RegistrationOptions registration = options.search.registration();
+  for (std::size_t n = 0; n < result.stages.size(); ++n)
+    report.stages.push_back(stage_in_report(registration.stages[n], result.stages[n]));
+  if (result.uncertainty)
+    report.sigma = {.translation_mm = result.uncertainty->translation_mm,
+                    .rotation_deg = result.uncertainty->rotation_rad.unaryExpr(&deg_from_rad)};
+  if (result.alternatives) {
+    report.similarity_as_is = result.alternatives->similarity;
+    for (const Alternative& alternative : result.alternatives->alternatives)
+      report.alternatives.push_back({.description = alternative.description, .similarity = alternative.similarity});
+  }
+  report.preset = options.search.preset;
   report.seed = options.search.seed;
   report.attenuation = options.rendering.attenuation;
   const AttenuationModel model = options.rendering.model();
@@ -72,6 +106,8 @@ SetupReport make_report(const RegisterOptions& options, const Study& study, cons
   report.device = renderer.device();
   report.renderer_settings = options.rendering.settings();
   report.seconds_register = result.seconds;
+  report.seconds_rendering = result.seconds_rendering;
+  report.seconds_similarity = result.seconds_similarity;
   report.ct_series_uid = study.ct.series_instance_uid;
   report.plan_uid = study.plan ? study.plan->sop_instance_uid : "";
   return report;
@@ -117,24 +153,26 @@ int run_register(const RegisterOptions& options, Console& console) {
   if (!options.truth.empty()) truth = read_setup_error(options.truth);
 
   Notes notes;
-  const auto [study, renderer] = load(options.study, options.rendering, notes, console);
+  options.rendering.check();
+  const Study study = load(options.study, notes, console);
+  const RendererPyramid renderers(options.rendering.kind(), study.ct.hu, options.rendering.model(), beams_of(study),
+                                  options.rendering.options());
   const double seconds_load = total.seconds();
   RegistrationResult result;
   {
     ProgressBar bar(console, "Registering");
-    result = register_views(*renderer, study.xrays, study.planned_room_from_patient, options.search.registration(),
+    result = register_views(renderers, study.xrays, study.planned_room_from_patient, options.search.registration(),
                             [&](double share) { bar.update(share); });
   }
 
-  SetupReport report = make_report(options, study, *renderer, result);
+  SetupReport report = make_report(options, study, renderers.finest(), result);
   if (may_write_registration(options, result))
     report.spatial_registration_uid = write_spatial_registration(
         study, result.actual_room_from_patient, label_of(result.verdict), output.path() / kRegistrationFile, notes);
-  write_pictures(study, *renderer, result.actual_room_from_patient, output.path());
+  write_pictures(study, renderers.finest(), result.actual_room_from_patient, output.path());
   report.overrides = notes.overrides;
   report.left_aside = notes.left_aside;
   report.warnings = notes.warnings;
-  report.warnings.insert(report.warnings.end(), result.warnings.begin(), result.warnings.end());
   report.seconds_load = seconds_load;
   report.seconds_total = total.seconds();
   const std::string json = json_report(report);
@@ -168,7 +206,7 @@ void add_register_command(CLI::App& app, Console& console, int& exit_status) {
                     "Write the registration object for a result that needs review, too, marked as not accepted");
   command->add_flag("--overwrite", options->overwrite, "Replace an earlier output in that folder");
   command->add_flag("--json", options->json, "Print result.json instead of the report");
-  add_search_options(*command, options->search);
+  add_search_switches(*command, options->search);
   add_rendering_options(*command, options->rendering);
   command->callback([options, &console, &exit_status] { exit_status = run_register(*options, console); });
 }

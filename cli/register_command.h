@@ -6,7 +6,8 @@
 #include <string>
 
 #include "cli/console.h"
-#include "cli/search_options.h"
+#include "cli/rendering_options.h"
+#include "cli/search_switches.h"
 #include "cli/study_options.h"
 
 namespace isoshift {
@@ -14,7 +15,7 @@ namespace isoshift {
 struct RegisterOptions {
   StudyOptions study;
   RenderingOptions rendering;
-  SearchOptions search;
+  SearchSwitches search;
   std::filesystem::path output;
   std::filesystem::path truth;  // empty: unknown
   bool overwrite = false;

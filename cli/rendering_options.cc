@@ -65,6 +65,11 @@ RendererOptions RenderingOptions::options() const {
   return result;
 }
 
+void RenderingOptions::check() const {
+  model().check();
+  options().check(kind());
+}
+
 std::vector<std::pair<std::string, std::string>> RenderingOptions::settings() const {
   const RendererKind chosen = kind();
   const RendererOptions used = options();

@@ -23,9 +23,11 @@ struct RenderingOptions {
   std::optional<int> block_edge;
 
   RendererKind kind() const;  // "auto" settled: raycast on a hardware GPU, else cpu
-  // Both throw UsageError for a flag that means nothing to what was chosen.
+  // The following throw UsageError for a flag that means nothing to what was chosen.
   AttenuationModel model() const;
   RendererOptions options() const;
+  void check() const;
+
   // What options() came to, by name, for the result.
   std::vector<std::pair<std::string, std::string>> settings() const;
 };

@@ -122,22 +122,19 @@ void add_study_options(CLI::App& command, StudyOptions& options) {
   command.add_option("--allow", options.allow, allow_keys_help())->type_name("KEY=REASON")->group(lacking);
 }
 
-LoadedStudy load(const StudyOptions& study_options, const RenderingOptions& rendering, Notes& notes, Console& console) {
-  const StudyRequest request = study_options.request();
-  const RendererKind kind = rendering.kind();
-  const AttenuationModel model = rendering.model();
-  const RendererOptions options = rendering.options();
-  LoadedStudy loaded;
-  {
-    ProgressBar bar(console, "Reading CT");
-    loaded.study = load_study(request, notes, [&](std::size_t done, std::size_t total) { bar.update(done, total); });
-  }
+Study load(const StudyOptions& options, Notes& notes, Console& console) {
+  const StudyRequest request = options.request();
+  ProgressBar bar(console, "Reading CT");
+  Study study = load_study(request, notes, [&](std::size_t done, std::size_t total) { bar.update(done, total); });
   for (const std::string& file : notes.left_aside) console.err << "left aside: " << file << "\n";
+  return study;
+}
+
+std::vector<Beam> beams_of(const Study& study) {
   std::vector<Beam> beams;
-  for (const XrayImage& xray : loaded.study.xrays)
+  for (const XrayImage& xray : study.xrays)
     if (std::ranges::find(beams, xray.view.beam) == beams.end()) beams.push_back(xray.view.beam);
-  loaded.renderer = make_renderer(kind, loaded.study.ct.hu, model, beams, options);
-  return loaded;
+  return beams;
 }
 
 }  // namespace isoshift

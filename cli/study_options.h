@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "cli/console.h"
-#include "cli/rendering_options.h"
 #include "io/study.h"
 
 namespace isoshift {
@@ -30,11 +29,10 @@ struct StudyOptions {
 };
 void add_study_options(CLI::App& command, StudyOptions& options);
 
-// Loads the study behind a progress bar and makes its renderer.
-struct LoadedStudy {
-  Study study;
-  std::unique_ptr<Renderer> renderer;
-};
-LoadedStudy load(const StudyOptions& study, const RenderingOptions& rendering, Notes& notes, Console& console);
+// Loads the study behind a progress bar.
+Study load(const StudyOptions& options, Notes& notes, Console& console);
+
+// The beam qualities of its X-rays.
+std::vector<Beam> beams_of(const Study& study);
 
 }  // namespace isoshift

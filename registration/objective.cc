@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <map>
 #include <numeric>
 #include <random>
 
@@ -26,6 +27,35 @@ std::vector<std::uint32_t> comparable_pixels(const Image<std::uint8_t>& field, S
   return pixels;
 }
 
+// A share of the pixels, drawn once. Gradients need their neighbors rendered, too: they are drawn in square patches,
+// which share them.
+constexpr std::uint32_t kPatchEdge = 8;
+
+std::vector<std::uint32_t> drawn_pixels(const std::vector<std::uint32_t>& pixels, int columns,
+                                        const ObjectiveOptions& options, std::mt19937_64& random) {
+  const auto wanted =
+      std::max(kMinPixels, static_cast<std::size_t>(options.pixel_fraction * static_cast<double>(pixels.size())));
+  if (wanted >= pixels.size()) return pixels;
+  std::vector<std::uint32_t> drawn;
+  if (options.similarity != SimilarityKind::kGradientCorrelation) {
+    std::ranges::sample(pixels, std::back_inserter(drawn), static_cast<std::ptrdiff_t>(wanted), random);
+    return drawn;
+  }
+  const auto width = static_cast<std::uint32_t>(columns);
+  const auto patch_of = [width](std::uint32_t pixel) {
+    return std::pair(pixel / width / kPatchEdge, pixel % width / kPatchEdge);
+  };
+  std::map<std::pair<std::uint32_t, std::uint32_t>, std::vector<std::uint32_t>> patches;
+  for (const std::uint32_t pixel : pixels) patches[patch_of(pixel)].push_back(pixel);
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> order;
+  for (const auto& [patch, members] : patches) order.push_back(patch);
+  std::ranges::shuffle(order, random);
+  for (std::size_t n = 0; drawn.size() < wanted; ++n)
+    drawn.insert(drawn.end(), patches[order[n]].begin(), patches[order[n]].end());
+  std::ranges::sort(drawn);
+  return drawn;
+}
+
 }  // namespace
 
 Objective::Objective(Renderer& renderer, std::span<const FixedImage> images, const ObjectiveOptions& options)
@@ -36,53 +66,42 @@ Objective::Objective(Renderer& renderer, std::span<const FixedImage> images, con
     if (field.size() < kMinPixels)
       throw Error(fmt::format("view {}: only {} of {} pixels lie in the irradiated field, too few to compare",
                               views_.size() + 1, field.size(), image.field.pixels.size()));
-    const auto wanted = static_cast<std::size_t>(options.pixel_fraction * static_cast<double>(field.size()));
-    std::vector<std::uint32_t> compared;
-    std::ranges::sample(field, std::back_inserter(compared), static_cast<std::ptrdiff_t>(std::max(kMinPixels, wanted)),
-                        random);
-    add_view(image, compared);
+    add_view(image, drawn_pixels(field, image.field.columns, options, random));
   }
 }
 
-void Objective::add_view(const FixedImage& image, const std::vector<std::uint32_t>& compared) {
+void Objective::add_view(const FixedImage& image, std::vector<std::uint32_t> compared) {
   const auto columns = static_cast<std::uint32_t>(image.field.columns);
   std::vector<std::uint32_t> rendered = compared;
+  std::vector<Neighbors> neighbors;
   if (similarity_ == SimilarityKind::kGradientCorrelation) {
     for (const std::uint32_t pixel : compared)
       rendered.insert(rendered.end(), {pixel - 1, pixel + 1, pixel - columns, pixel + columns});
     std::ranges::sort(rendered);
     rendered.erase(std::unique(rendered.begin(), rendered.end()), rendered.end());
-  }
-
-  Target target;
-  for (const std::uint32_t pixel : rendered) target.line_integral.push_back(image.line_integral.pixels[pixel]);
-  if (similarity_ == SimilarityKind::kGradientCorrelation) {
     const auto place = [&](std::uint32_t pixel) {
       return static_cast<std::uint32_t>(std::ranges::lower_bound(rendered, pixel) - rendered.begin());
     };
     for (const std::uint32_t pixel : compared)
-      target.neighbors.push_back({place(pixel - 1), place(pixel + 1), place(pixel - columns), place(pixel + columns)});
-    target.gradients = gradients(target.line_integral, target.neighbors);
+      neighbors.push_back({place(pixel - 1), place(pixel + 1), place(pixel - columns), place(pixel + columns)});
   }
+  std::vector<float> xray;
+  for (const std::uint32_t pixel : rendered) xray.push_back(image.line_integral.pixels[pixel]);
   views_.push_back(image.view);
   pixels_.of_view.push_back(std::move(rendered));
-  targets_.push_back(std::move(target));
-}
-
-double Objective::compare(const Target& target, std::span<const float> drr) const {
-  if (similarity_ == SimilarityKind::kNcc) return normalized_cross_correlation(target.line_integral, drr);
-  return gradient_correlation(target.gradients, gradients(drr, target.neighbors));
+  compared_.push_back(std::move(compared));
+  comparisons_.emplace_back(similarity_, std::move(xray), std::move(neighbors));
 }
 
 std::vector<std::vector<double>> Objective::per_view(std::span<const Eigen::Isometry3d> room_from_patient) {
   using Clock = std::chrono::steady_clock;
   const auto begin = Clock::now();
-  const RenderResult drrs = renderer_.render(views_, room_from_patient, pixels_);
+  const RenderResult drrs = render(room_from_patient);
   const auto rendered = Clock::now();
   std::vector<std::vector<double>> similarity(room_from_patient.size());
   for (std::size_t pose = 0; pose < room_from_patient.size(); ++pose)
     for (std::size_t view = 0; view < views_.size(); ++view)
-      similarity[pose].push_back(compare(targets_[view], drrs.line_integrals(pose, view)));
+      similarity[pose].push_back(comparisons_[view].of(drrs.line_integrals(pose, view)));
   seconds_.rendering += std::chrono::duration<double>(rendered - begin).count();
   seconds_.similarity += std::chrono::duration<double>(Clock::now() - rendered).count();
   return similarity;

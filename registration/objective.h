@@ -14,8 +14,9 @@ namespace isoshift {
 
 struct ObjectiveOptions {
   SimilarityKind similarity = SimilarityKind::kNcc;
-  double pixel_fraction = 1.0;  // share of the field's pixels that are compared
-  std::uint64_t seed = 1;       // draws them, once
+  double pixel_fraction = 1.0;    // share of the field's pixels that are compared: single ones, for gradients patches
+  std::size_t min_pixels = 1000;  // of every view, if its field has them
+  std::uint64_t seed = 1;         // draws them, once
 };
 
 class Objective {
@@ -23,8 +24,17 @@ class Objective {
   // Compares inside each image's field. Borrows the renderer. Throws Error for a field of fewer than 100 pixels.
   Objective(Renderer& renderer, std::span<const FixedImage> images, const ObjectiveOptions& options);
 
-  // Similarity per view, in [-1, 1]. Result [pose][view].
+  // Similarity per view. Result [pose][view].
   std::vector<std::vector<double>> per_view(std::span<const Eigen::Isometry3d> room_from_patient);
+
+  // What the similarities are computed from.
+  RenderResult render(std::span<const Eigen::Isometry3d> room_from_patient) {
+    return renderer_.render(views_, room_from_patient, pixels_);
+  }
+  std::span<const XrayView> views() const { return views_; }
+  const Comparison& comparison(std::size_t view) const { return comparisons_[view]; }
+  // Indices (row * columns + column) of the pixels compared in a view.
+  std::span<const std::uint32_t> compared_pixels(std::size_t view) const { return compared_[view]; }
 
   // Where the time went so far.
   struct Seconds {
@@ -36,21 +46,14 @@ class Objective {
   std::vector<double> values(std::span<const Eigen::Isometry3d> room_from_patient);
 
  private:
-  // The X-ray's side of one view's comparison.
-  struct Target {
-    std::vector<float> line_integral;  // at the pixels rendered
-    std::vector<Neighbors> neighbors;  // for gradients: of the pixels compared, among those rendered
-    Gradients gradients;
-  };
-
-  void add_view(const FixedImage& image, const std::vector<std::uint32_t>& compared);
-  double compare(const Target& target, std::span<const float> drr) const;
+  void add_view(const FixedImage& image, std::vector<std::uint32_t> compared);
 
   Renderer& renderer_;
   SimilarityKind similarity_;
   std::vector<XrayView> views_;
   PixelSet pixels_;
-  std::vector<Target> targets_;
+  std::vector<std::vector<std::uint32_t>> compared_;
+  std::vector<Comparison> comparisons_;
   Seconds seconds_;
 };
 

@@ -1,7 +1,11 @@
 #include "registration/optimizer.h"
 
+#include <algorithm>
+#include <condition_variable>
 #include <exception>
+#include <mutex>
 #include <nlopt.hpp>
+#include <thread>
 
 namespace isoshift {
 namespace {
@@ -16,46 +20,183 @@ std::string reason(nlopt::result result) {
   }
 }
 
-}  // namespace
+nlopt::algorithm algorithm_of(OptimizerKind kind) {
+  switch (kind) {
+    case OptimizerKind::kBobyqa: return nlopt::LN_BOBYQA;
+    case OptimizerKind::kNelderMead: return nlopt::LN_NELDERMEAD;
+    case OptimizerKind::kLbfgs: return nlopt::LD_LBFGS;
+  }
+  return nlopt::LN_BOBYQA;
+}
 
-OptimizerResult maximize(const std::function<double(std::span<const double>)>& objective,
-                         const OptimizerOptions& options) {
+using Points = std::vector<std::vector<double>>;
+
+// The value at a point and, where a gradient is wanted, on both sides of it along every axis, in one batch.
+class Differences {
+ public:
+  Differences(const OptimizerOptions& options, const std::vector<double>& x, bool with_gradient) : points_{x} {
+    for (std::size_t axis = 0; with_gradient && axis < x.size(); ++axis) {
+      const double step = options.difference_share * options.initial_step[axis];
+      points_.push_back(x);
+      points_.back()[axis] = std::max(options.lower[axis], x[axis] - step);
+      points_.push_back(x);
+      points_.back()[axis] = std::min(options.upper[axis], x[axis] + step);
+    }
+  }
+  const Points& points() const { return points_; }
+  std::vector<double> gradient(const std::vector<double>& values) const {
+    std::vector<double> gradient;
+    for (std::size_t n = 1; n < points_.size(); n += 2) {
+      const std::size_t axis = n / 2;
+      gradient.push_back((values[n + 1] - values[n]) / (points_[n + 1][axis] - points_[n][axis]));
+    }
+    return gradient;
+  }
+
+ private:
+  Points points_;
+};
+
+// One search. `values_at` gives the values at a batch of points; what it throws passes through.
+OptimizerResult maximize_one(const std::function<std::vector<double>(const Points&)>& values_at,
+                             const OptimizerOptions& options) {
   OptimizerResult result;
-  nlopt::opt bobyqa(nlopt::LN_BOBYQA, static_cast<unsigned>(options.start.size()));
-  bobyqa.set_lower_bounds(options.lower);
-  bobyqa.set_upper_bounds(options.upper);
-  bobyqa.set_initial_step(options.initial_step);
+  nlopt::opt search(algorithm_of(options.kind), static_cast<unsigned>(options.start.size()));
+  search.set_lower_bounds(options.lower);
+  search.set_upper_bounds(options.upper);
+  search.set_initial_step(options.initial_step);
   std::vector<double> tolerance = options.initial_step;
   for (double& step : tolerance) step *= options.relative_tolerance;
-  bobyqa.set_xtol_abs(tolerance);
-  bobyqa.set_maxeval(options.max_evaluations);
+  search.set_xtol_abs(tolerance);
+  const auto per_call =
+      static_cast<int>(Differences(options, options.start, options.kind == OptimizerKind::kLbfgs).points().size());
+  search.set_maxeval(std::max(1, options.max_evaluations / per_call));
   struct Call {
-    const std::function<double(std::span<const double>)>& objective;
+    const std::function<std::vector<double>(const Points&)>& values_at;
+    const OptimizerOptions& options;
     int& evaluations;
     std::exception_ptr failure;  // nlopt would replace it by one of its own
-  } call{objective, result.evaluations, nullptr};
-  bobyqa.set_max_objective(
-      [](const std::vector<double>& x, std::vector<double>&, void* data) {
-        auto& [function, evaluations, failure] = *static_cast<Call*>(data);
-        ++evaluations;
+  } call{values_at, options, result.evaluations, nullptr};
+  search.set_max_objective(
+      [](const std::vector<double>& x, std::vector<double>& gradient, void* data) {
+        Call& c = *static_cast<Call*>(data);
         try {
-          return function(x);
+          const Differences differences(c.options, x, !gradient.empty());
+          const std::vector<double> values = c.values_at(differences.points());
+          c.evaluations += static_cast<int>(values.size());
+          if (!gradient.empty()) gradient = differences.gradient(values);
+          return values.front();
         } catch (...) {
-          failure = std::current_exception();
+          c.failure = std::current_exception();
           throw nlopt::forced_stop();
         }
       },
       &call);
   result.best = options.start;
   try {
-    result.termination = reason(bobyqa.optimize(result.best, result.value));
+    result.termination = reason(search.optimize(result.best, result.value));
   } catch (const nlopt::forced_stop&) {
     std::rethrow_exception(call.failure);
   } catch (const nlopt::roundoff_limited&) {
-    result.value = bobyqa.last_optimum_value();  // `best` holds the best point so far
+    result.value = search.last_optimum_value();  // `best` holds the best point so far
     result.termination = "limited by round-off";
+  } catch (const std::runtime_error&) {
+    if (options.kind != OptimizerKind::kLbfgs) throw;
+    result.value = search.last_optimum_value();
+    result.termination =
+        "line search ended";  // NLopt's L-BFGS calls it a failure where differences are as coarse as ours
   }
   return result;
+}
+
+// What several searches, each on a thread of its own, ask for: gathered until all that still run are waiting.
+class LockStep {
+ public:
+  explicit LockStep(std::size_t searches) : asked_(searches), answers_(searches), running_(searches) {}
+
+  // Called by a search: waits for the next call of the objective.
+  std::vector<double> ask(std::size_t search, const Points& points) {
+    std::unique_lock lock(mutex_);
+    asked_[search] = &points;
+    ++waiting_;
+    changed_.notify_all();
+    changed_.wait(lock, [&] { return asked_[search] == nullptr || abandoned_; });
+    if (abandoned_) throw nlopt::forced_stop();
+    return std::move(answers_[search]);
+  }
+
+  // Called by a search at its end.
+  void leave() {
+    const std::lock_guard lock(mutex_);
+    --running_;
+    changed_.notify_all();
+  }
+
+  // Answers until no search runs. If the objective throws, all searches are told to stop.
+  void serve(const BatchObjective& objective) {
+    std::unique_lock lock(mutex_);
+    for (;;) {
+      changed_.wait(lock, [&] { return waiting_ == running_; });
+      if (running_ == 0) return;
+      Points points;
+      for (const Points* of_search : asked_)
+        if (of_search != nullptr) points.insert(points.end(), of_search->begin(), of_search->end());
+      std::vector<double> values;
+      try {
+        values = objective(points);
+      } catch (...) {
+        abandoned_ = true;
+        changed_.notify_all();
+        throw;
+      }
+      auto next = values.begin();
+      for (std::size_t search = 0; search < asked_.size(); ++search) {
+        if (asked_[search] == nullptr) continue;
+        const auto end = next + static_cast<std::ptrdiff_t>(asked_[search]->size());
+        answers_[search].assign(next, end);
+        next = end;
+        asked_[search] = nullptr;
+      }
+      waiting_ = 0;
+      changed_.notify_all();
+    }
+  }
+
+ private:
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  std::vector<const Points*> asked_;
+  std::vector<std::vector<double>> answers_;
+  std::size_t running_, waiting_ = 0;
+  bool abandoned_ = false;
+};
+
+}  // namespace
+
+std::string_view to_string(OptimizerKind kind) {
+  switch (kind) {
+    case OptimizerKind::kBobyqa: return "bobyqa";
+    case OptimizerKind::kNelderMead: return "nelder-mead";
+    case OptimizerKind::kLbfgs: return "l-bfgs";
+  }
+  return "";
+}
+
+std::vector<OptimizerResult> maximize(const BatchObjective& objective, std::span<const OptimizerOptions> searches) {
+  if (searches.size() == 1) return {maximize_one(objective, searches.front())};
+  std::vector<OptimizerResult> results(searches.size());
+  LockStep lock_step(searches.size());
+  std::vector<std::jthread> threads;  // joined before what they refer to ends
+  for (std::size_t n = 0; n < searches.size(); ++n)
+    threads.emplace_back([&, n] {
+      try {
+        results[n] = maximize_one([&](const Points& points) { return lock_step.ask(n, points); }, searches[n]);
+      } catch (...) {  // the objective has failed: serve() throws it
+      }
+      lock_step.leave();
+    });
+  lock_step.serve(objective);
+  return results;
 }
 
 }  // namespace isoshift

@@ -1,18 +1,29 @@
 #pragma once
-// Derivative-free local optimization within a box, by NLopt's BOBYQA (Powell 2009).
+// Local optimization within a box, by NLopt. Points come in batches: the differences of a gradient, and of several
+// searches the steps of all, so that one call of the objective fills a machine.
 
 #include <functional>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace isoshift {
 
+enum class OptimizerKind {
+  kBobyqa,      // quadratic models, no derivatives (Powell 2009)
+  kNelderMead,  // simplex, no derivatives
+  kLbfgs,       // quasi-Newton on central differences, which cost 13 evaluations per step but come in one batch
+};
+std::string_view to_string(OptimizerKind kind);
+
 struct OptimizerOptions {
+  OptimizerKind kind = OptimizerKind::kBobyqa;
   std::vector<double> start;
   std::vector<double> lower, upper;  // the box; start lies inside
   std::vector<double> initial_step;  // first trust-region radius per parameter
   double relative_tolerance = 1e-3;  // stop when steps fall below this share of the initial step
+  double difference_share = 0.05;    // kLbfgs: differences are taken over this share of the initial step, both ways
   int max_evaluations = 500;
 };
 
@@ -23,8 +34,12 @@ struct OptimizerResult {
   std::string termination = "not run";
 };
 
-// The largest value of `objective` found. Exceptions of the objective pass through.
-OptimizerResult maximize(const std::function<double(std::span<const double>)>& objective,
-                         const OptimizerOptions& options);
+// One value per point.
+using BatchObjective = std::function<std::vector<double>(std::span<const std::vector<double>>)>;
+
+// The largest value of `objective` found by each of several searches, which go on in step: every call of the objective
+// holds what each of them asks for next. What one finds does not depend on the others. Exceptions of the objective pass
+// through.
+std::vector<OptimizerResult> maximize(const BatchObjective& objective, std::span<const OptimizerOptions> searches);
 
 }  // namespace isoshift

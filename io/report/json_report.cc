@@ -50,6 +50,36 @@ Json couch_target_json(const ShownShift& shown) {
       {"yaw", shown.couch_target_deg[0]}, {"pitch", shown.couch_target_deg[1]}, {"roll", shown.couch_target_deg[2]}};
 }
 
+Json sigma_json(const std::optional<SetupReport::Sigma>& sigma,
+                const std::array<std::optional<double>, 3>& components) {
+  if (!sigma) return nullptr;
+  Json array = Json::array();
+  for (const auto& component : components) array.push_back(or_null(component));
+  return array;
+}
+
+Json stage_json(const SetupReport::Stage& stage) {
+  Json json = {{"name", stage.name},
+               {"similarity", stage.similarity},
+               {"evaluations", stage.evaluations},
+               {"seconds", stage.seconds},
+               {"termination", stage.termination},
+               {"value", stage.value},
+               {"optimizer", stage.optimizer},
+               {"spread_mm", or_null(stage.spread_mm)},
+               {"spread_deg", or_null(stage.spread_deg)}};
+  for (const auto& [name, value] : stage.parameters) json["parameters"][name] = value;
+  return json;
+}
+
+Json alternatives_json(const SetupReport& report) {
+  if (!report.similarity_as_is) return nullptr;
+  Json list = Json::array();
+  for (const SetupReport::Alternative& alternative : report.alternatives)
+    list.push_back({{"description", alternative.description}, {"similarity", alternative.similarity}});
+  return {{"similarity_as_is", *report.similarity_as_is}, {"if", list}};
+}
+
 Json unobservable_json(const SetupReport& report) {
   Json directions = Json::array();
   for (const Eigen::Vector3d& direction : report.unobservable_room) directions.push_back(array_of(direction));
@@ -71,7 +101,9 @@ std::string json_report(const SetupReport& report) {
                {"couch_shift", couch_shift_json(shown)},
                {"couch_target_deg", couch_target_json(shown)},
                {"uncertainty",
-                {{"translation_mm", nullptr}, {"rotation_deg", nullptr}, {"unobservable", unobservable_json(report)}}},
+                {{"translation_mm", sigma_json(report.sigma, shown.sigma_mm)},
+                 {"rotation_deg", sigma_json(report.sigma, shown.sigma_deg)},
+                 {"unobservable", unobservable_json(report)}}},
                {"views", Json::array()},
                {"stages", Json::array()},
                {"preset", report.preset},
@@ -91,20 +123,22 @@ std::string json_report(const SetupReport& report) {
                              {"sop_instance_uid", view.sop_instance_uid},
                              {"gantry_deg", view.gantry_deg},
                              {"similarity_start", view.similarity_start},
-                             {"similarity_final", view.similarity_final}});
+                             {"similarity_final", view.similarity_final},
+                             {"parts_with_signal", view.parts_with_signal},
+                             {"parts_disagreeing", view.parts_disagreeing}});
     images.push_back(view.sop_instance_uid);
   }
   for (const SetupReport::Stage& stage : report.stages) {
-    json["stages"].push_back({{"name", stage.name},
-                              {"similarity", stage.similarity},
-                              {"evaluations", stage.evaluations},
-                              {"seconds", stage.seconds},
-                              {"termination", stage.termination}});
+    json["stages"].push_back(stage_json(stage));
     evaluations += stage.evaluations;
   }
   json["evaluations"] = evaluations;
-  json["seconds"] = {
-      {"load", report.seconds_load}, {"register", report.seconds_register}, {"total", report.seconds_total}};
+  json["alternatives"] = alternatives_json(report);
+  json["seconds"] = {{"load", report.seconds_load},
+                     {"register", report.seconds_register},
+                     {"rendering", report.seconds_rendering},
+                     {"similarity", report.seconds_similarity},
+                     {"total", report.seconds_total}};
   json["references"] = {{"ct_series", report.ct_series_uid},
                         {"plan", or_null(report.plan_uid)},
                         {"images", images},

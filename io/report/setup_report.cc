@@ -34,6 +34,11 @@ ShownShift shown_shift(const SetupReport& report) {
   const ZxyAngles error = zxy_from_rotation(report.setup_error.linear());
   shown.setup_error_mm = determined(report.setup_error.translation(), report.unobservable_room);
   shown.setup_error_deg = {deg_from_rad(error.x_rad), deg_from_rad(error.y_rad), deg_from_rad(error.z_rad)};
+  if (report.sigma) {
+    shown.sigma_mm = determined(report.sigma->translation_mm, report.unobservable_room);
+    for (int axis = 0; axis < 3 && !report.translation_only; ++axis)
+      shown.sigma_deg[axis] = report.sigma->rotation_deg[axis];
+  }
   shown.withheld = report.verdict == Verdict::kRejected;
   std::vector<Eigen::Vector3d> unobservable_table;
   for (const Eigen::Vector3d& direction : report.unobservable_room)
@@ -49,5 +54,7 @@ std::string rounded(double value) {
   if (tenths == 0.0) return "0.0";
   return fmt::format("{:+.1f}", tenths / 10.0);
 }
+
+std::string rounded_up(double value) { return fmt::format("{:.1f}", std::ceil(value * 10.0 - 1e-9) / 10.0); }
 
 }  // namespace isoshift

@@ -22,13 +22,28 @@ struct SetupReport {
     double gantry_deg = 0.0;
     double similarity_start = -1.0;
     double similarity_final = -1.0;
+    int parts_with_signal = 0;  // of the view, for regional consistency
+    int parts_disagreeing = 0;
   };
   struct Stage {
     std::string name;
     std::string similarity;
+    std::string optimizer;
+    std::vector<std::pair<std::string, double>> parameters;  // what the preset says, by name
     int evaluations = 0;
     double seconds = 0.0;
+    double value = 0.0;  // the similarity reached
     std::string termination;
+    std::optional<double> spread_mm, spread_deg;  // between searches from different starts
+  };
+  struct Sigma {
+    Eigen::Vector3d translation_mm = Eigen::Vector3d::Zero();
+    Eigen::Vector3d rotation_deg = Eigen::Vector3d::Zero();
+  };
+  // What the images would match like if they were not what they say they are.
+  struct Alternative {
+    std::string description;
+    double similarity = 0.0;
   };
 
   Verdict verdict = Verdict::kRejected;
@@ -42,9 +57,12 @@ struct SetupReport {
   Eigen::Isometry3d setup_error = Eigen::Isometry3d::Identity();
   std::vector<Eigen::Vector3d> unobservable_room;
   bool translation_only = false;
+  std::optional<Sigma> sigma;  // one standard deviation, IEC 61217 fixed
 
   std::vector<View> views;
   std::vector<Stage> stages;
+  std::optional<double> similarity_as_is;  // what alternatives compare with
+  std::vector<Alternative> alternatives;
   std::string preset = "setup";
   std::uint64_t seed = 1;
   std::string attenuation;
@@ -53,6 +71,7 @@ struct SetupReport {
   std::string renderer, device;
   std::vector<std::pair<std::string, std::string>> renderer_settings;  // name and value of what it was asked to do
   double seconds_load = 0.0, seconds_register = 0.0, seconds_total = 0.0;
+  double seconds_rendering = 0.0, seconds_similarity = 0.0;  // of seconds_register
 
   std::string ct_series_uid;
   std::string plan_uid;                  // empty: there was no plan
@@ -65,6 +84,8 @@ struct SetupReport {
 struct ShownShift {
   std::array<std::optional<double>, 3> setup_error_mm;  // x, y, z, IEC 61217 fixed
   std::array<double, 3> setup_error_deg;                // rx, ry, rz of R = Rz Rx Ry
+  std::array<std::optional<double>, 3> sigma_mm;        // x, y, z; absent where the component is
+  std::array<std::optional<double>, 3> sigma_deg;       // about x, y, z
   bool withheld = false;                                // the verdict forbids a couch shift
   std::array<std::optional<double>, 3> couch_mm;        // lateral, longitudinal, vertical
   std::array<double, 3> couch_deg;                      // yaw, pitch, roll: change of the read-outs
@@ -74,6 +95,9 @@ ShownShift shown_shift(const SetupReport& report);
 
 // One rounding for every format a person reads: to 0.1, halves away from zero, with sign, "-0.0" never.
 std::string rounded(double value);
+
+// The same for an uncertainty: rounded up, so that none is shown smaller than it is, and without sign.
+std::string rounded_up(double value);
 
 // result.json, full precision. docs/result.schema.json describes it.
 std::string json_report(const SetupReport& report);

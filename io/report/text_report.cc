@@ -23,12 +23,14 @@ constexpr Sense kYaw = {"counter-clockwise, seen from above", "clockwise, seen f
 constexpr Sense kPitch = {"gantry end up", "gantry end down"};
 constexpr Sense kRoll = {"right side down, seen facing the gantry", "left side down, seen facing the gantry"};
 
-// "  Lateral        -4.3 mm   to the left, seen facing the gantry"
-std::string row(std::string_view name, const std::optional<double>& value, std::string_view unit, const Sense& sense) {
+// "  x              -4.3 +/- 0.1 mm   to the left, seen facing the gantry"; the uncertainty is two sigma.
+std::string row(std::string_view name, const std::optional<double>& value, std::string_view unit, const Sense& sense,
+                const std::optional<double>& sigma = std::nullopt) {
   if (!value) return fmt::format("  {:<14} not determined\n", name);
   const std::string number = rounded(*value);
   const char* words = number == "0.0" ? "" : *value > 0.0 ? sense.positive : sense.negative;
-  const std::string line = fmt::format("  {:<14} {:>6} {:<4} {}", name, number, unit, words);
+  const std::string uncertain = sigma ? fmt::format(" +/- {}", rounded_up(2.0 * *sigma)) : "";
+  const std::string line = fmt::format("  {:<14} {:>6}{} {:<4} {}", name, number, uncertain, unit, words);
   return line.substr(0, line.find_last_not_of(' ') + 1) + "\n";
 }
 
@@ -87,19 +89,22 @@ std::string text_report(const SetupReport& report) {
                                             rounded(shown.couch_target_deg[0]), rounded(shown.couch_target_deg[1]),
                                             rounded(shown.couch_target_deg[2]));
 
-  text += "\nSETUP ERROR         (where the patient lies, against the plan)\n";
+  text += "\nSETUP ERROR         (where the patient lies, against the plan; +/-: two sigma)\n";
   if (shown.withheld)
     text += "  withheld: the result was rejected\n";
   else
-    text +=
-        row("x", shown.setup_error_mm[0], "mm", kLateral) + row("y", shown.setup_error_mm[1], "mm", kLongitudinal) +
-        row("z", shown.setup_error_mm[2], "mm", kVertical) + row("about x", shown.setup_error_deg[0], "deg", kPitch) +
-        row("about y", shown.setup_error_deg[1], "deg", kRoll) + row("about z", shown.setup_error_deg[2], "deg", kYaw);
+    text += row("x", shown.setup_error_mm[0], "mm", kLateral, shown.sigma_mm[0]) +
+            row("y", shown.setup_error_mm[1], "mm", kLongitudinal, shown.sigma_mm[1]) +
+            row("z", shown.setup_error_mm[2], "mm", kVertical, shown.sigma_mm[2]) +
+            row("about x", shown.setup_error_deg[0], "deg", kPitch, shown.sigma_deg[0]) +
+            row("about y", shown.setup_error_deg[1], "deg", kRoll, shown.sigma_deg[1]) +
+            row("about z", shown.setup_error_deg[2], "deg", kYaw, shown.sigma_deg[2]);
   if (report.translation_only) text += "  Only translations were searched; rotations were taken as 0.\n";
 
   text += "\nVIEWS               similarity at the planned pose -> at the pose found\n";
   for (const SetupReport::View& view : report.views)
-    text += fmt::format("  {:<14} {:.4f} -> {:.4f}\n", plain(view.label), view.similarity_start, view.similarity_final);
+    text += fmt::format("  {:<14} {:.4f} -> {:.4f}; {} of {} parts with signal match elsewhere\n", plain(view.label),
+                        view.similarity_start, view.similarity_final, view.parts_disagreeing, view.parts_with_signal);
 
   text += list("WARNINGS", report.warnings) + list("OVERRIDES", report.overrides);
   std::string settings;
@@ -111,8 +116,9 @@ std::string text_report(const SetupReport& report) {
       "at\n"
       "  imaging; angles are changes of the table's read-outs. Shown to 0.1; result.json has full precision.\n\n"
       "Renderer     {} on {}{}; attenuation {}, threshold {:.0f} HU; seed {}\n"
+      "Search       preset {}\n"
       "Time         {:.1f} s, of which registration {:.1f} s\n",
-      report.renderer, report.device, settings, report.attenuation, report.threshold_hu, report.seed,
+      report.renderer, report.device, settings, report.attenuation, report.threshold_hu, report.seed, report.preset,
       report.seconds_total, report.seconds_register);
   return text;
 }

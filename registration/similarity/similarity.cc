@@ -1,13 +1,57 @@
 #include "registration/similarity/similarity.h"
 
+#include <algorithm>
 #include <cassert>
 #include <cmath>
 #include <cstddef>
+#include <numeric>
 
 namespace isoshift {
+namespace {
+
+// The bin of a share of the range: the last one holds the largest value.
+int bin_of(float share, int bins) { return std::min(bins - 1, static_cast<int>(share * static_cast<float>(bins))); }
+
+// Entropies of the X-ray, the DRR and both, in nats.
+struct Entropies {
+  double xray = 0.0, drr = 0.0, joint = 0.0;
+};
+
+Entropies entropies_of(const JointHistogram& histogram) {
+  std::array<double, kInformationBins> xray = {}, drr = {};
+  double sum = 0.0;
+  for (std::size_t n = 0; n < histogram.size(); ++n) {
+    xray[n / kInformationBins] += histogram[n];
+    drr[n % kInformationBins] += histogram[n];
+    sum += histogram[n];
+  }
+  if (!(sum > 0.0)) return {};
+  const auto entropy_of = [sum](const auto& counts) {
+    double entropy = 0.0;
+    for (const double count : counts)
+      if (count > 0.0) entropy -= count / sum * std::log(count / sum);
+    return entropy;
+  };
+  return {.xray = entropy_of(xray), .drr = entropy_of(drr), .joint = entropy_of(histogram)};
+}
+
+}  // namespace
 
 std::string_view to_string(SimilarityKind kind) {
-  return kind == SimilarityKind::kNcc ? "ncc" : "gradient-correlation";
+  switch (kind) {
+    case SimilarityKind::kNcc: return "ncc";
+    case SimilarityKind::kGradientCorrelation: return "gradient-correlation";
+    case SimilarityKind::kStochasticRankCorrelation: return "src";
+    case SimilarityKind::kMutualInformation: return "mi";
+    case SimilarityKind::kNormalizedMutualInformation: return "nmi";
+  }
+  return "";
+}
+
+std::optional<SimilarityKind> similarity_kind_from(std::string_view name) {
+  for (const SimilarityKind kind : kSimilarityKinds)
+    if (to_string(kind) == name) return kind;
+  return std::nullopt;
 }
 
 double normalized_cross_correlation(std::span<const float> a, std::span<const float> b) {
@@ -45,6 +89,116 @@ Gradients gradients(std::span<const float> pixels, std::span<const Neighbors> ne
 double gradient_correlation(const Gradients& a, const Gradients& b) {
   return 0.5 * (normalized_cross_correlation(a.along_row, b.along_row) +
                 normalized_cross_correlation(a.along_column, b.along_column));
+}
+
+Range range_of(std::span<const float> values) {
+  if (values.empty()) return {0.0F, 0.0F};
+  const auto [low, high] = std::ranges::minmax(values);
+  return {.low = low, .per_unit = high > low ? 1.0F / (high - low) : 0.0F};
+}
+
+std::vector<float> histogram_ranks(std::span<const float> values) {
+  const Range range = range_of(values);
+  std::array<std::uint32_t, kRankBins> counts = {};
+  std::vector<int> bins;
+  bins.reserve(values.size());
+  for (const float value : values) {
+    bins.push_back(bin_of(range(value), kRankBins));
+    ++counts[static_cast<std::size_t>(bins.back())];
+  }
+  std::array<float, kRankBins> rank_of_bin = {};
+  std::uint32_t below = 0;
+  for (std::size_t bin = 0; bin < counts.size(); ++bin) {
+    rank_of_bin[bin] = static_cast<float>(below) + 0.5F * (static_cast<float>(counts[bin]) - 1.0F);
+    below += counts[bin];
+  }
+  std::vector<float> ranks;
+  ranks.reserve(values.size());
+  for (const int bin : bins) ranks.push_back(rank_of_bin[static_cast<std::size_t>(bin)]);
+  return ranks;
+}
+
+std::vector<float> exact_ranks(std::span<const float> values) {
+  std::vector<std::uint32_t> order(values.size());
+  std::iota(order.begin(), order.end(), 0U);
+  std::ranges::sort(order, {}, [&](std::uint32_t n) { return values[n]; });
+  std::vector<float> ranks(values.size());
+  for (std::size_t first = 0, last = 0; first < order.size(); first = last) {
+    while (last < order.size() && values[order[last]] == values[order[first]]) ++last;
+    for (std::size_t n = first; n < last; ++n) ranks[order[n]] = 0.5F * static_cast<float>(first + last - 1);
+  }
+  return ranks;
+}
+
+double rank_correlation(std::span<const float> ranks_a, std::span<const float> ranks_b) {
+  return normalized_cross_correlation(ranks_a, ranks_b);
+}
+
+std::vector<std::uint32_t> information_bins(std::span<const float> xray) {
+  const Range range = range_of(xray);
+  std::vector<std::uint32_t> bins;
+  bins.reserve(xray.size());
+  for (const float value : xray) bins.push_back(static_cast<std::uint32_t>(bin_of(range(value), kInformationBins)));
+  return bins;
+}
+
+JointHistogram joint_histogram(std::span<const std::uint32_t> xray_bins, std::span<const float> drr) {
+  assert(xray_bins.size() == drr.size());
+  const Range range = range_of(drr);
+  JointHistogram histogram = {};
+  for (std::size_t n = 0; n < drr.size(); ++n) {
+    const float place = range(drr[n]) * static_cast<float>(kInformationBins - 1);
+    const int lower = std::min(kInformationBins - 2, static_cast<int>(place));
+    const float beyond = place - static_cast<float>(lower);
+    const auto to_upper = static_cast<std::uint32_t>(beyond * static_cast<float>(kSharesPerPixel) + 0.5F);
+    const std::size_t at = static_cast<std::size_t>(xray_bins[n]) * kInformationBins + static_cast<std::size_t>(lower);
+    histogram[at] += kSharesPerPixel - to_upper;
+    histogram[at + 1] += to_upper;
+  }
+  return histogram;
+}
+
+double mutual_information(const JointHistogram& histogram) {
+  const Entropies entropies = entropies_of(histogram);
+  return entropies.xray + entropies.drr - entropies.joint;
+}
+
+double normalized_mutual_information(const JointHistogram& histogram) {
+  const Entropies entropies = entropies_of(histogram);
+  return entropies.joint > 0.0 ? (entropies.xray + entropies.drr) / entropies.joint : 1.0;
+}
+
+Comparison::Comparison(SimilarityKind kind, std::vector<float> xray, std::vector<Neighbors> neighbors)
+    : kind_(kind), neighbors_(std::move(neighbors)) {
+  switch (kind) {
+    case SimilarityKind::kNcc: values_ = std::move(xray); break;
+    case SimilarityKind::kGradientCorrelation: gradients_ = gradients(xray, neighbors_); break;
+    // Sorted, once: the result then does not depend on how the receptor's values are spread over their range.
+    case SimilarityKind::kStochasticRankCorrelation: values_ = exact_ranks(xray); break;
+    case SimilarityKind::kMutualInformation:
+    case SimilarityKind::kNormalizedMutualInformation: bins_ = information_bins(xray); break;
+  }
+}
+
+std::size_t Comparison::pixels_compared() const {
+  switch (kind_) {
+    case SimilarityKind::kGradientCorrelation: return neighbors_.size();
+    case SimilarityKind::kMutualInformation:
+    case SimilarityKind::kNormalizedMutualInformation: return bins_.size();
+    default: return values_.size();
+  }
+}
+
+double Comparison::of(std::span<const float> drr) const {
+  switch (kind_) {
+    case SimilarityKind::kNcc: return normalized_cross_correlation(values_, drr);
+    case SimilarityKind::kGradientCorrelation: return gradient_correlation(gradients_, gradients(drr, neighbors_));
+    case SimilarityKind::kStochasticRankCorrelation: return rank_correlation(values_, histogram_ranks(drr));
+    case SimilarityKind::kMutualInformation: return mutual_information(joint_histogram(bins_, drr));
+    case SimilarityKind::kNormalizedMutualInformation:
+      return normalized_mutual_information(joint_histogram(bins_, drr));
+  }
+  return 0.0;
 }
 
 }  // namespace isoshift

@@ -1,7 +1,14 @@
 #pragma once
-// Merit functions: how alike two lists of pixels are (docs/algorithms.md, "Similarities").
+// Merit functions: how alike an X-ray and a DRR are, pixel by pixel of a list (docs/algorithms.md, "Similarities").
+//
+//   const Comparison comparison(SimilarityKind::kStochasticRankCorrelation, xray_pixels);
+//   const double similarity = comparison.of(drr_pixels);
+//
+// similarity.comp computes the same on a GPU.
 
+#include <array>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string_view>
 #include <vector>
@@ -9,11 +16,19 @@
 namespace isoshift {
 
 enum class SimilarityKind {
-  kNcc,                  // normalized cross correlation: captures from far
-  kGradientCorrelation,  // NCC of the gradients (Penney et al. 1998): precise, blind to slow intensity errors
+  kNcc,                         // normalized cross correlation, -1 to 1
+  kGradientCorrelation,         // NCC of the gradients (Penney et al. 1998), -1 to 1: precise, captures little
+  kStochasticRankCorrelation,   // SRC, Spearman's rho (Birkfellner et al. 2009), -1 to 1: blind to monotone changes
+  kMutualInformation,           // in nats, 0 and more
+  kNormalizedMutualInformation  // (H(A) + H(B)) / H(A, B) (Studholme et al. 1999), 1 to 2
 };
 
+inline constexpr std::array kSimilarityKinds = {
+    SimilarityKind::kNcc, SimilarityKind::kGradientCorrelation, SimilarityKind::kStochasticRankCorrelation,
+    SimilarityKind::kMutualInformation, SimilarityKind::kNormalizedMutualInformation};
+
 std::string_view to_string(SimilarityKind kind);
+std::optional<SimilarityKind> similarity_kind_from(std::string_view name);
 
 // Pearson's correlation of two equally long lists, in [-1, 1]; 0 where either is constant.
 double normalized_cross_correlation(std::span<const float> a, std::span<const float> b);
@@ -31,5 +46,58 @@ Gradients gradients(std::span<const float> pixels, std::span<const Neighbors> ne
 
 // The mean of the correlations along rows and along columns, in [-1, 1].
 double gradient_correlation(const Gradients& a, const Gradients& b);
+
+// Where values lie between the least and the largest of a list, 0 to 1; 0 everywhere where it is constant.
+struct Range {
+  float low, per_unit;
+  float operator()(float value) const { return (value - low) * per_unit; }
+};
+Range range_of(std::span<const float> values);
+
+// Ranks from a cumulative histogram of kRankBins bins between the least and the largest value: every value of a bin
+// gets the mean of the bin's ranks (0 is the first). Exact for 8-bit data.
+inline constexpr int kRankBins = 256;
+std::vector<float> histogram_ranks(std::span<const float> values);
+
+// The same with one bin per value: what a sort gives.
+std::vector<float> exact_ranks(std::span<const float> values);
+
+// Spearman's rho as Pearson's correlation of mid-ranks, which holds with ties, too.
+double rank_correlation(std::span<const float> ranks_a, std::span<const float> ranks_b);
+
+// Joint histogram of kInformationBins x kInformationBins, counts in units of 1 / kSharesPerPixel pixels. An X-ray pixel
+// falls into one bin, a DRR pixel is shared by distance between two: the sum then changes smoothly with the pose.
+inline constexpr int kInformationBins = 32;
+inline constexpr int kSharesPerPixel = 256;
+using JointHistogram = std::array<std::uint32_t, static_cast<std::size_t>(kInformationBins) * kInformationBins>;
+std::vector<std::uint32_t> information_bins(std::span<const float> xray);
+JointHistogram joint_histogram(std::span<const std::uint32_t> xray_bins, std::span<const float> drr);
+double mutual_information(const JointHistogram& histogram);             // nats
+double normalized_mutual_information(const JointHistogram& histogram);  // 1 where nothing is shared
+
+// The X-ray's side of one view, prepared once.
+class Comparison {
+ public:
+  // `neighbors` are those of the pixels compared, for gradients; else every pixel of the list is compared.
+  Comparison(SimilarityKind kind, std::vector<float> xray, std::vector<Neighbors> neighbors = {});
+
+  // How alike a DRR's pixels are, in the order of the X-ray's.
+  double of(std::span<const float> drr) const;
+
+  SimilarityKind kind() const { return kind_; }
+  std::size_t pixels_compared() const;
+  // What the kind needs of the X-ray: line integrals, ranks or (as numbers) bins; or gradients and neighbors.
+  std::span<const float> values() const { return values_; }
+  std::span<const std::uint32_t> bins() const { return bins_; }
+  const Gradients& xray_gradients() const { return gradients_; }
+  std::span<const Neighbors> neighbors() const { return neighbors_; }
+
+ private:
+  SimilarityKind kind_;
+  std::vector<float> values_;
+  std::vector<std::uint32_t> bins_;
+  std::vector<Neighbors> neighbors_;
+  Gradients gradients_;
+};
 
 }  // namespace isoshift

@@ -1,4 +1,4 @@
-#include "registration/quality.h"
+#include "registration/quality/judge.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

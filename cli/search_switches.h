@@ -8,12 +8,13 @@
 
 namespace isoshift {
 
-struct SearchOptions {
+struct SearchSwitches {
+  std::string preset = "setup";
   std::string dof = "rigid";
-  std::uint64_t seed = RegistrationOptions{}.seed;
+  std::uint64_t seed = 1;
 
   RegistrationOptions registration() const;
 };
-void add_search_options(CLI::App& command, SearchOptions& options);
+void add_search_switches(CLI::App& command, SearchSwitches& options);
 
 }  // namespace isoshift

@@ -11,7 +11,7 @@ namespace isoshift {
 // rays lie within 30 degrees of each other, as with a single view.
 std::vector<Eigen::Vector3d> unobservable_directions(std::span<const XrayView> views);
 
-// Sets verdict, reasons and warnings from the parameters found (in the order of Stage) and the views' similarities.
+// Sets verdict and reasons from all else in the result, and from the parameters found (PoseParameters).
 void judge(std::span<const double> parameters, const RegistrationOptions& options, RegistrationResult& result);
 
 }  // namespace isoshift

@@ -1,0 +1,153 @@
+// Who is on the table, and are the images what they say? Registers phantom patients with their own X-rays, with X-rays
+// that were mirrored, turned, exchanged or taken from the other side, and with those of all other patients. Prints a
+// line of CSV per registration and a summary; exits with 1 if anything wrong was accepted.
+//
+//   identity_check [patients=20] > identity.csv
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <iostream>
+#include <map>
+#include <random>
+
+#include "bench/scene.h"
+#include "geometry/target_error.h"
+#include "registration/presets.h"
+
+namespace isoshift {
+namespace {
+
+constexpr int kPixels = 512;
+constexpr std::array kGantryAnglesDeg = {0.0, 90.0};
+
+struct Patient {
+  std::vector<Shape> shapes;
+  Eigen::Isometry3d setup_error;
+  std::vector<XrayImage> xrays;
+};
+
+// Every second one a spine, lying off plan by up to 8 mm and 3 degrees per axis.
+Patient make_patient(std::uint64_t seed) {
+  std::mt19937_64 random(seed);
+  std::uniform_real_distribution<double> within(-1.0, 1.0);
+  const auto vector = [&] { return Eigen::Vector3d(within(random), within(random), within(random)); };
+  Placement placement;
+  placement.translation_mm = 8.0 * vector();
+  placement.rotation_deg = 3.0 * vector();
+  Patient patient{.shapes = seed % 2 == 0 ? head_phantom(Eigen::Vector3d::Zero(), seed)
+                                          : spine_phantom(Eigen::Vector3d::Zero(), seed)};
+  patient.setup_error.linear() = placement.rotation();
+  patient.setup_error.translation() = placement.translation_mm;
+  for (const double gantry_deg : kGantryAnglesDeg) {
+    XrayImage xray{.label = fmt::format("G{:.0f}", gantry_deg), .view = bench_view(gantry_deg, kPixels)};
+    xray.values =
+        simulate_xray(patient.shapes, placement,
+                      {.gantry_angle_deg = gantry_deg, .pixels = kPixels, .pixel_mm = 410.0 / kPixels}, 20000.0, seed);
+    patient.xrays.push_back(std::move(xray));
+  }
+  return patient;
+}
+
+Volume<float> ct_of(const Patient& patient) {
+  const Eigen::Vector3i size(200, 230, 150);
+  const Eigen::Vector3d spacing_mm(1.0, 1.0, 1.5);
+  Eigen::Affine3d patient_from_voxel = Eigen::Affine3d::Identity();
+  patient_from_voxel.linear() = spacing_mm.asDiagonal();
+  patient_from_voxel.translation() = -0.5 * (size.cast<double>().cwiseProduct(spacing_mm) - spacing_mm);
+  return ct_of_shapes(patient.shapes, size, patient_from_voxel);
+}
+
+XrayImage mirrored(XrayImage xray) {
+  for (int row = 0; row < xray.values.rows; ++row) {
+    const auto begin = xray.values.pixels.begin() + static_cast<std::ptrdiff_t>(row) * xray.values.columns;
+    std::reverse(begin, begin + xray.values.columns);
+  }
+  return xray;
+}
+
+XrayImage turned(XrayImage xray) {
+  std::ranges::reverse(xray.values.pixels);
+  return xray;
+}
+
+// What may be wrong with a patient's own images.
+std::vector<std::pair<std::string, std::vector<XrayImage>>> variants(const std::vector<XrayImage>& xrays) {
+  std::vector<std::pair<std::string, std::vector<XrayImage>>> list = {{"right", xrays}};
+  const auto with = [&](std::size_t view, const XrayImage& image) {
+    std::vector<XrayImage> changed = xrays;
+    changed[view] = image;
+    return changed;
+  };
+  list.emplace_back("AP mirrored", with(0, mirrored(xrays[0])));
+  list.emplace_back("lateral mirrored", with(1, mirrored(xrays[1])));
+  list.emplace_back("AP turned", with(0, turned(xrays[0])));
+  std::vector<XrayImage> changed = xrays;
+  std::swap(changed[0].view, changed[1].view);
+  list.emplace_back("angles exchanged", changed);
+  for (std::size_t view = 0; view < 2; ++view) {
+    changed = xrays;
+    changed[view].view = bench_view(kGantryAnglesDeg[view] + 180.0, kPixels);
+    list.emplace_back(fmt::format("gantry + 180 in view {}", view + 1), changed);
+  }
+  changed = xrays;
+  for (std::size_t view = 0; view < 2; ++view) changed[view].view = bench_view(kGantryAnglesDeg[view] + 180.0, kPixels);
+  list.emplace_back("gantry + 180 in both", changed);
+  return list;
+}
+
+int check(int patient_count) {
+  std::vector<Patient> patients;
+  for (int n = 0; n < patient_count; ++n) patients.push_back(make_patient(static_cast<std::uint64_t>(100 + n)));
+  Eigen::Isometry3d planned = Eigen::Isometry3d::Identity();  // HFS: (x, y, z) of the room is (x, z, -y) of the patient
+  planned.linear() << 1, 0, 0, 0, 0, 1, 0, -1, 0;
+
+  struct Count {
+    int all = 0, accepted = 0;
+  };
+  std::map<std::string, Count> counts;
+  fmt::print("ct,xrays,case,verdict,mtre_mm,ncc,as_is,best_alternative,disagreeing,with_signal,seconds,reasons\n");
+  const auto one = [&](const RendererPyramid& renderers, int ct, int of, const std::string& what,
+                       const std::vector<XrayImage>& xrays) {
+    const RegistrationResult result = register_views(renderers, xrays, planned, preset("setup"));
+    const Eigen::Isometry3d found = result.actual_room_from_patient * planned.inverse();
+    double ncc = 1.0, disagreeing = 0.0, with_signal = 1e-9, best = 0.0;
+    for (const ViewReport& view : result.views) {
+      ncc = std::min(ncc, view.similarity_final);
+      disagreeing += view.consistency.disagreeing();
+      with_signal += view.consistency.with_signal();
+    }
+    for (const Alternative& alternative : result.alternatives->alternatives)
+      best = std::max(best, alternative.similarity);
+    std::string reasons;
+    for (const std::string& reason : result.reasons) reasons += reason + "; ";
+    fmt::print("{},{},{},{},{:.2f},{:.3f},{:.3f},{:.3f},{:.0f},{:.0f},{:.2f},\"{}\"\n", ct, of, what,
+               to_string(result.verdict),
+               mean_target_registration_error_mm(found, patients[static_cast<std::size_t>(of)].setup_error,
+                                                 standard_targets_mm()),
+               ncc, result.alternatives->similarity, best, disagreeing, with_signal, result.seconds, reasons);
+    std::fflush(stdout);
+    Count& count = counts[what];
+    ++count.all;
+    count.accepted += result.verdict == Verdict::kAccepted ? 1 : 0;
+  };
+  for (int ct = 0; ct < patient_count; ++ct) {
+    const RendererPyramid renderers(RendererKind::kCpu, ct_of(patients[static_cast<std::size_t>(ct)]), {},
+                                    std::array{Beam::kKilovoltage});
+    for (const auto& [what, xrays] : variants(patients[static_cast<std::size_t>(ct)].xrays))
+      one(renderers, ct, ct, what, xrays);
+    for (int of = 0; of < patient_count; ++of)
+      if (of != ct) one(renderers, ct, of, "another patient", patients[static_cast<std::size_t>(of)].xrays);
+  }
+  bool wrong_accepted = false;
+  for (const auto& [what, count] : counts) {
+    std::cerr << fmt::format("{:<24} {:>4} of {:>4} accepted\n", what, count.accepted, count.all);
+    wrong_accepted = wrong_accepted || (what != "right" && count.accepted > 0);
+  }
+  return wrong_accepted ? 1 : 0;
+}
+
+}  // namespace
+}  // namespace isoshift
+
+int main(int argc, char** argv) { return isoshift::check(argc > 1 ? std::atoi(argv[1]) : 20); }

@@ -1,0 +1,72 @@
+#include "drr/renderer_pyramid.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <limits>
+
+namespace isoshift {
+namespace {
+
+// Blocks as large as fit into an edge, per axis.
+Eigen::Vector3i block_of(const Volume<float>& ct_hu, double edge_mm) {
+  constexpr double kRounding = 1.01;
+  return (kRounding * edge_mm / ct_hu.spacing_mm().array()).cast<int>().max(1).min(ct_hu.size.array());
+}
+
+}  // namespace
+
+CoarserCt coarser_ct(const Volume<float>& ct_hu, const AttenuationModel& model, const Eigen::Vector3i& block) {
+  const bool windowed = model.kind == AttenuationModel::Kind::kWindowed;
+  const auto nothing_hu = static_cast<float>(windowed ? model.window_low_hu : -1000.0);
+  const auto most_hu = windowed ? static_cast<float>(model.window_high_hu) : std::numeric_limits<float>::max();
+  const auto attenuating_hu = [&](float hu) {
+    return hu < static_cast<float>(model.threshold_hu) ? nothing_hu : std::clamp(hu, nothing_hu, most_hu);
+  };
+
+  // Voxel 0 of the coarser lattice lies in the middle of the first block. The last blocks may reach beyond the CT.
+  Eigen::Affine3d fine_from_coarse = Eigen::Affine3d::Identity();
+  fine_from_coarse.linear() = block.cast<double>().asDiagonal();
+  fine_from_coarse.translation() = 0.5 * (block.array() - 1).cast<double>();
+  const Eigen::Vector3i size = (ct_hu.size.array() + block.array() - 1) / block.array();
+  CoarserCt coarser{.hu = Volume<float>(size, ct_hu.patient_from_voxel * fine_from_coarse), .model = model};
+  coarser.model.threshold_hu = nothing_hu;
+  tbb::parallel_for(0, size.z(), [&](int k) {
+    for (int j = 0; j < size.y(); ++j)
+      for (int i = 0; i < size.x(); ++i) {
+        float sum = 0.0F;
+        for (int z = 0; z < block.z(); ++z)
+          for (int y = 0; y < block.y(); ++y)
+            for (int x = 0; x < block.x(); ++x) {
+              const Eigen::Vector3i at(i * block.x() + x, j * block.y() + y, k * block.z() + z);
+              const bool inside = (at.array() < ct_hu.size.array()).all();
+              sum += inside ? attenuating_hu(ct_hu.at(at.x(), at.y(), at.z())) : nothing_hu;
+            }
+        coarser.hu.at(i, j, k) = sum / static_cast<float>(block.prod());
+      }
+  });
+  return coarser;
+}
+
+RendererPyramid::RendererPyramid(RendererKind kind, const Volume<float>& ct_hu, const AttenuationModel& model,
+                                 std::span<const Beam> beams, const RendererOptions& options) {
+  levels_.push_back(
+      {.edge_mm = ct_hu.spacing_mm().maxCoeff(), .renderer = make_renderer(kind, ct_hu, model, beams, options)});
+  Eigen::Vector3i last = Eigen::Vector3i::Ones();
+  for (const double edge_mm : {1.0, 2.0, 4.0}) {
+    const Eigen::Vector3i block = block_of(ct_hu, edge_mm);
+    if (block == last) continue;
+    last = block;
+    const CoarserCt coarser = coarser_ct(ct_hu, model, block);
+    levels_.push_back({.edge_mm = coarser.hu.spacing_mm().maxCoeff(),
+                       .renderer = make_renderer(kind, coarser.hu, coarser.model, beams, options)});
+  }
+}
+
+Renderer& RendererPyramid::with_voxels_up_to(double edge_mm) const {
+  const auto fits = [&](const Level& level) { return level.edge_mm <= 1.01 * edge_mm; };
+  const auto coarsest = std::find_if(levels_.rbegin(), levels_.rend(), fits);
+  return coarsest == levels_.rend() ? finest() : *coarsest->renderer;
+}
+
+}  // namespace isoshift

@@ -1,0 +1,16 @@
+#pragma once
+// What a search varies: the setup error about the isocenter in IEC 61217 fixed, as translation in mm and rotation
+// vector in mm on a sphere, so that all parameters move the anatomy alike. Three parameters are a translation only.
+
+#include <Eigen/Geometry>
+#include <span>
+#include <vector>
+
+namespace isoshift {
+
+// The sphere's radius.
+inline constexpr double kLeverMm = 100.0;
+
+Eigen::Isometry3d setup_error_from_parameters(std::span<const double> parameters);
+
+}  // namespace isoshift

@@ -1,0 +1,88 @@
+#include "registration/presets.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "geometry/error.h"
+#include "geometry/rotation.h"
+
+namespace isoshift {
+namespace {
+
+// Stochastic rank correlation captures from far and needs the fewest evaluations; gradient correlation ends precisely
+// (docs/evaluation.md).
+std::vector<Stage> setup_stages() {
+  return {{.name = "coarse",
+           .similarity = SimilarityKind::kStochasticRankCorrelation,
+           .pixel_mm = 5.0,
+           .voxel_mm = 4.0,
+           .candidates = 60,
+           .starts = 1,
+           .reach_mm = 20.0,
+           .reach_rad = rad_from_deg(8.0),
+           .initial_step_mm = 8.0,
+           .initial_step_rad = rad_from_deg(3.5),
+           .relative_tolerance = 0.02},
+          {.name = "medium",
+           .similarity = SimilarityKind::kStochasticRankCorrelation,
+           .pixel_mm = 2.5,
+           .voxel_mm = 2.0,
+           .pixel_fraction = 0.5,
+           .min_pixels = 3000,
+           .initial_step_mm = 1.5,
+           .initial_step_rad = rad_from_deg(0.9),
+           .relative_tolerance = 0.05},
+          // From three starts: do they agree?
+          {.name = "restarts",
+           .similarity = SimilarityKind::kGradientCorrelation,
+           .pixel_mm = 2.5,
+           .voxel_mm = 2.0,
+           .pixel_fraction = 0.5,
+           .min_pixels = 3000,
+           .candidates = 2,
+           .starts = 3,
+           .reach_mm = 2.0,
+           .reach_rad = rad_from_deg(1.5),
+           .initial_step_mm = 1.0,
+           .initial_step_rad = rad_from_deg(0.6),
+           .relative_tolerance = 0.05},
+          {.name = "fine",
+           .similarity = SimilarityKind::kGradientCorrelation,
+           .pixel_mm = 1.2,
+           .voxel_mm = 1.0,
+           .pixel_fraction = 0.4,
+           .min_pixels = 12000,
+           .initial_step_mm = 0.4,
+           .initial_step_rad = rad_from_deg(0.25),
+           .relative_tolerance = 0.015}};
+}
+
+std::vector<Stage> fast_stages() {
+  std::vector<Stage> stages = setup_stages();
+  std::erase_if(stages, [](const Stage& stage) { return stage.name == "restarts"; });
+  for (Stage& stage : stages) stage.candidates = 0;
+  return stages;
+}
+
+std::vector<Stage> paper_stages() {
+  return {{.name = "single",
+           .similarity = SimilarityKind::kStochasticRankCorrelation,
+           .optimizer = OptimizerKind::kNelderMead,
+           .pixel_mm = 1.0,
+           .pixel_fraction = 0.05,
+           .initial_step_mm = 8.0,
+           .initial_step_rad = rad_from_deg(3.0),
+           .relative_tolerance = 0.005,
+           .max_evaluations = 500}};
+}
+
+}  // namespace
+
+RegistrationOptions preset(std::string_view name) {
+  if (name == "setup") return {.preset = "setup", .stages = setup_stages()};
+  if (name == "fast") return {.preset = "fast", .stages = fast_stages(), .check_alternatives = false};
+  if (name == "paper") return {.preset = "paper", .stages = paper_stages(), .check_alternatives = false};
+  throw UsageError(fmt::format("there is no preset {}; the presets are {}", name, fmt::join(kPresets, ", ")));
+}
+
+}  // namespace isoshift

@@ -1,0 +1,28 @@
+#pragma once
+// How far the pose found may lie from the true one, from the images alone (docs/algorithms.md, "Uncertainty").
+//
+// Maximizing gradient correlation is least squares on gradients of unit norm: 2 (1 - GC) = |x - d(p)|^2. At the
+// optimum, with J the derivatives of d by the pose and r = x - d, the covariance is the sandwich H^-1 M H^-1 of
+// curvature H = J'J and scatter M = sum over tiles of s s', s = J'r of a tile (White 1980; Liang and Zeger 1986):
+// residuals may have any size and be alike within a tile, as those of anatomy, noise and scatter are.
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <optional>
+
+#include "registration/objective.h"
+
+namespace isoshift {
+
+// One standard deviation per axis, in the room: of where the isocenter's anatomy lies, and of the rotation vector.
+struct Uncertainty {
+  Eigen::Vector3d translation_mm = Eigen::Vector3d::Zero();
+  Eigen::Vector3d rotation_rad = Eigen::Vector3d::Zero();
+};
+
+// `objective` compares by gradient correlation. Nothing where the images do not determine the pose (a singular
+// curvature). With `translation_only`, rotations are taken as known and get 0.
+std::optional<Uncertainty> estimated_uncertainty(Objective& objective, const Eigen::Isometry3d& room_from_patient,
+                                                 bool translation_only);
+
+}  // namespace isoshift

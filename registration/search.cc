@@ -1,0 +1,135 @@
+#include "registration/search.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <numeric>
+#include <random>
+
+#include "registration/objective.h"
+#include "registration/pose_parameters.h"
+
+namespace isoshift {
+namespace {
+
+using Parameters = std::vector<double>;
+
+// The largest reduction that keeps pixels at the isocenter within the stage's size, and enough of them in a small
+// field.
+int reduction(const FixedImage& image, double pixel_mm) {
+  constexpr double kMinFieldPixels = 900.0;
+  const auto field_pixels = static_cast<double>(std::ranges::count_if(image.field.pixels, std::identity()));
+  return std::max(
+      1, static_cast<int>(std::min(pixel_mm * pixels_per_mm(image.view), std::sqrt(field_pixels / kMinFieldPixels))));
+}
+
+double bound_of(std::size_t axis, const SearchOptions& options) {
+  return axis < 3 ? options.bound_mm : options.bound_rad * kLeverMm;
+}
+
+OptimizerOptions optimizer_options(const Stage& stage, const SearchOptions& options, const Parameters& start) {
+  OptimizerOptions from_start{.kind = stage.optimizer,
+                              .start = start,
+                              .relative_tolerance = stage.relative_tolerance,
+                              .max_evaluations = stage.max_evaluations};
+  for (std::size_t axis = 0; axis < start.size(); ++axis) {
+    from_start.lower.push_back(-bound_of(axis, options));
+    from_start.upper.push_back(bound_of(axis, options));
+    from_start.initial_step.push_back(axis < 3 ? stage.initial_step_mm : stage.initial_step_rad * kLeverMm);
+  }
+  return from_start;
+}
+
+// Where a stage begins: where the last one ended and, drawn around it, its candidates.
+std::vector<Parameters> candidates_of(const Stage& stage, const SearchOptions& options, const Parameters& last,
+                                      std::mt19937_64& random) {
+  std::vector<Parameters> candidates = {last};
+  std::uniform_real_distribution<double> uniform(-1.0, 1.0);
+  for (int n = 0; n < stage.candidates; ++n) {
+    Parameters candidate = last;
+    for (std::size_t axis = 0; axis < candidate.size(); ++axis) {
+      const double reach = axis < 3 ? stage.reach_mm : stage.reach_rad * kLeverMm;
+      const double bound = bound_of(axis, options);
+      candidate[axis] = std::clamp(candidate[axis] + reach * uniform(random), -bound, bound);
+    }
+    candidates.push_back(candidate);
+  }
+  return candidates;
+}
+
+// The best `count` of them, if there are more.
+std::vector<Parameters> best_of(std::vector<Parameters> candidates, std::size_t count, const BatchObjective& objective,
+                                int& evaluations) {
+  if (candidates.size() <= count) return candidates;
+  const std::vector<double> values = objective(candidates);
+  evaluations += static_cast<int>(values.size());
+  std::vector<std::size_t> order(candidates.size());
+  std::iota(order.begin(), order.end(), 0);
+  std::ranges::stable_sort(order, std::greater(), [&](std::size_t n) { return values[n]; });
+  std::vector<Parameters> best;
+  for (std::size_t n = 0; n < count; ++n) best.push_back(candidates[order[n]]);
+  return best;
+}
+
+void report_spread(const std::vector<OptimizerResult>& found, const OptimizerResult& best, StageReport& report) {
+  if (found.size() < 2) return;
+  const Eigen::Isometry3d of_best = setup_error_from_parameters(best.best);
+  report.spread_mm = report.spread_rad = 0.0;
+  for (const OptimizerResult& other : found) {
+    const Eigen::Isometry3d setup_error = setup_error_from_parameters(other.best);
+    report.spread_mm = std::max(*report.spread_mm, (setup_error.translation() - of_best.translation()).norm());
+    report.spread_rad =
+        std::max(*report.spread_rad, Eigen::AngleAxisd(setup_error.linear() * of_best.linear().transpose()).angle());
+  }
+}
+
+}  // namespace
+
+FixedImage at_pixel_size(const FixedImage& image, double pixel_mm) {
+  return reduced(image, reduction(image, pixel_mm));
+}
+
+SearchResult search(const RendererPyramid& renderers, std::span<const FixedImage> images,
+                    const Eigen::Isometry3d& planned_room_from_patient, const SearchOptions& options,
+                    const SearchProgress& progress) {
+  SearchResult result{.parameters = Parameters(options.dof == Dof::kRigid ? 6 : 3, 0.0)};
+  std::mt19937_64 random(options.seed);
+  for (const Stage& stage : options.stages) {
+    const auto begin = std::chrono::steady_clock::now();
+    std::vector<FixedImage> level;
+    for (const FixedImage& image : images) level.push_back(at_pixel_size(image, stage.pixel_mm));
+    Objective objective(renderers.with_voxels_up_to(stage.voxel_mm), level,
+                        {.similarity = stage.similarity,
+                         .pixel_fraction = stage.pixel_fraction,
+                         .min_pixels = static_cast<std::size_t>(stage.min_pixels),
+                         .seed = options.seed});
+    const BatchObjective similarity_at = [&](std::span<const Parameters> points) {
+      std::vector<Eigen::Isometry3d> poses;
+      for (const Parameters& point : points)
+        poses.push_back(setup_error_from_parameters(point) * planned_room_from_patient);
+      return objective.values(poses);
+    };
+
+    StageReport report{.name = stage.name, .similarity = std::string(to_string(stage.similarity))};
+    std::vector<OptimizerOptions> searches;
+    for (const Parameters& start : best_of(candidates_of(stage, options, result.parameters, random),
+                                           static_cast<std::size_t>(stage.starts), similarity_at, report.evaluations))
+      searches.push_back(optimizer_options(stage, options, start));
+    const std::vector<OptimizerResult> found = maximize(similarity_at, searches);
+    const OptimizerResult& best = *std::ranges::max_element(found, {}, &OptimizerResult::value);
+    result.parameters = best.best;
+    for (const OptimizerResult& of_start : found) report.evaluations += of_start.evaluations;
+    report.value = best.value;
+    report.termination = best.termination;
+    report.reached_limit = best.evaluations >= stage.max_evaluations;
+    report_spread(found, best, report);
+    report.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+    result.stages.push_back(report);
+    result.seconds_rendering += objective.seconds().rendering;
+    result.seconds_similarity += objective.seconds().similarity;
+    if (progress) progress(static_cast<double>(result.stages.size()) / static_cast<double>(options.stages.size()));
+  }
+  return result;
+}
+
+}  // namespace isoshift

@@ -1,0 +1,78 @@
+#pragma once
+// The search for the pose at which DRRs match the X-rays, in stages from coarse to fine.
+
+#include <Eigen/Geometry>
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "drr/renderer_pyramid.h"
+#include "registration/optimizer.h"
+#include "registration/preprocess/preprocess.h"
+#include "registration/similarity/similarity.h"
+
+namespace isoshift {
+
+enum class Dof { kRigid, kTranslation };
+
+// One stage. It begins where the one before ended, and around it at `candidates` poses drawn within `reach`: all are
+// evaluated, and the best `starts` of them searched from, in step.
+struct Stage {
+  std::string name;
+  SimilarityKind similarity = SimilarityKind::kNcc;
+  OptimizerKind optimizer = OptimizerKind::kBobyqa;
+  double pixel_mm = 4.0;        // the stage's pixels, at the isocenter: the image is reduced to at least this size
+  double voxel_mm = 0.0;        // the CT is reduced to voxels up to this edge; 0: not at all
+  double pixel_fraction = 1.0;  // share of the field's pixels compared
+  int min_pixels = 1000;        // of every view, if the field has them
+  int candidates = 0;
+  int starts = 1;
+  double reach_mm = 0.0;             // candidates are drawn in a box of this half width
+  double reach_rad = 0.0;            // the same for the rotations
+  double initial_step_mm = 5.0;      // first trust-region radius of the translations
+  double initial_step_rad = 0.05;    // the same for the rotations
+  double relative_tolerance = 0.01;  // stop when steps fall below this share of the initial ones
+  int max_evaluations = 200;         // per start; one evaluation renders every view once
+};
+
+struct SearchOptions {
+  std::span<const Stage> stages;
+  Dof dof = Dof::kRigid;
+  double bound_mm = 50.0;   // the search box
+  double bound_rad = 0.35;  // the same for rotations
+  std::uint64_t seed = 1;
+};
+
+struct StageReport {
+  std::string name;
+  std::string similarity;
+  int evaluations = 0;
+  double seconds = 0.0;
+  double value = 0.0;  // the similarity reached
+  std::string termination = "not run";
+  bool reached_limit = false;  // the evaluations ran out before the search converged
+  // Between the poses that the starts ended at, where there were several: the largest distance from the best one.
+  std::optional<double> spread_mm, spread_rad;
+};
+
+// Progress of a search: the share done, from 0 to 1, an estimate.
+using SearchProgress = std::function<void(double share)>;
+
+struct SearchResult {
+  std::vector<double> parameters;  // PoseParameters: of the setup error on top of `planned_room_from_patient`
+  std::vector<StageReport> stages;
+  double seconds_rendering = 0.0, seconds_similarity = 0.0;
+};
+
+SearchResult search(const RendererPyramid& renderers, std::span<const FixedImage> images,
+                    const Eigen::Isometry3d& planned_room_from_patient, const SearchOptions& options,
+                    const SearchProgress& progress = {});
+
+// The image as a stage compares it: reduced as far as the pixel size allows, but to no fewer pixels than a small field
+// needs.
+FixedImage at_pixel_size(const FixedImage& image, double pixel_mm);
+
+}  // namespace isoshift
