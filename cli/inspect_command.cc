@@ -90,6 +90,25 @@ std::string describe_plan(const std::filesystem::path& path) {
   return text + "\n";
 }
 
+std::string describe_structures(const std::filesystem::path& path) {
+  try {
+    const RtStructures read = read_rt_structures(path);
+    std::string text = fmt::format("RT Structure Set \"{}\", {}\n", read.label, path.string());
+    for (const Structure& structure : read.structures)
+      text += line(fmt::format("structure {} \"{}\"", structure.number, structure.name),
+                   fmt::format("{}, {} closed contours{}",
+                               structure.interpreted_type.empty() ? "type missing" : structure.interpreted_type,
+                               structure.contours.size(),
+                               structure.ignored_contours == 0
+                                   ? ""
+                                   : fmt::format(", {} that {} nothing", structure.ignored_contours,
+                                                 structure.ignored_contours == 1 ? "encloses" : "enclose")));
+    return text + "\n";
+  } catch (const Error& error) {
+    return fmt::format("RT Structure Set, {}\n", path.string()) + line("REFUSED", error.what()) + "\n";
+  }
+}
+
 std::string describe_ct(const std::string& series_uid, const std::vector<std::filesystem::path>& files,
                         Console& console) {
   std::string text = fmt::format("CT series {}\n", series_uid) +
@@ -124,8 +143,7 @@ void run_inspect(const std::vector<std::filesystem::path>& paths, Console& conso
   }
   for (const StudyFiles::Ct& ct : files.cts) console.out << describe_ct(ct.series_instance_uid, ct.files, console);
   for (const StudyFiles::Image& image : files.images) console.out << describe_rt_image(image.file, planned_position);
-  for (const auto& structures : files.structures)
-    console.out << fmt::format("RT Structure Set, {}\n\n", structures.file.string());
+  for (const auto& structures : files.structures) console.out << describe_structures(structures.file);
   for (const std::string& file : files.left_aside) console.out << "left aside: " << file << "\n";
   for (const std::string& reason : files.unreadable) console.out << "unreadable: " << reason << "\n";
   if (!files.unreadable.empty())

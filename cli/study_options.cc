@@ -55,6 +55,7 @@ StudyRequest StudyOptions::request() const {
     throw UsageError("which study? Name its folder, or its parts with --ct and --image");
   request.parts = {.study = study, .ct = ct, .images = images, .plan = std::nullopt};
   if (!plan.empty()) request.parts.plan = plan;
+  if (!structures.empty()) request.parts.structures = structures;
   if (!isocenter.empty()) request.isocenter_patient_mm = Eigen::Vector3d(isocenter.data());
   for (const std::string& text : gantry_angles) {
     const auto [label, angle] = key_and_value(text, "--gantry-angle");
@@ -86,6 +87,11 @@ void add_study_options(CLI::App& command, StudyOptions& options) {
       ->type_name("PATH")
       ->group(parts);
   command.add_option("--plan", options.plan, "RT Plan")->type_name("FILE")->group(parts);
+  command
+      .add_option("--structures", options.structures,
+                  "RT Structure Set; else the one that the plan refers to, else the only one drawn on the CT")
+      ->type_name("FILE")
+      ->group(parts);
 
   const char* lacking = "What the files lack (never guessed; each use is written into the result)";
   command.add_option("--isocenter", options.isocenter, "Planned isocenter in patient coordinates of the CT, mm")

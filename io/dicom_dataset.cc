@@ -141,8 +141,11 @@ std::vector<DicomItem> DicomItem::items(const DcmTagKey& sequence_tag) const {
   DcmSequenceOfItems* sequence = nullptr;
   if (item_->findAndGetSequence(sequence_tag, sequence).bad() || sequence == nullptr) return {};
   std::vector<DicomItem> items;
-  for (unsigned long n = 0; n < sequence->card(); ++n)
-    items.emplace_back(*sequence->getItem(n), fmt::format("{}: {} item {}", where_, described(sequence_tag), n + 1));
+  items.reserve(sequence->card());
+  // From one item to the next: getItem(n) counts from the first, which takes half a minute for 200 000 contours.
+  const std::string prefix = fmt::format("{}: {} item ", where_, described(sequence_tag));
+  for (DcmObject* item = sequence->nextInContainer(nullptr); item != nullptr; item = sequence->nextInContainer(item))
+    items.emplace_back(static_cast<DcmItem&>(*item), fmt::format("{}{}", prefix, items.size() + 1));
   return items;
 }
 

@@ -66,6 +66,7 @@ std::vector<Finding> patient_findings(const Study& study) {
     differ(&Identity::patient_birth_date, DCM_PatientBirthDate, true);
   };
   if (study.plan) compare(study.plan->identity, study.plan->path.string());
+  if (study.structures) compare(study.structures->identity, study.structures->path.string());
   for (const RtImage& image : study.rt_images) compare(image.identity, image.path.string());
   return findings;
 }
@@ -101,6 +102,25 @@ std::vector<Finding> plan_findings(const Study& study, Notes& notes) {
                                       *image.plan_sop_instance_uid, plan.sop_instance_uid)});
   }
   return findings;
+}
+
+// What is drawn in another frame of reference would lie anywhere on the CT.
+std::vector<Finding> structure_findings(const Study& study, Notes& notes) {
+  std::vector<std::string> unknown, elsewhere;
+  if (study.structures)
+    for (const Structure& structure : study.structures->structures) {
+      if (!structure.frame_of_reference_uid)
+        unknown.push_back(fmt::format("\"{}\"", structure.name));
+      else if (*structure.frame_of_reference_uid != study.ct.frame_of_reference_uid)
+        elsewhere.push_back(fmt::format("\"{}\"", structure.name));
+    }
+  if (!unknown.empty())
+    notes.warnings.push_back(fmt::format("structures {} have no {}; taken as that of the CT", fmt::join(unknown, ", "),
+                                         described(DCM_ReferencedFrameOfReferenceUID)));
+  if (elsewhere.empty()) return {};
+  return {{"for-mismatch", fmt::format("{}: {} of {} is not that of the CT, so they do not apply to it",
+                                       study.structures->path.string(), described(DCM_ReferencedFrameOfReferenceUID),
+                                       fmt::join(elsewhere, ", "))}};
 }
 
 // The views must be of one moment and one table position. Each is compared with the first view that says; one that does
@@ -247,6 +267,7 @@ Study load_study(const StudyRequest& request, Notes& notes, const Progress& prog
   Study study;
   notes.left_aside = parts.left_aside;
   if (parts.plan) study.plan = read_rt_plan(*parts.plan);
+  if (parts.structures) study.structures = read_rt_structures(*parts.structures);
   for (const std::filesystem::path& path : parts.images) study.rt_images.push_back(read_rt_image_header(path));
   drop_repeated_images(study.rt_images, notes);
   check_labels(request.switches, study.rt_images);
@@ -279,6 +300,7 @@ Study load_study(const StudyRequest& request, Notes& notes, const Progress& prog
   study.ct = read_ct_series(parts.ct, request.allowed, notes, progress);
   findings = patient_findings(study);
   std::ranges::move(plan_findings(study, notes), std::back_inserter(findings));
+  std::ranges::move(structure_findings(study, notes), std::back_inserter(findings));
   std::ranges::move(session_findings(study, notes), std::back_inserter(findings));
   settle(findings, request.allowed, notes);
   check_one_patient_position(study);

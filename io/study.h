@@ -10,6 +10,7 @@
 #include "io/notes.h"
 #include "io/rt_image.h"
 #include "io/rt_plan.h"
+#include "io/rt_structures.h"
 #include "io/study_files.h"
 
 namespace isoshift {
@@ -25,6 +26,7 @@ struct StudyRequest {
 struct Study {
   CtSeries ct;
   std::optional<RtPlan> plan;
+  std::optional<RtStructures> structures;
   std::vector<RtImage> rt_images;  // headers with switches applied, in order of acquisition
   std::vector<XrayImage> xrays;    // the same images, ready for registration
   PatientPosition patient_position = PatientPosition::kHfs;

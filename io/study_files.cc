@@ -46,6 +46,14 @@ std::set<std::string> drawn_on(const DicomItem& structures) {
   return series_uids;
 }
 
+// The frames of reference of the structures: every one has its own (PS3.3 C.8.8.5).
+std::set<std::string> drawn_in(const DicomItem& structures) {
+  std::set<std::string> frame_uids;
+  for (const DicomItem& roi : structures.items(DCM_StructureSetROISequence))
+    if (const auto uid = roi.text(DCM_ReferencedFrameOfReferenceUID)) frame_uids.insert(*uid);
+  return frame_uids;
+}
+
 void add_ct_slice(const fs::path& path, const DicomItem& dataset, StudyFiles& files) {
   const auto type = dataset.texts(DCM_ImageType);
   if (type.size() > 2 && type[2] == "LOCALIZER") {
@@ -82,7 +90,8 @@ void add(const fs::path& path, StudyFiles& files) {
   } else if (sop_class == UID_RTStructureSetStorage) {
     files.structures.push_back({.file = path,
                                 .sop_instance_uid = dataset.required_text(DCM_SOPInstanceUID),
-                                .ct_series_uids = drawn_on(dataset)});
+                                .ct_series_uids = drawn_on(dataset),
+                                .frame_of_reference_uids = drawn_in(dataset)});
   } else {
     files.left_aside.push_back(
         fmt::format("{}: {}", path.string(), dcmFindNameOfUID(sop_class.c_str(), "an object of unknown class")));
@@ -140,6 +149,59 @@ const StudyFiles::Ct& choose_ct(const StudyFiles& files, const StudyFiles::Plan*
                           list));
 }
 
+// Whether a structure set was drawn on the CT. One that names no images may have been, if it is in the CT's frame.
+bool is_drawn_on(const StudyFiles::Ct& ct, const StudyFiles::Structures& structures) {
+  return structures.ct_series_uids.empty() ? structures.frame_of_reference_uids.contains(ct.frame_of_reference_uid)
+                                           : structures.ct_series_uids.contains(ct.series_instance_uid);
+}
+
+// The structure set that the plan refers to, else all drawn on the CT; copies of one count once.
+std::vector<const StudyFiles::Structures*> candidates_of(const std::vector<StudyFiles::Structures>& all,
+                                                         const StudyFiles::Plan* plan, const StudyFiles::Ct& ct) {
+  std::vector<const StudyFiles::Structures*> candidates;
+  const auto add_where = [&](auto&& is_candidate) {
+    for (const StudyFiles::Structures& structures : all)
+      if (is_candidate(structures) && std::ranges::none_of(candidates, [&](const auto* earlier) {
+            return earlier->sop_instance_uid == structures.sop_instance_uid;
+          }))
+        candidates.push_back(&structures);
+  };
+  if (plan != nullptr)
+    add_where([&](const auto& structures) { return structures.sop_instance_uid == plan->structure_set_uid; });
+  if (candidates.empty()) add_where([&](const auto& structures) { return is_drawn_on(ct, structures); });
+  return candidates;
+}
+
+void choose_structures(const std::vector<StudyFiles::Structures>& all, const StudyFiles::Plan* plan,
+                       const StudyFiles::Ct& ct, StudyParts& parts) {
+  const auto candidates = candidates_of(all, plan, ct);
+  if (candidates.size() == 1) parts.structures = candidates.front()->file;
+  for (const StudyFiles::Structures& structures : all) {
+    if (structures.file == parts.structures) continue;
+    std::string reason = "an RT Structure Set that was not drawn on the CT";
+    if (candidates.size() == 1 && structures.sop_instance_uid == candidates.front()->sop_instance_uid)
+      reason = fmt::format("the same RT Structure Set as {}", parts.structures->string());
+    else if (candidates.size() == 1 && is_drawn_on(ct, structures))
+      reason = "an RT Structure Set that the plan does not refer to";
+    else if (is_drawn_on(ct, structures))
+      reason = fmt::format("one of {} RT Structure Sets drawn on the CT; name the one meant: --structures FILE",
+                           candidates.size());
+    parts.left_aside.push_back(fmt::format("{}: {}", structures.file.string(), reason));
+  }
+}
+
+// A structure set that a person named; those found in the folder are others.
+void take_named_structures(const fs::path& named, const std::vector<StudyFiles::Structures>& found, StudyParts& parts) {
+  const std::vector<StudyFiles::Structures> structures = scan_readable({named}).structures;
+  if (structures.size() != 1)
+    throw Error(fmt::format("{}: holds {} RT Structure Sets, expected one.\n       Name the file: --structures FILE",
+                            named.string(), structures.empty() ? "no" : fmt::format("{}", structures.size())));
+  parts.structures = structures.front().file;
+  for (const StudyFiles::Structures& other : found)
+    if (other.sop_instance_uid != structures.front().sop_instance_uid)
+      parts.left_aside.push_back(fmt::format("{}: an RT Structure Set that was not named", other.file.string()));
+}
+
 }  // namespace
 
 StudyFiles scan_study(const std::vector<fs::path>& paths) {
@@ -189,6 +251,10 @@ StudyParts find_parts(const NamedParts& named) {
   for (const StudyFiles::Plan& other : other_plans)
     parts.left_aside.push_back(fmt::format("{}: an RT Plan that {}", other.file.string(),
                                            named.plan ? "was not named" : "no X-ray refers to"));
+  if (named.structures)
+    take_named_structures(*named.structures, files.structures, parts);
+  else
+    choose_structures(files.structures, plan, ct, parts);
   // An image of another plan that lies here too belongs to that one; an image of an unknown plan is a matter for
   // checks.
   for (const StudyFiles::Image& image : files.images) {

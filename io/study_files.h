@@ -30,7 +30,8 @@ struct StudyFiles {
   struct Structures {
     std::filesystem::path file;
     std::string sop_instance_uid;
-    std::set<std::string> ct_series_uids;  // of the images it was drawn on
+    std::set<std::string> ct_series_uids;           // of the images it was drawn on
+    std::set<std::string> frame_of_reference_uids;  // of its structures
   };
 
   std::vector<Ct> cts;
@@ -50,6 +51,7 @@ struct StudyParts {
   std::vector<std::filesystem::path> ct;
   std::vector<std::filesystem::path> images;
   std::optional<std::filesystem::path> plan;
+  std::optional<std::filesystem::path> structures;
   std::vector<std::string> left_aside;
 };
 
@@ -59,11 +61,13 @@ struct NamedParts {
   std::vector<std::filesystem::path> ct;
   std::vector<std::filesystem::path> images;
   std::optional<std::filesystem::path> plan;
+  std::optional<std::filesystem::path> structures;
 };
 
 // The plan that the images refer to, the CT in whose frame of reference (and, of several, on whose structure set) it
-// was made, and the images of that plan. All else is left aside, with the reason. Throws Error where something is
-// absent or the files do not tell which of several is meant.
+// was made, the images of that plan, and the structure set that the plan refers to, else the only one drawn on that CT.
+// All else is left aside, with the reason. Throws Error where CT or images are absent or the files do not tell which of
+// several is meant; nobody has to tell that of structure sets, unless they are wanted.
 StudyParts find_parts(const NamedParts& named);
 
 }  // namespace isoshift

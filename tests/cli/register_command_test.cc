@@ -149,6 +149,8 @@ TEST_F(RegisterCommandTest, InspectSaysWhatIsThereAndWhatIsMissing) {
     d.put(DCM_RTImagePosition, "");
   });
   std::ofstream(study_.path() / "notes.txt") << "not DICOM";
+  const auto square = rectangle({0, 40, -400}, 20, 20);
+  draw(study_, {{"Spine", {square, square}}, {"Marker", {{{1, 2, 3}}}, "POINT"}});
   const CommandOutcome outcome = run_command({"inspect", study_.path().string()});
   EXPECT_EQ(outcome.exit_status, 0) << outcome.err;
   EXPECT_THAT(outcome.out, HasSubstr("RT Plan \"SETUP\""));
@@ -158,7 +160,21 @@ TEST_F(RegisterCommandTest, InspectSaysWhatIsThereAndWhatIsMissing) {
                                      "--rt-image-position X,Y or --assume-centered\n"
                                      "  MISSING                  RTImageSID (3002,0026); supplied by --sid MM\n"));
   EXPECT_THAT(outcome.out, HasSubstr("  source, IEC fixed        (1000.00, 0.00, 0.00) mm\n"));
+  EXPECT_THAT(outcome.out,
+              HasSubstr("RT Structure Set \"DRAWN\", " + study_.structures().string() +
+                        "\n"
+                        "  structure 1 \"Spine\"      ORGAN, 2 closed contours\n"
+                        "  structure 2 \"Marker\"     ORGAN, 0 closed contours, 1 that encloses nothing\n"));
   EXPECT_THAT(outcome.out, HasSubstr("notes.txt: not a DICOM file"));
+}
+
+TEST_F(RegisterCommandTest, InspectSaysWhyStructuresAreRefused) {
+  draw(study_, {{"Spine", {rectangle({0, 40, -400}, 20, 20)}}});
+  edit(study_.structures(), [](DicomItem d) { d.erase(DCM_StructureSetROISequence); });
+  const CommandOutcome outcome = run_command({"inspect", study_.structures().string()});
+  EXPECT_EQ(outcome.exit_status, 0) << outcome.err;
+  EXPECT_THAT(outcome.out, HasSubstr("  REFUSED                  " + study_.structures().string() +
+                                     ": ROIContourSequence (3006,0039) item 1: ReferencedROINumber (3006,0084) is 1"));
 }
 
 }  // namespace

@@ -113,6 +113,51 @@ TEST_F(StudyFilesTest, OfSeveralCtsInOneFrameTheStructureSetDecides) {
   EXPECT_THAT(find().ct.front().string(), HasSubstr("/other/CT/"));
 }
 
+TEST_F(StudyFilesTest, TakesTheOnlyStructureSetDrawnOnTheCt) {
+  EXPECT_EQ(find().structures, std::nullopt);
+  draw(study_, {{"Spine", {}}});
+  EXPECT_EQ(find().structures, study_.structures());
+  // Drawn on other images, although in the same frame of reference.
+  edit(study_.structures(), [](DicomItem d) {
+    d.append_item(DCM_ReferencedFrameOfReferenceSequence)
+        .append_item(DCM_RTReferencedStudySequence)
+        .append_item(DCM_RTReferencedSeriesSequence)
+        .put(DCM_SeriesInstanceUID, "1.2.3");
+  });
+  const StudyParts parts = find();
+  EXPECT_EQ(parts.structures, std::nullopt);
+  EXPECT_THAT(parts.left_aside,
+              Contains(study_.structures().string() + ": an RT Structure Set that was not drawn on the CT"));
+}
+
+TEST_F(StudyFilesTest, OfSeveralStructureSetsThePlanOrAPersonDecides) {
+  draw(study_, {{"Spine", {}}});
+  const std::filesystem::path second = study_.path() / "RTSTRUCT2.dcm", copy = study_.path() / "copy.dcm";
+  std::filesystem::copy(study_.structures(), second);
+  edit(second, [](DicomItem d) { d.put(DCM_SOPInstanceUID, "1.2.3.5"); });
+  StudyParts parts = find();
+  EXPECT_EQ(parts.structures, std::nullopt);
+  for (const std::filesystem::path& file : {study_.structures(), second})
+    EXPECT_THAT(parts.left_aside, Contains(file.string() + ": one of 2 RT Structure Sets drawn on the CT; name the one "
+                                                           "meant: --structures FILE"));
+
+  NamedParts named;
+  named.structures = study_.structures();
+  parts = find(named);
+  EXPECT_EQ(parts.structures, study_.structures());
+  EXPECT_THAT(parts.left_aside, Contains(second.string() + ": an RT Structure Set that was not named"));
+
+  edit(study_.plan(), [](DicomItem d) {
+    d.append_item(DCM_ReferencedStructureSetSequence).put(DCM_ReferencedSOPInstanceUID, "1.2.3.5");
+  });
+  std::filesystem::copy(second, copy);
+  parts = find();
+  EXPECT_EQ(parts.structures, second);
+  EXPECT_THAT(parts.left_aside,
+              Contains(study_.structures().string() + ": an RT Structure Set that the plan does not refer to"));
+  EXPECT_THAT(parts.left_aside, Contains(copy.string() + ": the same RT Structure Set as " + second.string()));
+}
+
 TEST_F(StudyFilesTest, ACtInNoPlansFrameIsRefused) {
   add("other", 2);
   std::filesystem::remove(study_.path() / "other" / "RTPLAN.dcm");
@@ -135,6 +180,11 @@ TEST_F(StudyFilesTest, WhatWasNamedIsWhatTheMessageNames) {
             "no RT Image found (searched " + study_.truth().string() + ").\n       Name the X-rays: --image FILE");
   EXPECT_EQ(error_of_finding({.study = {}, .ct = {}, .images = {}, .plan = study_.truth()}),
             study_.truth().string() + ": holds no RT Plan");
+  NamedParts named;
+  named.structures = study_.plan();
+  EXPECT_EQ(error_of_finding(named), study_.plan().string() +
+                                         ": holds no RT Structure Sets, expected one.\n       Name the file: "
+                                         "--structures FILE");
 }
 
 }  // namespace

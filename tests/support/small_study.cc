@@ -1,6 +1,9 @@
 #include "tests/support/small_study.h"
 
+#include <dcmtk/dcmdata/dcuid.h>
 #include <fmt/format.h>
+
+#include "io/rt_plan.h"
 
 namespace isoshift {
 
@@ -24,6 +27,45 @@ std::filesystem::path SmallStudy::ct_slice(int k) const { return path() / "CT" /
 
 std::filesystem::path SmallStudy::image(int n) const {
   return path() / "RTIMAGE" / (n == 0 ? "KV_G000.dcm" : "KV_G090.dcm");
+}
+
+void draw(const SmallStudy& study, const std::vector<DrawnStructure>& structures) {
+  const RtPlan plan = read_rt_plan(study.plan());
+  DicomFile file;
+  DicomItem dataset = file.dataset();
+  put_identity(dataset, plan.identity);
+  dataset.put(DCM_SOPClassUID, UID_RTStructureSetStorage);
+  dataset.put(DCM_SOPInstanceUID, "1.2.3.4");
+  dataset.put(DCM_Modality, "RTSTRUCT");
+  dataset.put(DCM_SeriesInstanceUID, "1.2.3");
+  dataset.put(DCM_StructureSetLabel, "DRAWN");
+  for (std::size_t n = 0; n < structures.size(); ++n) {
+    const double number = static_cast<double>(n + 1);
+    DicomItem roi = dataset.append_item(DCM_StructureSetROISequence);
+    roi.put(DCM_ROINumber, number);
+    roi.put(DCM_ROIName, structures[n].name);
+    roi.put(DCM_ReferencedFrameOfReferenceUID, plan.frame_of_reference_uid.value());
+    DicomItem drawn = dataset.append_item(DCM_ROIContourSequence);
+    drawn.put(DCM_ReferencedROINumber, number);
+    for (const auto& points_mm : structures[n].contours) {
+      DicomItem contour = drawn.append_item(DCM_ContourSequence);
+      contour.put(DCM_ContourGeometricType, structures[n].geometric_type);
+      contour.put(DCM_NumberOfContourPoints, static_cast<double>(points_mm.size()));
+      contour.put(DCM_ContourData, std::span(points_mm.front().data(), 3 * points_mm.size()));
+    }
+    DicomItem observation = dataset.append_item(DCM_RTROIObservationsSequence);
+    observation.put(DCM_ObservationNumber, number);
+    observation.put(DCM_ReferencedROINumber, number);
+    observation.put(DCM_RTROIInterpretedType, "ORGAN");
+  }
+  file.write(study.structures());
+}
+
+std::vector<Eigen::Vector3d> rectangle(const Eigen::Vector3d& center_mm, double width_mm, double height_mm) {
+  std::vector<Eigen::Vector3d> corners;
+  for (const auto& [x, y] : {std::pair(-0.5, -0.5), {0.5, -0.5}, {0.5, 0.5}, {-0.5, 0.5}})
+    corners.push_back(center_mm + Eigen::Vector3d(x * width_mm, y * height_mm, 0));
+  return corners;
 }
 
 CommandOutcome register_study(const SmallStudy& study, const std::vector<std::string>& more) {

@@ -1,7 +1,10 @@
 #pragma once
 // A phantom study small enough to be made, broken and read in every test.
 
+#include <Eigen/Core>
 #include <functional>
+#include <string>
+#include <vector>
 
 #include "io/dicom_dataset.h"
 #include "phantom/study_writer.h"
@@ -23,11 +26,25 @@ class SmallStudy {
   std::filesystem::path ct_slice(int k) const;
   std::filesystem::path image(int n) const;  // 0: gantry 0, 1: gantry 90
   std::filesystem::path plan() const { return path() / "RTPLAN.dcm"; }
+  std::filesystem::path structures() const { return path() / "RTSTRUCT.dcm"; }  // there once drawn: draw()
   std::filesystem::path truth() const { return path() / "truth.json"; }
 
  private:
   TemporaryFolder folder_;
 };
+
+// A structure as a planning system would write it.
+struct DrawnStructure {
+  std::string name;
+  std::vector<std::vector<Eigen::Vector3d>> contours;  // patient mm
+  std::string geometric_type = "CLOSED_PLANAR";
+};
+
+// Writes the study's structure set, of its patient and in its frame of reference: numbered from 1, all of type ORGAN.
+void draw(const SmallStudy& study, const std::vector<DrawnStructure>& structures);
+
+// A rectangle around `center_mm` in the plane of its z.
+std::vector<Eigen::Vector3d> rectangle(const Eigen::Vector3d& center_mm, double width_mm, double height_mm);
 
 // isoshift register STUDY -o OUTPUT, with more arguments.
 CommandOutcome register_study(const SmallStudy& study, const std::vector<std::string>& more = {});

@@ -1,0 +1,14 @@
+#pragma once
+// Regions of a volume: 1 inside, 0 outside.
+
+#include <cstdint>
+
+#include "geometry/volume.h"
+
+namespace isoshift {
+
+// All voxels whose center lies at most `margin_mm` from the center of a voxel of `mask`: exact on every lattice,
+// sheared ones too. Throws UsageError for a margin that is negative or not finite.
+Volume<std::uint8_t> dilated(const Volume<std::uint8_t>& mask, double margin_mm);
+
+}  // namespace isoshift
