@@ -22,12 +22,13 @@ constexpr int kPixels = 512;
 constexpr std::array kGantryAnglesDeg = {0.0, 90.0};
 
 struct Patient {
+  bool is_head = true;
   std::vector<Shape> shapes;
   Eigen::Isometry3d setup_error;
   std::vector<XrayImage> xrays;
 };
 
-// Every second one a spine, lying off plan by up to 8 mm and 3 degrees per axis.
+// Every fourth one a spine, lying off plan by up to 8 mm and 3 degrees per axis.
 Patient make_patient(std::uint64_t seed) {
   std::mt19937_64 random(seed);
   std::uniform_real_distribution<double> within(-1.0, 1.0);
@@ -35,8 +36,9 @@ Patient make_patient(std::uint64_t seed) {
   Placement placement;
   placement.translation_mm = 8.0 * vector();
   placement.rotation_deg = 3.0 * vector();
-  Patient patient{.shapes = seed % 2 == 0 ? head_phantom(Eigen::Vector3d::Zero(), seed)
-                                          : spine_phantom(Eigen::Vector3d::Zero(), seed)};
+  Patient patient{.is_head = seed % 4 != 0, .setup_error = Eigen::Isometry3d::Identity()};
+  patient.shapes =
+      patient.is_head ? head_phantom(Eigen::Vector3d::Zero(), seed) : spine_phantom(Eigen::Vector3d::Zero(), seed);
   patient.setup_error.linear() = placement.rotation();
   patient.setup_error.translation() = placement.translation_mm;
   for (const double gantry_deg : kGantryAnglesDeg) {
@@ -50,7 +52,7 @@ Patient make_patient(std::uint64_t seed) {
 }
 
 Volume<float> ct_of(const Patient& patient) {
-  const Eigen::Vector3i size(200, 230, 150);
+  const Eigen::Vector3i size = patient.is_head ? Eigen::Vector3i(190, 230, 144) : Eigen::Vector3i(320, 220, 120);
   const Eigen::Vector3d spacing_mm(1.0, 1.0, 1.5);
   Eigen::Affine3d patient_from_voxel = Eigen::Affine3d::Identity();
   patient_from_voxel.linear() = spacing_mm.asDiagonal();
@@ -106,7 +108,8 @@ int check(int patient_count) {
     int all = 0, accepted = 0;
   };
   std::map<std::string, Count> counts;
-  fmt::print("ct,xrays,case,verdict,mtre_mm,ncc,as_is,best_alternative,disagreeing,with_signal,seconds,reasons\n");
+  fmt::print(
+      "ct,xrays,case,verdict,mtre_mm,ncc,as_is,best_alternative,disagreeing,with_signal,seconds,err_sigma,reasons\n");
   const auto one = [&](const RendererPyramid& renderers, int ct, int of, const std::string& what,
                        const std::vector<XrayImage>& xrays) {
     const RegistrationResult result = register_views(renderers, xrays, planned, preset("setup"));
@@ -117,15 +120,26 @@ int check(int patient_count) {
       disagreeing += view.consistency.disagreeing();
       with_signal += view.consistency.with_signal();
     }
-    for (const Alternative& alternative : result.alternatives->alternatives)
-      best = std::max(best, alternative.similarity);
-    std::string reasons;
+    double as_is = 0.0;
+    for (const Alternative& alternative : result.alternatives)
+      if (alternative.similarity > best) {
+        best = alternative.similarity;
+        as_is = alternative.as_is;
+      }
+    std::string errors, reasons;
+    const Eigen::Isometry3d error = found * patients[static_cast<std::size_t>(of)].setup_error.inverse();
+    const Eigen::AngleAxisd turn(error.linear());
+    for (int axis = 0; axis < 3 && result.uncertainty; ++axis)
+      errors += fmt::format("{:.3f}/{:.3f} ", error.translation()[axis], result.uncertainty->translation_mm[axis]);
+    for (int axis = 0; axis < 3 && result.uncertainty; ++axis)
+      errors += fmt::format("{:.3f}/{:.3f} ", deg_from_rad(turn.angle() * turn.axis()[axis]),
+                            deg_from_rad(result.uncertainty->rotation_rad[axis]));
     for (const std::string& reason : result.reasons) reasons += reason + "; ";
-    fmt::print("{},{},{},{},{:.2f},{:.3f},{:.3f},{:.3f},{:.0f},{:.0f},{:.2f},\"{}\"\n", ct, of, what,
+    fmt::print("{},{},{},{},{:.2f},{:.3f},{:.3f},{:.3f},{:.0f},{:.0f},{:.2f},{},\"{}\"\n", ct, of, what,
                to_string(result.verdict),
                mean_target_registration_error_mm(found, patients[static_cast<std::size_t>(of)].setup_error,
                                                  standard_targets_mm()),
-               ncc, result.alternatives->similarity, best, disagreeing, with_signal, result.seconds, reasons);
+               ncc, as_is, best, disagreeing, with_signal, result.seconds, errors, reasons);
     std::fflush(stdout);
     Count& count = counts[what];
     ++count.all;

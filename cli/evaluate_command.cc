@@ -11,6 +11,7 @@
 
 #include "cli/commands.h"
 #include "cli/evaluation_files.h"
+#include "cli/region_switches.h"
 #include "cli/rendering_options.h"
 #include "cli/search_switches.h"
 #include "cli/study_options.h"
@@ -31,6 +32,7 @@ struct EvaluateOptions {
   StudyOptions study;
   RenderingOptions rendering;
   SearchSwitches search;
+  RegionSwitches region;
   std::string series = "bins";
   std::optional<int> starts;
   std::optional<double> distance_mm;
@@ -69,6 +71,10 @@ Json configuration_of(const EvaluateOptions& options, const Study& study, const 
           {"threshold_hu", options.rendering.threshold_hu},
           {"preset", options.search.preset},
           {"dof", options.search.dof},
+          {"structures", options.region.structures},
+          {"excluded", options.region.excluded},
+          {"around_isocenter_mm", options.region.around_isocenter_mm.value_or(0.0)},
+          {"margin_mm", options.region.margin_mm},
           {"seed", options.search.seed},
           {"series", options.series},
           {"start_seed", protocol.seed},
@@ -121,9 +127,9 @@ EvaluatedRun evaluated(int number, const StartPose& start, const Eigen::Isometry
 
 // Runs what is missing, several at a time, each on one thread; alone, one uses all. What it finds does not depend on
 // that.
-void run_missing(EvaluationFolder& folder, const EvaluateOptions& options, const Study& study,
-                 const RendererPyramid& renderers, const Eigen::Isometry3d& truth, const std::vector<StartPose>& starts,
-                 int jobs, ProgressBar& bar) {
+void run_missing(EvaluationFolder& folder, const Study& study, const RendererPyramid& renderers,
+                 const RegistrationOptions& registration, const Eigen::Isometry3d& truth,
+                 const std::vector<StartPose>& starts, int jobs, ProgressBar& bar) {
   std::vector<int> missing;
   for (int number = 0; number < static_cast<int>(starts.size()); ++number)
     if (!folder.has(number)) missing.push_back(number);
@@ -134,7 +140,7 @@ void run_missing(EvaluationFolder& folder, const EvaluateOptions& options, const
     for (std::size_t n = next++; n < missing.size(); n = next++) try {
         const int number = missing[n];
         const Eigen::Isometry3d start = starts[number].setup_error * study.planned_room_from_patient;
-        const RegistrationResult result = register_views(renderers, study.xrays, start, options.search.registration());
+        const RegistrationResult result = register_views(renderers, study.xrays, start, registration);
         const std::lock_guard lock(mutex);
         folder.append(evaluated(number, starts[number], truth, study, result));
         bar.update(folder.runs().size(), starts.size());
@@ -180,12 +186,15 @@ int run_evaluate(const EvaluateOptions& options, Console& console) {
   Notes notes;
   options.rendering.check();
   const Study study = load(options.study, notes, console);
-  const RendererPyramid renderers(options.rendering.kind(), study.ct.hu, options.rendering.model(), beams_of(study),
-                                  options.rendering.options());
+  const RegionOfStudy region = region_of(options.region, study, options.rendering.threshold_hu);
+  const RendererPyramid renderers(options.rendering.kind(), region.rendered_ct, options.rendering.model(),
+                                  beams_of(study), options.rendering.options());
+  RegistrationOptions registration = options.search.registration();
+  registration.region = &region.projected;
   EvaluationFolder folder(options.output, configuration_of(options, study, renderers.finest(), truth, protocol));
   {
     ProgressBar bar(console, "Evaluating");
-    run_missing(folder, options, study, renderers, truth, start_poses(truth, protocol), jobs, bar);
+    run_missing(folder, study, renderers, registration, truth, start_poses(truth, protocol), jobs, bar);
   }
   folder.write_summary();
   for (const std::string& warning : notes.warnings) console.err << "warning: " << warning << "\n";
@@ -225,6 +234,7 @@ void add_evaluate_command(CLI::App& app, Console& console, int& exit_status) {
       ->check(CLI::PositiveNumber);
   command->add_option("--table", options->table, "Print a table of evaluations made earlier")->type_name("FOLDER...");
   add_search_switches(*command, options->search);
+  add_region_switches(*command, options->region);
   add_rendering_options(*command, options->rendering);
   command->callback([options, &console, &exit_status] { exit_status = run_evaluate(*options, console); });
 }

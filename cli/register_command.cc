@@ -91,11 +91,9 @@ SetupReport make_report(const RegisterOptions& options, const Study& study, cons
   if (result.uncertainty)
     report.sigma = {.translation_mm = result.uncertainty->translation_mm,
                     .rotation_deg = result.uncertainty->rotation_rad.unaryExpr(&deg_from_rad)};
-  if (result.alternatives) {
-    report.similarity_as_is = result.alternatives->similarity;
-    for (const Alternative& alternative : result.alternatives->alternatives)
-      report.alternatives.push_back({.description = alternative.description, .similarity = alternative.similarity});
-  }
+  for (const Alternative& alternative : result.alternatives)
+    report.alternatives.push_back(
+        {.description = alternative.description, .similarity = alternative.similarity, .as_is = alternative.as_is});
   report.preset = options.search.preset;
   report.seed = options.search.seed;
   report.attenuation = options.rendering.attenuation;
@@ -155,13 +153,16 @@ int run_register(const RegisterOptions& options, Console& console) {
   Notes notes;
   options.rendering.check();
   const Study study = load(options.study, notes, console);
-  const RendererPyramid renderers(options.rendering.kind(), study.ct.hu, options.rendering.model(), beams_of(study),
-                                  options.rendering.options());
+  const RegionOfStudy region = region_of(options.region, study, options.rendering.threshold_hu);
+  const RendererPyramid renderers(options.rendering.kind(), region.rendered_ct, options.rendering.model(),
+                                  beams_of(study), options.rendering.options());
+  RegistrationOptions registration = options.search.registration();
+  registration.region = &region.projected;
   const double seconds_load = total.seconds();
   RegistrationResult result;
   {
     ProgressBar bar(console, "Registering");
-    result = register_views(renderers, study.xrays, study.planned_room_from_patient, options.search.registration(),
+    result = register_views(renderers, study.xrays, study.planned_room_from_patient, registration,
                             [&](double share) { bar.update(share); });
   }
 
@@ -207,6 +208,7 @@ void add_register_command(CLI::App& app, Console& console, int& exit_status) {
   command->add_flag("--overwrite", options->overwrite, "Replace an earlier output in that folder");
   command->add_flag("--json", options->json, "Print result.json instead of the report");
   add_search_switches(*command, options->search);
+  add_region_switches(*command, options->region);
   add_rendering_options(*command, options->rendering);
   command->callback([options, &console, &exit_status] { exit_status = run_register(*options, console); });
 }

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "cli/console.h"
+#include "cli/region_switches.h"
 #include "cli/rendering_options.h"
 #include "cli/search_switches.h"
 #include "cli/study_options.h"
@@ -16,6 +17,7 @@ struct RegisterOptions {
   StudyOptions study;
   RenderingOptions rendering;
   SearchSwitches search;
+  RegionSwitches region;
   std::filesystem::path output;
   std::filesystem::path truth;  // empty: unknown
   bool overwrite = false;

@@ -4,7 +4,7 @@
 
 #include <algorithm>
 #include <chrono>
-#include <map>
+#include <functional>
 #include <numeric>
 #include <random>
 
@@ -27,38 +27,53 @@ std::vector<std::uint32_t> comparable_pixels(const Image<std::uint8_t>& field, S
   return pixels;
 }
 
-// A share of the pixels, drawn once. Gradients need their neighbors rendered, too: they are drawn in square patches,
-// which share them.
-constexpr std::uint32_t kPatchEdge = 8;
+std::size_t wanted_pixels(std::size_t available, const ObjectiveOptions& options) {
+  const auto share = static_cast<std::size_t>(options.pixel_fraction * static_cast<double>(available));
+  return std::min(available, std::max({kMinPixels, options.min_pixels, share}));
+}
 
-std::vector<std::uint32_t> drawn_pixels(const std::vector<std::uint32_t>& pixels, int columns,
-                                        const ObjectiveOptions& options, std::mt19937_64& random) {
-  const auto wanted =
-      std::max(kMinPixels, static_cast<std::size_t>(options.pixel_fraction * static_cast<double>(pixels.size())));
-  if (wanted >= pixels.size()) return pixels;
+std::vector<std::uint32_t> drawn_pixels(const std::vector<std::uint32_t>& pixels, const ObjectiveOptions& options,
+                                        std::mt19937_64& random) {
   std::vector<std::uint32_t> drawn;
-  if (options.similarity != SimilarityKind::kGradientCorrelation) {
-    std::ranges::sample(pixels, std::back_inserter(drawn), static_cast<std::ptrdiff_t>(wanted), random);
-    return drawn;
-  }
-  const auto width = static_cast<std::uint32_t>(columns);
-  const auto patch_of = [width](std::uint32_t pixel) {
-    return std::pair(pixel / width / kPatchEdge, pixel % width / kPatchEdge);
-  };
-  std::map<std::pair<std::uint32_t, std::uint32_t>, std::vector<std::uint32_t>> patches;
-  for (const std::uint32_t pixel : pixels) patches[patch_of(pixel)].push_back(pixel);
-  std::vector<std::pair<std::uint32_t, std::uint32_t>> order;
-  for (const auto& [patch, members] : patches) order.push_back(patch);
-  std::ranges::shuffle(order, random);
-  for (std::size_t n = 0; drawn.size() < wanted; ++n)
-    drawn.insert(drawn.end(), patches[order[n]].begin(), patches[order[n]].end());
-  std::ranges::sort(drawn);
+  std::ranges::sample(pixels, std::back_inserter(drawn),
+                      static_cast<std::ptrdiff_t>(wanted_pixels(pixels.size(), options)), random);
   return drawn;
+}
+
+// Gradients need their neighbors rendered, too: pixels are taken in square patches, which share them, and those with
+// the strongest gradients of the DRR first. Where it has none, there is only noise to compare.
+std::vector<std::uint32_t> strongest_pixels(const std::vector<std::uint32_t>& pixels, const Image<float>& drr,
+                                            const ObjectiveOptions& options) {
+  constexpr int kPatchEdge = 8;
+  struct Patch {
+    double strength = 0.0;
+    std::vector<std::uint32_t> pixels;
+  };
+  const int patches_per_row = drr.columns / kPatchEdge + 1;
+  std::vector<Patch> patches(static_cast<std::size_t>(patches_per_row) * (drr.rows / kPatchEdge + 1));
+  for (const std::uint32_t pixel : pixels) {
+    const int column = static_cast<int>(pixel) % drr.columns, row = static_cast<int>(pixel) / drr.columns;
+    Patch& patch = patches[static_cast<std::size_t>(row / kPatchEdge * patches_per_row + column / kPatchEdge)];
+    const float along_row = drr.at(column + 1, row) - drr.at(column - 1, row);
+    const float along_column = drr.at(column, row + 1) - drr.at(column, row - 1);
+    patch.strength += along_row * along_row + along_column * along_column;
+    patch.pixels.push_back(pixel);
+  }
+  std::ranges::stable_sort(patches, std::greater(), &Patch::strength);
+  const std::size_t wanted = wanted_pixels(pixels.size(), options);
+  std::vector<std::uint32_t> strongest;
+  for (const Patch& patch : patches) {
+    if (strongest.size() >= wanted) break;
+    strongest.insert(strongest.end(), patch.pixels.begin(), patch.pixels.end());
+  }
+  std::ranges::sort(strongest);
+  return strongest;
 }
 
 }  // namespace
 
-Objective::Objective(Renderer& renderer, std::span<const FixedImage> images, const ObjectiveOptions& options)
+Objective::Objective(Renderer& renderer, std::span<const FixedImage> images, const Eigen::Isometry3d& about,
+                     const ObjectiveOptions& options)
     : renderer_(renderer), similarity_(options.similarity) {
   std::mt19937_64 random(options.seed);
   for (const FixedImage& image : images) {
@@ -66,7 +81,12 @@ Objective::Objective(Renderer& renderer, std::span<const FixedImage> images, con
     if (field.size() < kMinPixels)
       throw Error(fmt::format("view {}: only {} of {} pixels lie in the irradiated field, too few to compare",
                               views_.size() + 1, field.size(), image.field.pixels.size()));
-    add_view(image, drawn_pixels(field, image.field.columns, options, random));
+    if (similarity_ != SimilarityKind::kGradientCorrelation) {
+      add_view(image, drawn_pixels(field, options, random));
+      continue;
+    }
+    const RenderResult drr = renderer.render(std::span(&image.view, 1), std::span(&about, 1), PixelSet::all());
+    add_view(image, strongest_pixels(field, image_of(image.view, drr.line_integrals(0, 0)), options));
   }
 }
 

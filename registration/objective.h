@@ -14,15 +14,17 @@ namespace isoshift {
 
 struct ObjectiveOptions {
   SimilarityKind similarity = SimilarityKind::kNcc;
-  double pixel_fraction = 1.0;    // share of the field's pixels that are compared: single ones, for gradients patches
+  double pixel_fraction = 1.0;  // share of the field's pixels that are compared: drawn, or for gradients the strongest
   std::size_t min_pixels = 1000;  // of every view, if its field has them
-  std::uint64_t seed = 1;         // draws them, once
+  std::uint64_t seed = 1;         // draws them
 };
 
 class Objective {
  public:
   // Compares inside each image's field. Borrows the renderer. Throws Error for a field of fewer than 100 pixels.
-  Objective(Renderer& renderer, std::span<const FixedImage> images, const ObjectiveOptions& options);
+  // `about` is near the poses to come: gradients are compared where they are strong there.
+  Objective(Renderer& renderer, std::span<const FixedImage> images, const Eigen::Isometry3d& about,
+            const ObjectiveOptions& options);
 
   // Similarity per view. Result [pose][view].
   std::vector<std::vector<double>> per_view(std::span<const Eigen::Isometry3d> room_from_patient);

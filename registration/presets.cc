@@ -51,7 +51,7 @@ std::vector<Stage> setup_stages() {
            .pixel_mm = 1.2,
            .voxel_mm = 1.0,
            .pixel_fraction = 0.4,
-           .min_pixels = 12000,
+           .min_pixels = 8000,
            .initial_step_mm = 0.4,
            .initial_step_rad = rad_from_deg(0.25),
            .relative_tolerance = 0.015}};

@@ -14,32 +14,27 @@ namespace isoshift {
 namespace {
 
 // Before anything is searched: the CT must appear in every view as planned.
-void require_visible(const RendererPyramid& renderers, std::span<const XrayImage> xrays,
-                     std::span<const FixedImage> images, const Eigen::Isometry3d& planned) {
+void require_visible(const RendererPyramid& renderers, std::span<const XrayImage> xrays, const FixedViews& views,
+                     const Eigen::Isometry3d& planned) {
   constexpr double kPixelMm = 5.0;
+  const std::vector<FixedImage> images = views.reduced_to(kPixelMm, planned, 0.0);
   for (std::size_t n = 0; n < images.size(); ++n) {
-    const XrayView view = at_pixel_size(images[n], kPixelMm).view;
-    const RenderResult drr =
-        renderers.with_voxels_up_to(kPixelMm).render(std::span(&view, 1), std::span(&planned, 1), PixelSet::all());
+    const RenderResult drr = renderers.with_voxels_up_to(kPixelMm).render(std::span(&images[n].view, 1),
+                                                                          std::span(&planned, 1), PixelSet::all());
     require_not_empty(drr.line_integrals(0, 0), xrays[n].label);
   }
 }
 
-std::vector<FixedImage> level_of(std::span<const FixedImage> images, double pixel_mm) {
-  std::vector<FixedImage> level;
-  for (const FixedImage& image : images) level.push_back(at_pixel_size(image, pixel_mm));
-  return level;
-}
-
 // Similarity before and after, and whether the parts of each view agree.
-void report_views(const RendererPyramid& renderers, std::span<const FixedImage> images, const Eigen::Isometry3d& start,
+void report_views(const RendererPyramid& renderers, const FixedViews& views, const Eigen::Isometry3d& start,
                   const Stage& last_stage, RegistrationResult& result) {
-  Objective ncc(renderers.with_voxels_up_to(last_stage.voxel_mm), level_of(images, 2.0 * last_stage.pixel_mm),
-                {.similarity = SimilarityKind::kNcc});
-  const std::array poses = {start, result.actual_room_from_patient};
+  const Eigen::Isometry3d& found = result.actual_room_from_patient;
+  Objective ncc(renderers.with_voxels_up_to(last_stage.voxel_mm),
+                views.reduced_to(2.0 * last_stage.pixel_mm, found, 0.0), found, {.similarity = SimilarityKind::kNcc});
+  const std::array poses = {start, found};
   const auto similarity = ncc.per_view(poses);
-  std::vector<ViewConsistency> consistency = regional_consistency(renderers, images, result.actual_room_from_patient);
-  for (std::size_t view = 0; view < images.size(); ++view)
+  std::vector<ViewConsistency> consistency = regional_consistency(renderers, views, found);
+  for (std::size_t view = 0; view < consistency.size(); ++view)
     result.views.push_back({.similarity_start = similarity[0][view],
                             .similarity_final = similarity[1][view],
                             .consistency = std::move(consistency[view])});
@@ -63,16 +58,17 @@ RegistrationResult register_views(const RendererPyramid& renderers, std::span<co
                                   const SearchProgress& progress) {
   options.check();
   const auto begin = std::chrono::steady_clock::now();
-  std::vector<FixedImage> images;
-  for (const XrayImage& xray : xrays) images.push_back(prepare(xray));
-  require_visible(renderers, xrays, images, start_room_from_patient);
+  const ProjectedRegion everything;
+  FixedViews fixed{.images = {}, .region = options.region != nullptr ? *options.region : everything};
+  for (const XrayImage& xray : xrays) fixed.images.push_back(prepare(xray));
+  require_visible(renderers, xrays, fixed, start_room_from_patient);
 
   const SearchOptions search_options{.stages = options.stages,
                                      .dof = options.dof,
                                      .bound_mm = options.bound_mm,
                                      .bound_rad = options.bound_rad,
                                      .seed = options.seed};
-  const SearchResult found = search(renderers, images, start_room_from_patient, search_options, progress);
+  const SearchResult found = search(renderers, fixed, start_room_from_patient, search_options, progress);
   RegistrationResult result{
       .renderer = renderers.finest().kind(),
       .actual_room_from_patient = setup_error_from_parameters(found.parameters) * start_room_from_patient,
@@ -80,8 +76,10 @@ RegistrationResult register_views(const RendererPyramid& renderers, std::span<co
       .seconds_rendering = found.seconds_rendering,
       .seconds_similarity = found.seconds_similarity};
   const Stage& last = options.stages.back();
-  report_views(renderers, images, start_room_from_patient, last, result);
-  Objective gradient_correlation(renderers.with_voxels_up_to(last.voxel_mm), level_of(images, last.pixel_mm),
+  report_views(renderers, fixed, start_room_from_patient, last, result);
+  Objective gradient_correlation(renderers.with_voxels_up_to(last.voxel_mm),
+                                 fixed.reduced_to(last.pixel_mm, result.actual_room_from_patient, 0.0),
+                                 result.actual_room_from_patient,
                                  {.similarity = SimilarityKind::kGradientCorrelation,
                                   .pixel_fraction = last.pixel_fraction,
                                   .min_pixels = static_cast<std::size_t>(last.min_pixels),
@@ -89,7 +87,7 @@ RegistrationResult register_views(const RendererPyramid& renderers, std::span<co
   result.uncertainty =
       estimated_uncertainty(gradient_correlation, result.actual_room_from_patient, options.dof == Dof::kTranslation);
   if (options.check_alternatives)
-    result.alternatives = compare_alternatives(renderers, images, start_room_from_patient, search_options);
+    result.alternatives = compare_alternatives(renderers, fixed, start_room_from_patient, search_options);
 
   std::vector<XrayView> views;
   for (const XrayImage& xray : xrays) views.push_back(xray.view);

@@ -30,6 +30,7 @@ struct RegistrationOptions {
   double bound_rad = 0.35;  // the same for rotations, about 20 degrees
   std::uint64_t seed = 1;   // the only source of randomness: same seed, same pose
   bool check_alternatives = true;
+  const ProjectedRegion* region = nullptr;  // borrowed; what of the views is compared. nullptr: all
 
   // Throws UsageError naming the field and its value.
   void check() const;
@@ -51,7 +52,7 @@ struct RegistrationResult {
   std::optional<Uncertainty> uncertainty;          // nothing: the images do not determine the pose
   std::vector<ViewReport> views;
   std::vector<StageReport> stages;
-  std::optional<AlternativesReport> alternatives;                           // unless the preset leaves them out
+  std::vector<Alternative> alternatives;                                    // empty: the preset leaves them out
   double seconds = 0.0, seconds_rendering = 0.0, seconds_similarity = 0.0;  // in all, and of that in the search
 
   int evaluations() const;

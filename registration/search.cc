@@ -85,20 +85,27 @@ void report_spread(const std::vector<OptimizerResult>& found, const OptimizerRes
 
 }  // namespace
 
-FixedImage at_pixel_size(const FixedImage& image, double pixel_mm) {
-  return reduced(image, reduction(image, pixel_mm));
+std::vector<FixedImage> FixedViews::reduced_to(double pixel_mm, const Eigen::Isometry3d& room_from_patient,
+                                               double slack_mm) const {
+  std::vector<FixedImage> level;
+  for (const FixedImage& image : images) {
+    level.push_back(reduced(image, reduction(image, pixel_mm)));
+    region.restrict(level.back(), room_from_patient, slack_mm);
+  }
+  return level;
 }
 
-SearchResult search(const RendererPyramid& renderers, std::span<const FixedImage> images,
-                    const Eigen::Isometry3d& planned_room_from_patient, const SearchOptions& options,
+SearchResult search(const RendererPyramid& renderers, const FixedViews& views,
+                    const Eigen::Isometry3d& start_room_from_patient, const SearchOptions& options,
                     const SearchProgress& progress) {
-  SearchResult result{.parameters = Parameters(options.dof == Dof::kRigid ? 6 : 3, 0.0)};
+  SearchResult result{.parameters = options.parameters};
+  if (result.parameters.empty()) result.parameters.resize(options.dof == Dof::kRigid ? 6 : 3, 0.0);
   std::mt19937_64 random(options.seed);
   for (const Stage& stage : options.stages) {
     const auto begin = std::chrono::steady_clock::now();
-    std::vector<FixedImage> level;
-    for (const FixedImage& image : images) level.push_back(at_pixel_size(image, stage.pixel_mm));
-    Objective objective(renderers.with_voxels_up_to(stage.voxel_mm), level,
+    const Eigen::Isometry3d about = setup_error_from_parameters(result.parameters) * start_room_from_patient;
+    const std::vector<FixedImage> level = views.reduced_to(stage.pixel_mm, about, stage.initial_step_mm);
+    Objective objective(renderers.with_voxels_up_to(stage.voxel_mm), level, about,
                         {.similarity = stage.similarity,
                          .pixel_fraction = stage.pixel_fraction,
                          .min_pixels = static_cast<std::size_t>(stage.min_pixels),
@@ -106,7 +113,7 @@ SearchResult search(const RendererPyramid& renderers, std::span<const FixedImage
     const BatchObjective similarity_at = [&](std::span<const Parameters> points) {
       std::vector<Eigen::Isometry3d> poses;
       for (const Parameters& point : points)
-        poses.push_back(setup_error_from_parameters(point) * planned_room_from_patient);
+        poses.push_back(setup_error_from_parameters(point) * start_room_from_patient);
       return objective.values(poses);
     };
 

@@ -12,6 +12,7 @@
 #include "drr/renderer_pyramid.h"
 #include "registration/optimizer.h"
 #include "registration/preprocess/preprocess.h"
+#include "registration/region.h"
 #include "registration/similarity/similarity.h"
 
 namespace isoshift {
@@ -44,6 +45,7 @@ struct SearchOptions {
   double bound_mm = 50.0;   // the search box
   double bound_rad = 0.35;  // the same for rotations
   std::uint64_t seed = 1;
+  std::vector<double> parameters;  // where to begin; empty: at no setup error
 };
 
 struct StageReport {
@@ -62,17 +64,24 @@ struct StageReport {
 using SearchProgress = std::function<void(double share)>;
 
 struct SearchResult {
-  std::vector<double> parameters;  // PoseParameters: of the setup error on top of `planned_room_from_patient`
+  std::vector<double> parameters;  // PoseParameters: of the setup error on top of the start
   std::vector<StageReport> stages;
   double seconds_rendering = 0.0, seconds_similarity = 0.0;
 };
 
-SearchResult search(const RendererPyramid& renderers, std::span<const FixedImage> images,
-                    const Eigen::Isometry3d& planned_room_from_patient, const SearchOptions& options,
-                    const SearchProgress& progress = {});
+// The X-rays and what of them is compared.
+struct FixedViews {
+  std::vector<FixedImage> images;
+  const ProjectedRegion& region;
 
-// The image as a stage compares it: reduced as far as the pixel size allows, but to no fewer pixels than a small field
-// needs.
-FixedImage at_pixel_size(const FixedImage& image, double pixel_mm);
+  // As a stage compares them: reduced as far as the pixel size allows, but to no fewer pixels than a small field needs,
+  // and restricted to the region with the patient at a pose known to within `slack_mm`.
+  std::vector<FixedImage> reduced_to(double pixel_mm, const Eigen::Isometry3d& room_from_patient,
+                                     double slack_mm) const;
+};
+
+SearchResult search(const RendererPyramid& renderers, const FixedViews& views,
+                    const Eigen::Isometry3d& start_room_from_patient, const SearchOptions& options,
+                    const SearchProgress& progress = {});
 
 }  // namespace isoshift

@@ -73,11 +73,12 @@ Json stage_json(const SetupReport::Stage& stage) {
 }
 
 Json alternatives_json(const SetupReport& report) {
-  if (!report.similarity_as_is) return nullptr;
   Json list = Json::array();
   for (const SetupReport::Alternative& alternative : report.alternatives)
-    list.push_back({{"description", alternative.description}, {"similarity", alternative.similarity}});
-  return {{"similarity_as_is", *report.similarity_as_is}, {"if", list}};
+    list.push_back({{"description", alternative.description},
+                    {"similarity", alternative.similarity},
+                    {"as_is", alternative.as_is}});
+  return list;
 }
 
 Json unobservable_json(const SetupReport& report) {

@@ -44,6 +44,7 @@ struct SetupReport {
   struct Alternative {
     std::string description;
     double similarity = 0.0;
+    double as_is = 0.0;
   };
 
   Verdict verdict = Verdict::kRejected;
@@ -61,7 +62,6 @@ struct SetupReport {
 
   std::vector<View> views;
   std::vector<Stage> stages;
-  std::optional<double> similarity_as_is;  // what alternatives compare with
   std::vector<Alternative> alternatives;
   std::string preset = "setup";
   std::uint64_t seed = 1;

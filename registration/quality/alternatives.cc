@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <optional>
 
 #include "geometry/rotation.h"
 
@@ -49,40 +50,77 @@ FixedImage turned(FixedImage image) {
   return image;
 }
 
+// A search for the images as something.
+struct Attempt {
+  std::string description;
+  FixedViews views;
+  SearchResult found;
+};
+
+// What a search does not explain. An alternative that leaves less than this many times as much as the images as they
+// are is looked at closely: blurred, a head is symmetric.
+double unexplained(const SearchResult& found) { return 1.0 - found.stages.back().value; }
+constexpr double kClose = 3.0;
+
+std::vector<Attempt> attempts_with(const FixedViews& views) {
+  std::vector<Attempt> attempts = {{.description = "as they are", .views = views}};
+  const auto with = [&](std::string description, std::size_t view, FixedImage image) {
+    attempts.push_back({.description = std::move(description), .views = views});
+    attempts.back().views.images[view] = std::move(image);
+  };
+  for (std::size_t view = 0; view < views.images.size(); ++view) {
+    with(fmt::format("view {} mirrored", view + 1), view, mirrored(views.images[view]));
+    with(fmt::format("view {} turned by 180 degrees", view + 1), view, turned(views.images[view]));
+  }
+  for (std::size_t view = 1; view < views.images.size(); ++view) {
+    const XrayView& first = views.images[0].view;
+    const XrayView& other = views.images[view].view;
+    if (first.columns != other.columns || first.rows != other.rows) continue;  // not exchanged unseen
+    attempts.push_back({.description = fmt::format("views 1 and {} exchanged", view + 1), .views = views});
+    std::swap(attempts.back().views.images[0].view, attempts.back().views.images[view].view);
+  }
+  return attempts;
+}
+
 }  // namespace
 
-AlternativesReport compare_alternatives(const RendererPyramid& renderers, std::span<const FixedImage> images,
-                                        const Eigen::Isometry3d& start_room_from_patient,
-                                        const SearchOptions& options) {
-  const std::vector<Stage> stages = short_stages();
+std::vector<Alternative> compare_alternatives(const RendererPyramid& renderers, const FixedViews& views,
+                                              const Eigen::Isometry3d& start_room_from_patient,
+                                              const SearchOptions& options) {
+  const std::vector<Stage> short_list = short_stages();
   SearchOptions short_search = options;
-  short_search.stages = stages;
-  // Small images suffice, and are quicker to reduce again.
-  std::vector<FixedImage> small;
-  for (const FixedImage& image : images) small.push_back(at_pixel_size(image, 1.0));
-  const auto reached = [&](const std::vector<FixedImage>& as) {
-    return search(renderers, as, start_room_from_patient, short_search).stages.back().value;
-  };
+  short_search.stages = short_list;
+  // The last stage to the end, and before it one from where the short ones leave off.
+  std::vector<Stage> long_list = {short_list.back(), options.stages.back()};
+  long_list.front().pixel_mm = 2.0 * options.stages.back().pixel_mm;
+  long_list.front().voxel_mm = 2.0 * options.stages.back().voxel_mm;
 
-  AlternativesReport report{.similarity = reached(small)};
-  const auto try_as = [&](std::string description, const std::vector<FixedImage>& as) {
-    report.alternatives.push_back({.description = std::move(description), .similarity = reached(as)});
+  std::vector<Attempt> attempts = attempts_with(views);
+  for (Attempt& attempt : attempts)
+    attempt.found = search(renderers, attempt.views, start_room_from_patient, short_search);
+  const auto is_close = [&](const Attempt& attempt) {
+    return unexplained(attempt.found) < kClose * unexplained(attempts.front().found);
   };
-  for (std::size_t view = 0; view < small.size(); ++view) {
-    std::vector<FixedImage> as = small;
-    as[view] = mirrored(small[view]);
-    try_as(fmt::format("view {} mirrored", view + 1), as);
-    as[view] = turned(small[view]);
-    try_as(fmt::format("view {} turned by 180 degrees", view + 1), as);
+  const auto closely = [&](const Attempt& attempt) {
+    SearchOptions long_search = options;
+    long_search.stages = long_list;
+    long_search.parameters = attempt.found.parameters;
+    return search(renderers, attempt.views, start_room_from_patient, long_search).stages.back().value;
+  };
+  std::optional<double> as_is_closely;
+  std::vector<Alternative> alternatives;
+  for (std::size_t n = 1; n < attempts.size(); ++n) {
+    Alternative alternative{.description = attempts[n].description,
+                            .similarity = attempts[n].found.stages.back().value,
+                            .as_is = attempts.front().found.stages.back().value};
+    if (is_close(attempts[n])) {
+      if (!as_is_closely) as_is_closely = closely(attempts.front());
+      alternative.as_is = *as_is_closely;
+      alternative.similarity = closely(attempts[n]);
+    }
+    alternatives.push_back(std::move(alternative));
   }
-  for (std::size_t view = 1; view < small.size(); ++view) {
-    std::vector<FixedImage> as = small;
-    std::swap(as[0].view, as[view].view);
-    // Images of different sizes cannot have been exchanged.
-    if (as[0].view.columns != small[0].view.columns || as[0].view.rows != small[0].view.rows) continue;
-    try_as(fmt::format("views 1 and {} exchanged", view + 1), as);
-  }
-  return report;
+  return alternatives;
 }
 
 }  // namespace isoshift

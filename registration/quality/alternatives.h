@@ -12,16 +12,14 @@ namespace isoshift {
 
 struct Alternative {
   std::string description;  // "view 1 mirrored"
-  double similarity = 0.0;  // what the search reaches with it
+  double similarity = 0.0;  // gradient correlation that the search reaches with it,
+  double as_is = 0.0;       // and in the same way with the images as they are
 };
 
-struct AlternativesReport {
-  double similarity = 0.0;  // of the images as they are, found in the same way
-  std::vector<Alternative> alternatives;
-};
-
-// Searches with short stages, each time from the start.
-AlternativesReport compare_alternatives(const RendererPyramid& renderers, std::span<const FixedImage> images,
-                                        const Eigen::Isometry3d& start_room_from_patient, const SearchOptions& options);
+// Searches with short stages, each time from the start; where an alternative comes close, with `options.stages` to the
+// end.
+std::vector<Alternative> compare_alternatives(const RendererPyramid& renderers, const FixedViews& views,
+                                              const Eigen::Isometry3d& start_room_from_patient,
+                                              const SearchOptions& options);
 
 }  // namespace isoshift

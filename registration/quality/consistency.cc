@@ -4,8 +4,6 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
-#include "registration/search.h"
-
 namespace isoshift {
 namespace {
 
@@ -65,12 +63,13 @@ int ViewConsistency::with_signal() const { return static_cast<int>(std::ranges::
 
 int ViewConsistency::disagreeing() const { return static_cast<int>(std::ranges::count_if(tiles, &Tile::disagrees)); }
 
-std::vector<ViewConsistency> regional_consistency(const RendererPyramid& renderers, std::span<const FixedImage> images,
+std::vector<ViewConsistency> regional_consistency(const RendererPyramid& renderers, const FixedViews& fixed,
                                                   const Eigen::Isometry3d& room_from_patient) {
   std::vector<ViewConsistency> views;
-  for (const FixedImage& image : images) {
-    const FixedImage level = at_pixel_size(image, kPixelMm);
-    const double factor = static_cast<double>(image.view.columns) / level.view.columns;
+  const std::vector<FixedImage> levels = fixed.reduced_to(kPixelMm, room_from_patient, 0.0);
+  for (std::size_t n = 0; n < levels.size(); ++n) {
+    const FixedImage& level = levels[n];
+    const double factor = static_cast<double>(fixed.images[n].view.columns) / level.view.columns;
     const double px_per_mm = pixels_per_mm(level.view);
     const RenderResult rendered = renderers.with_voxels_up_to(kPixelMm).render(
         std::span(&level.view, 1), std::span(&room_from_patient, 1), PixelSet::all());

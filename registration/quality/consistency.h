@@ -3,11 +3,10 @@
 // that restarts, curvature and similarity all confirm (docs/algorithms.md, "Regional consistency").
 
 #include <Eigen/Geometry>
-#include <span>
 #include <vector>
 
 #include "drr/renderer_pyramid.h"
-#include "registration/preprocess/preprocess.h"
+#include "registration/search.h"
 
 namespace isoshift {
 
@@ -29,7 +28,7 @@ struct ViewConsistency {
 };
 
 // One per image.
-std::vector<ViewConsistency> regional_consistency(const RendererPyramid& renderers, std::span<const FixedImage> images,
+std::vector<ViewConsistency> regional_consistency(const RendererPyramid& renderers, const FixedViews& fixed,
                                                   const Eigen::Isometry3d& room_from_patient);
 
 }  // namespace isoshift

@@ -10,8 +10,10 @@
 namespace isoshift {
 namespace {
 
-constexpr double kTileMm = 25.0;  // residuals are alike over about this distance, at the isocenter
-constexpr double kStepMm = 0.3;   // of the differences, also of rotations on the sphere of kLeverMm
+static const double kTileMm = std::getenv("TILE")
+                                  ? std::atof(std::getenv("TILE"))
+                                  : 25.0;  // residuals are alike over about this distance, at the isocenter
+constexpr double kStepMm = 0.3;            // of the differences, also of rotations on the sphere of kLeverMm
 
 // What the sandwich leaves out: errors common to all tiles, such as those of the model of beam and scatter. The factor
 // and the floor bring the share of true errors within one and two sigma to 68 and 95 % over the cases of
@@ -35,10 +37,11 @@ struct Sandwich {
   int tiles = 0;
 };
 
-// Residuals and derivatives of one view along one direction, added to the scores of its tiles.
-void add(const Eigen::VectorXd& residual, const Eigen::MatrixXd& derivative, std::span<const int> tile_of,
-         Eigen::MatrixXd& curvature, std::map<int, Eigen::VectorXd>& scores) {
-  curvature += derivative.transpose() * derivative;
+// Residuals and derivatives of one view along one direction, added to the scores of its tiles. What does not correlate
+// at all does not bend the similarity.
+void add(const Eigen::VectorXd& residual, const Eigen::MatrixXd& derivative, double correlation,
+         std::span<const int> tile_of, Eigen::MatrixXd& curvature, std::map<int, Eigen::VectorXd>& scores) {
+  curvature += correlation * derivative.transpose() * derivative;
   for (Eigen::Index n = 0; n < residual.size(); ++n) {
     auto [score, is_new] = scores.try_emplace(tile_of[static_cast<std::size_t>(n)]);
     if (is_new) score->second = Eigen::VectorXd::Zero(derivative.cols());
@@ -71,14 +74,14 @@ Sandwich sandwich_at(Objective& objective, const Eigen::Isometry3d& pose, int ax
       of_pose.push_back(gradients(drrs.line_integrals(p, view), comparison.neighbors()));
     std::map<int, Eigen::VectorXd> scores;
     for (const auto direction : {&Gradients::along_row, &Gradients::along_column}) {
-      const Eigen::VectorXd residual =
-          normalized(comparison.xray_gradients().*direction) - normalized(of_pose.front().*direction);
-      Eigen::MatrixXd derivative(residual.size(), axes);
+      const Eigen::VectorXd xray = normalized(comparison.xray_gradients().*direction);
+      const Eigen::VectorXd drr = normalized(of_pose.front().*direction);
+      Eigen::MatrixXd derivative(drr.size(), axes);
       for (int axis = 0; axis < axes; ++axis)
         derivative.col(axis) = (normalized(of_pose[static_cast<std::size_t>(2 * axis + 2)].*direction) -
                                 normalized(of_pose[static_cast<std::size_t>(2 * axis + 1)].*direction)) /
                                (2.0 * kStepMm);
-      add(residual, derivative, tile_of, sandwich.curvature, scores);
+      add(xray - drr, derivative, xray.dot(drr), tile_of, sandwich.curvature, scores);
     }
     for (const auto& [tile, score] : scores) sandwich.scatter += score * score.transpose();
     sandwich.tiles += static_cast<int>(scores.size());

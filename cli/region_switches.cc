@@ -1,0 +1,96 @@
+#include "cli/region_switches.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "geometry/error.h"
+#include "geometry/mask.h"
+#include "io/structure_mask.h"
+
+namespace isoshift {
+namespace {
+
+// Beyond the compared region the CT is rendered over this distance more, so that its cut surface is seen outside only.
+constexpr double kRenderedBeyondMm = 15.0;
+
+const Structure& structure_of(const Study& study, const std::string& name) {
+  if (!study.structures)
+    throw Error(fmt::format("structure {}: the study holds no RT Structure Set (--structures FILE names one)", name));
+  return structure_named(*study.structures, name);
+}
+
+Volume<std::uint8_t> mask_in_ct(const Study& study, const std::string& name) {
+  return mask_of(structure_of(study, name), study.ct.hu.size, study.ct.hu.patient_from_voxel);
+}
+
+void unite(Volume<std::uint8_t>& mask, const Volume<std::uint8_t>& other) {
+  std::ranges::transform(mask.voxels, other.voxels, mask.voxels.begin(), std::ranges::max);
+}
+
+Volume<std::uint8_t> sphere(const Study& study, double radius_mm) {
+  const Volume<float>& ct = study.ct.hu;
+  Volume<std::uint8_t> mask(ct.size, ct.patient_from_voxel);
+  for (int k = 0; k < ct.size.z(); ++k)
+    for (int j = 0; j < ct.size.y(); ++j)
+      for (int i = 0; i < ct.size.x(); ++i) {
+        const Eigen::Vector3d at_patient_mm = ct.patient_from_voxel * Eigen::Vector3d(i, j, k);
+        mask.at(i, j, k) = (at_patient_mm - study.isocenter_patient_mm).norm() <= radius_mm ? 1 : 0;
+      }
+  return mask;
+}
+
+}  // namespace
+
+RegionOfStudy region_of(const RegionSwitches& switches, const Study& study, double threshold_hu) {
+  if (switches.around_isocenter_mm && !(*switches.around_isocenter_mm > 0.0))
+    throw UsageError(fmt::format("--around-isocenter {}: expected more than 0 mm", *switches.around_isocenter_mm));
+  RegionOfInterest region;
+  RegionOfStudy result{.rendered_ct = study.ct.hu};
+  if (switches.around_isocenter_mm) region.volume = sphere(study, *switches.around_isocenter_mm);
+  for (const std::string& name : switches.structures) {
+    const Volume<std::uint8_t> mask = dilated(mask_in_ct(study, name), switches.margin_mm);
+    if (region.volume)
+      unite(*region.volume, mask);
+    else
+      region.volume = mask;
+  }
+  if (region.volume) result.rendered_ct = only_inside(result.rendered_ct, dilated(*region.volume, kRenderedBeyondMm));
+  region.left_out.push_back(beyond_the_ct(study.ct.hu, threshold_hu));
+  for (const std::string& name : switches.excluded) {
+    const Volume<std::uint8_t> mask = mask_in_ct(study, name);
+    result.rendered_ct = without(result.rendered_ct, mask);
+    // A couch lies behind everything: its pixels stay, only its voxels go.
+    if (structure_of(study, name).interpreted_type != "SUPPORT")
+      region.left_out.push_back(dilated(mask, switches.margin_mm));
+  }
+  result.projected = ProjectedRegion(region);
+  return result;
+}
+
+void add_region_switches(CLI::App& command, RegionSwitches& switches) {
+  const char* group = "Region of interest";
+  command
+      .add_option("--structure", switches.structures,
+                  "Register this structure of the RT Structure Set only (may be given more than once)")
+      ->type_name("NAME")
+      ->group(group);
+  command
+      .add_option("--around-isocenter", switches.around_isocenter_mm,
+                  "Register what lies within this distance of the isocenter only")
+      ->type_name("MM")
+      ->group(group);
+  command
+      .add_option("--exclude", switches.excluded,
+                  "Leave out a structure that moves on its own, such as the mandible, or the couch")
+      ->type_name("NAME")
+      ->group(group);
+  command.add_option("--margin", switches.margin_mm, "Around every structure, mm")
+      ->type_name("MM")
+      ->check(CLI::Range(0.0, 100.0))
+      ->capture_default_str()
+      ->group(group);
+}
+
+}  // namespace isoshift

@@ -1,0 +1,106 @@
+#include "registration/region.h"
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+
+#include "drr/renderer_pyramid.h"
+
+namespace isoshift {
+namespace {
+
+constexpr double kMaskVoxelMm = 2.0;  // masks are projected in voxels of this size
+constexpr float kInsideHu = 0.0F, kAirHu = -1000.0F;
+
+// A renderer for which the mask is water and all else nothing. It projects masks only: always on the CPU.
+std::unique_ptr<Renderer> renderer_of(const Volume<std::uint8_t>& mask) {
+  Volume<float> hu(mask.size, mask.patient_from_voxel);
+  std::ranges::transform(mask.voxels, hu.voxels.begin(), [](std::uint8_t in) { return in != 0 ? kInsideHu : kAirHu; });
+  const Eigen::Vector3i block = (kMaskVoxelMm / hu.spacing_mm().array()).cast<int>().max(1);
+  const CoarserCt coarser = coarser_ct(hu, {.threshold_hu = -500.0}, block);
+  return make_renderer(RendererKind::kCpu, coarser.hu, coarser.model,
+                       std::array{Beam::kKilovoltage, Beam::kMegavoltage},
+                       RendererOptions{.precision = VolumePrecision::kU8});
+}
+
+// 255 where rays meet the mask, by more than the smear at its rim.
+cv::Mat shadow(Renderer& renderer, const XrayView& view, const Eigen::Isometry3d& room_from_patient) {
+  XrayView of_mask = view;
+  of_mask.beam = Beam::kKilovoltage;
+  const RenderResult drr = renderer.render(std::span(&of_mask, 1), std::span(&room_from_patient, 1), PixelSet::all());
+  constexpr float kRim = 0.02F;  // a millimeter of water
+  cv::Mat mask(view.rows, view.columns, CV_8U);
+  std::ranges::transform(drr.line_integrals(0, 0), mask.begin<std::uint8_t>(),
+                         [](float value) { return value > kRim ? std::uint8_t{255} : std::uint8_t{0}; });
+  return mask;
+}
+
+cv::Mat grown(const cv::Mat& mask, int pixels) {
+  if (pixels < 1) return mask;
+  cv::Mat result;
+  const cv::Size size(2 * pixels + 1, 2 * pixels + 1);
+  cv::dilate(mask, result, cv::getStructuringElement(cv::MORPH_ELLIPSE, size));
+  return result;
+}
+
+}  // namespace
+
+Volume<std::uint8_t> beyond_the_ct(const Volume<float>& ct_hu, double threshold_hu, double reach_mm) {
+  constexpr double kVoxelMm = 4.0;
+  const Eigen::Vector3i block = (kVoxelMm / ct_hu.spacing_mm().array()).cast<int>().max(1);
+  const Volume<float> coarse = coarser_ct(ct_hu, {.threshold_hu = threshold_hu}, block).hu;
+  const auto attenuates = [&](const Eigen::Vector3i& at) {
+    return coarse.at(at.x(), at.y(), at.z()) > static_cast<float>(threshold_hu);
+  };
+  const Eigen::Vector3i reach = (reach_mm / coarse.spacing_mm().array()).ceil().cast<int>();
+  Volume<std::uint8_t> beyond(coarse.size + 2 * reach,
+                              coarse.patient_from_voxel * Eigen::Translation3d(-reach.cast<double>()));
+  for (int axis = 0; axis < 3; ++axis) {
+    const int u = (axis + 1) % 3, v = (axis + 2) % 3;
+    Eigen::Vector3i at;
+    for (at[u] = 0; at[u] < coarse.size[u]; ++at[u])
+      for (at[v] = 0; at[v] < coarse.size[v]; ++at[v])
+        for (const bool at_end : {false, true}) {
+          at[axis] = at_end ? coarse.size[axis] - 1 : 0;
+          if (!attenuates(at)) continue;
+          for (int step = 1; step <= reach[axis]; ++step) {
+            Eigen::Vector3i out = at + reach;
+            out[axis] += at_end ? step : -step;
+            beyond.at(out.x(), out.y(), out.z()) = 1;
+          }
+        }
+  }
+  return beyond;
+}
+
+Volume<float> only_inside(const Volume<float>& ct_hu, const Volume<std::uint8_t>& mask) {
+  Volume<float> result = ct_hu;
+  std::ranges::transform(result.voxels, mask.voxels, result.voxels.begin(),
+                         [](float hu, std::uint8_t in) { return in != 0 ? hu : kAirHu; });
+  return result;
+}
+
+Volume<float> without(const Volume<float>& ct_hu, const Volume<std::uint8_t>& mask) {
+  Volume<float> result = ct_hu;
+  std::ranges::transform(result.voxels, mask.voxels, result.voxels.begin(),
+                         [](float hu, std::uint8_t in) { return in != 0 ? kAirHu : hu; });
+  return result;
+}
+
+ProjectedRegion::ProjectedRegion(const RegionOfInterest& region) {
+  const auto is_empty = [](const Volume<std::uint8_t>& mask) {
+    return std::ranges::none_of(mask.voxels, [](std::uint8_t in) { return in != 0; });
+  };
+  if (region.volume) inside_ = renderer_of(*region.volume);
+  for (const Volume<std::uint8_t>& volume : region.left_out)
+    if (!is_empty(volume)) outside_.push_back(renderer_of(volume));
+}
+
+void ProjectedRegion::restrict(FixedImage& image, const Eigen::Isometry3d& room_from_patient, double slack_mm) const {
+  cv::Mat field(image.field.rows, image.field.columns, CV_8U, image.field.pixels.data());
+  const int slack_px = static_cast<int>(std::lround(slack_mm * pixels_per_mm(image.view)));
+  if (inside_) field.setTo(0, grown(shadow(*inside_, image.view, room_from_patient), slack_px) == 0);
+  for (const auto& outside : outside_) field.setTo(0, grown(shadow(*outside, image.view, room_from_patient), slack_px));
+}
+
+}  // namespace isoshift

@@ -1,0 +1,42 @@
+#pragma once
+// What of the views is compared: pixels whose rays meet a volume of interest, and none that meet what is left out.
+
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "drr/renderer.h"
+#include "registration/preprocess/preprocess.h"
+
+namespace isoshift {
+
+// Volumes hold 1 inside and 0 outside, in the CT's patient coordinates; their lattices may differ from the CT's.
+struct RegionOfInterest {
+  std::optional<Volume<std::uint8_t>> volume;  // unset: all
+  std::vector<Volume<std::uint8_t>> left_out;  // such as a jaw that moves on its own
+};
+
+// Where a CT ends although the body goes on: the columns of space beyond its faces, up to `reach_mm` away, where the
+// outermost voxels attenuate. The X-ray shows what lies there, the DRR does not.
+Volume<std::uint8_t> beyond_the_ct(const Volume<float>& ct_hu, double threshold_hu, double reach_mm = 150.0);
+
+// A CT without what lies outside a mask of the same size (1 inside): that becomes air.
+Volume<float> only_inside(const Volume<float>& ct_hu, const Volume<std::uint8_t>& mask);
+Volume<float> without(const Volume<float>& ct_hu, const Volume<std::uint8_t>& mask);
+
+// Its projections. May be used from several threads.
+class ProjectedRegion {
+ public:
+  // Everything is compared.
+  ProjectedRegion() = default;
+  explicit ProjectedRegion(const RegionOfInterest& region);
+
+  // Takes out of the field of an image what is not compared with the patient at a pose known to within `slack_mm`.
+  void restrict(FixedImage& image, const Eigen::Isometry3d& room_from_patient, double slack_mm) const;
+
+ private:
+  std::unique_ptr<Renderer> inside_;
+  std::vector<std::unique_ptr<Renderer>> outside_;
+};
+
+}  // namespace isoshift
