@@ -38,6 +38,19 @@ int exit_status_of(Verdict verdict) {
   return kExitFailed;
 }
 
+std::vector<SetupReport::Part> parts_in_report(const ViewConsistency& consistency) {
+  std::vector<SetupReport::Part> parts;
+  for (const Tile& tile : consistency.tiles)
+    parts.push_back({.center_px = tile.center_px,
+                     .width_px = tile.width_px,
+                     .displacement_mm = tile.displacement_mm,
+                     .correlation = tile.correlation,
+                     .best_correlation = tile.best_correlation,
+                     .has_signal = tile.has_signal,
+                     .disagrees = tile.disagrees});
+  return parts;
+}
+
 SetupReport::Stage stage_in_report(const Stage& stage, const StageReport& done) {
   SetupReport::Stage shown{.name = done.name,
                            .similarity = done.similarity,
@@ -83,8 +96,7 @@ SetupReport make_report(const RegisterOptions& options, const Study& study, cons
                             .gantry_deg = study.rt_images[n].gantry_angle_deg.value(),
                             .similarity_start = result.views[n].similarity_start,
                             .similarity_final = result.views[n].similarity_final,
-                            .parts_with_signal = result.views[n].consistency.with_signal(),
-                            .parts_disagreeing = result.views[n].consistency.disagreeing()});
+                            .parts = parts_in_report(result.views[n].consistency)});
   const RegistrationOptions registration = options.search.registration();
   for (std::size_t n = 0; n < result.stages.size(); ++n)
     report.stages.push_back(stage_in_report(registration.stages[n], result.stages[n]));

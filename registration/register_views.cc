@@ -29,10 +29,11 @@ void require_visible(const RendererPyramid& renderers, std::span<const XrayImage
 void report_views(const RendererPyramid& renderers, const FixedViews& views, const Eigen::Isometry3d& start,
                   const Stage& last_stage, RegistrationResult& result) {
   const Eigen::Isometry3d& found = result.actual_room_from_patient;
-  Objective ncc(renderers.with_voxels_up_to(last_stage.voxel_mm),
-                views.reduced_to(2.0 * last_stage.pixel_mm, found, 0.0), found, {.similarity = SimilarityKind::kNcc});
+  Objective gradient_correlation(renderers.with_voxels_up_to(2.0 * last_stage.voxel_mm),
+                                 views.reduced_to(2.0 * last_stage.pixel_mm, found, 0.0), found,
+                                 {.similarity = SimilarityKind::kGradientCorrelation});
   const std::array poses = {start, found};
-  const auto similarity = ncc.per_view(poses);
+  const auto similarity = gradient_correlation.per_view(poses);
   std::vector<ViewConsistency> consistency = regional_consistency(renderers, views, found);
   for (std::size_t view = 0; view < consistency.size(); ++view)
     result.views.push_back({.similarity_start = similarity[0][view],

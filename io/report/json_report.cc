@@ -72,6 +72,19 @@ Json stage_json(const SetupReport::Stage& stage) {
   return json;
 }
 
+Json parts_json(const SetupReport::View& view) {
+  Json list = Json::array();
+  for (const SetupReport::Part& part : view.parts)
+    list.push_back({{"center_px", array_of(part.center_px)},
+                    {"width_px", part.width_px},
+                    {"displacement_mm", array_of(part.displacement_mm)},
+                    {"correlation", part.correlation},
+                    {"best_correlation", part.best_correlation},
+                    {"has_signal", part.has_signal},
+                    {"disagrees", part.disagrees}});
+  return list;
+}
+
 Json alternatives_json(const SetupReport& report) {
   Json list = Json::array();
   for (const SetupReport::Alternative& alternative : report.alternatives)
@@ -125,8 +138,7 @@ std::string json_report(const SetupReport& report) {
                              {"gantry_deg", view.gantry_deg},
                              {"similarity_start", view.similarity_start},
                              {"similarity_final", view.similarity_final},
-                             {"parts_with_signal", view.parts_with_signal},
-                             {"parts_disagreeing", view.parts_disagreeing}});
+                             {"parts", parts_json(view)}});
     images.push_back(view.sop_instance_uid);
   }
   for (const SetupReport::Stage& stage : report.stages) {

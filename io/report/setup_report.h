@@ -16,14 +16,21 @@ namespace isoshift {
 
 // Angles in degrees here: this is where numbers meet people. Frames and signs: docs/conventions.md.
 struct SetupReport {
+  // A square of a view, and where it matches the DRR best.
+  struct Part {
+    Eigen::Vector2d center_px = Eigen::Vector2d::Zero();
+    double width_px = 0.0;
+    Eigen::Vector2d displacement_mm = Eigen::Vector2d::Zero();  // along columns and rows, at the isocenter
+    double correlation = 0.0, best_correlation = 0.0;           // where the pose puts it, and there
+    bool has_signal = false, disagrees = false;
+  };
   struct View {
     std::string label;
     std::string sop_instance_uid;
     double gantry_deg = 0.0;
     double similarity_start = -1.0;
     double similarity_final = -1.0;
-    int parts_with_signal = 0;  // of the view, for regional consistency
-    int parts_disagreeing = 0;
+    std::vector<Part> parts;
   };
   struct Stage {
     std::string name;

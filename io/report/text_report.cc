@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "geometry/rotation.h"
@@ -104,7 +105,9 @@ std::string text_report(const SetupReport& report) {
   text += "\nVIEWS               similarity at the planned pose -> at the pose found\n";
   for (const SetupReport::View& view : report.views)
     text += fmt::format("  {:<14} {:.4f} -> {:.4f}; {} of {} parts with signal match elsewhere\n", plain(view.label),
-                        view.similarity_start, view.similarity_final, view.parts_disagreeing, view.parts_with_signal);
+                        view.similarity_start, view.similarity_final,
+                        std::ranges::count_if(view.parts, &SetupReport::Part::disagrees),
+                        std::ranges::count_if(view.parts, &SetupReport::Part::has_signal));
 
   text += list("WARNINGS", report.warnings) + list("OVERRIDES", report.overrides);
   std::string settings;

@@ -10,10 +10,8 @@
 namespace isoshift {
 namespace {
 
-static const double kTileMm = std::getenv("TILE")
-                                  ? std::atof(std::getenv("TILE"))
-                                  : 25.0;  // residuals are alike over about this distance, at the isocenter
-constexpr double kStepMm = 0.3;            // of the differences, also of rotations on the sphere of kLeverMm
+constexpr double kTileMm = 25.0;  // residuals are alike over about this distance, at the isocenter
+constexpr double kStepMm = 0.3;   // of the differences, also of rotations on the sphere of kLeverMm
 
 // What the sandwich leaves out: errors common to all tiles, such as those of the model of beam and scatter. The factor
 // and the floor bring the share of true errors within one and two sigma to 68 and 95 % over the cases of
