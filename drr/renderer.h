@@ -108,6 +108,8 @@ class RenderResult {
   std::vector<std::size_t> view_begins_;  // within one pose; the last entry is the pose's total
 };
 
+class RaycastGlRenderer;
+
 class Renderer {
  public:
   virtual ~Renderer() = default;
@@ -126,6 +128,9 @@ class Renderer {
   // How long the GPU was busy with the last render(), by its own clock and without transfers from it; nothing where
   // there is no OpenGL.
   virtual std::optional<double> gpu_seconds() const { return std::nullopt; }
+
+  // The renderer that can leave its line integrals on the GPU, if this is one.
+  virtual RaycastGlRenderer* on_gpu() { return nullptr; }
 };
 
 // A renderer for views of the given beam qualities; rendering another one is a logic error. Keeps its own copy of the
