@@ -98,15 +98,19 @@ class RenderResult {
       : values_(std::move(values)), view_begins_(std::move(view_begins)) {}
 
   // Line integrals of one pose and view, in the order of the pixel set (row-major for all pixels).
-  std::span<const float> line_integrals(std::size_t pose, std::size_t view) const {
+  std::span<const float> line_integrals(std::size_t pose, std::size_t view) const& {
     const std::size_t begin = pose * view_begins_.back() + view_begins_[view];
     return std::span(values_).subspan(begin, view_begins_[view + 1] - view_begins_[view]);
   }
+  std::span<const float> line_integrals(std::size_t pose,
+                                        std::size_t view) const&& = delete;  // they would not outlive it
 
  private:
   std::vector<float> values_;
   std::vector<std::size_t> view_begins_;  // within one pose; the last entry is the pose's total
 };
+
+class RaycastGlRenderer;
 
 class Renderer {
  public:
@@ -126,6 +130,9 @@ class Renderer {
   // How long the GPU was busy with the last render(), by its own clock and without transfers from it; nothing where
   // there is no OpenGL.
   virtual std::optional<double> gpu_seconds() const { return std::nullopt; }
+
+  // The renderer that can leave its line integrals on the GPU, if this is one.
+  virtual RaycastGlRenderer* on_gpu() { return nullptr; }
 };
 
 // A renderer for views of the given beam qualities; rendering another one is a logic error. Keeps its own copy of the

@@ -8,12 +8,18 @@
 #include <numeric>
 #include <random>
 
+#include "drr/raycast/raycast.h"
 #include "geometry/error.h"
+#include "registration/similarity/gl_similarity.h"
 
 namespace isoshift {
 namespace {
 
 constexpr std::size_t kMinPixels = 100;
+
+using Clock = std::chrono::steady_clock;
+
+double seconds_since(Clock::time_point begin) { return std::chrono::duration<double>(Clock::now() - begin).count(); }
 
 // The pixels that can be compared: those in the field, for gradients only those with all four neighbors in it.
 std::vector<std::uint32_t> comparable_pixels(const Image<std::uint8_t>& field, SimilarityKind similarity) {
@@ -88,7 +94,11 @@ Objective::Objective(Renderer& renderer, std::span<const FixedImage> images, con
     const RenderResult drr = renderer.render(std::span(&image.view, 1), std::span(&about, 1), PixelSet::all());
     add_view(image, strongest_pixels(field, image_of(image.view, drr.line_integrals(0, 0)), options));
   }
+  if (RaycastGlRenderer* gl = renderer_.on_gpu(); gl != nullptr && !comparisons_.empty())
+    gl_similarity_ = std::make_unique<GlSimilarity>(gl->context(), comparisons_);
 }
+
+Objective::~Objective() = default;
 
 void Objective::add_view(const FixedImage& image, std::vector<std::uint32_t> compared) {
   const auto columns = static_cast<std::uint32_t>(image.field.columns);
@@ -114,16 +124,38 @@ void Objective::add_view(const FixedImage& image, std::vector<std::uint32_t> com
 }
 
 std::vector<std::vector<double>> Objective::per_view(std::span<const Eigen::Isometry3d> room_from_patient) {
-  using Clock = std::chrono::steady_clock;
+  if (gl_similarity_) return per_view_on_gpu(room_from_patient);
   const auto begin = Clock::now();
   const RenderResult drrs = render(room_from_patient);
-  const auto rendered = Clock::now();
+  const double rendering = seconds_since(begin);
   std::vector<std::vector<double>> similarity(room_from_patient.size());
   for (std::size_t pose = 0; pose < room_from_patient.size(); ++pose)
     for (std::size_t view = 0; view < views_.size(); ++view)
       similarity[pose].push_back(comparisons_[view].of(drrs.line_integrals(pose, view)));
-  seconds_.rendering += std::chrono::duration<double>(rendered - begin).count();
-  seconds_.similarity += std::chrono::duration<double>(Clock::now() - rendered).count();
+  seconds_.rendering += rendering;
+  seconds_.similarity += seconds_since(begin) - rendering;
+  return similarity;
+}
+
+std::vector<std::vector<double>> Objective::per_view_on_gpu(std::span<const Eigen::Isometry3d> room_from_patient) {
+  RaycastGlRenderer& gl = *renderer_.on_gpu();
+  std::size_t pixels_per_pose = 0;
+  for (const auto& of_view : pixels_.of_view) pixels_per_pose += of_view.size();
+  const std::size_t at_once = gl.poses_at_once(pixels_per_pose);
+  std::vector<std::vector<double>> similarity;
+  for (std::size_t first = 0; first < room_from_patient.size(); first += at_once) {
+    const auto poses = room_from_patient.subspan(first, std::min(at_once, room_from_patient.size() - first));
+    const auto begin = Clock::now();
+    const Buffer& line_integrals = gl.render_on_gpu(views_, poses, pixels_);
+    double rendering = seconds_since(begin);  // on llvmpipe all of it, on a GPU until it is under way
+    const auto part = gl_similarity_->of(line_integrals, poses.size());
+    similarity.insert(similarity.end(), part.begin(), part.end());
+    // By now its clock can be read without waiting; glFinish() in between would keep the GPU idle.
+    const double all = seconds_since(begin);
+    rendering = std::min(all, rendering + gl.gpu_seconds().value_or(0.0));
+    seconds_.rendering += rendering;
+    seconds_.similarity += all - rendering;
+  }
   return similarity;
 }
 

@@ -3,6 +3,7 @@
 
 #include <Eigen/Geometry>
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -19,14 +20,18 @@ struct ObjectiveOptions {
   std::uint64_t seed = 1;         // draws them
 };
 
+class GlSimilarity;
+
 class Objective {
  public:
   // Compares inside each image's field. Borrows the renderer. Throws Error for a field of fewer than 100 pixels.
   // `about` is near the poses to come: gradients are compared where they are strong there.
   Objective(Renderer& renderer, std::span<const FixedImage> images, const Eigen::Isometry3d& about,
             const ObjectiveOptions& options);
+  ~Objective();
 
-  // Similarity per view. Result [pose][view].
+  // Similarity per view. Result [pose][view]. Computed where the renderer has its line integrals: on the GPU, if it can
+  // leave them there.
   std::vector<std::vector<double>> per_view(std::span<const Eigen::Isometry3d> room_from_patient);
 
   // What the similarities are computed from.
@@ -38,7 +43,7 @@ class Objective {
   // Indices (row * columns + column) of the pixels compared in a view.
   std::span<const std::uint32_t> compared_pixels(std::size_t view) const { return compared_[view]; }
 
-  // Where the time went so far.
+  // Where the time went so far. A GPU's rendering is by its own clock; what else is waited for counts as similarity.
   struct Seconds {
     double rendering = 0.0, similarity = 0.0;
   };
@@ -49,6 +54,7 @@ class Objective {
 
  private:
   void add_view(const FixedImage& image, std::vector<std::uint32_t> compared);
+  std::vector<std::vector<double>> per_view_on_gpu(std::span<const Eigen::Isometry3d> room_from_patient);
 
   Renderer& renderer_;
   SimilarityKind similarity_;
@@ -56,6 +62,7 @@ class Objective {
   PixelSet pixels_;
   std::vector<std::vector<std::uint32_t>> compared_;
   std::vector<Comparison> comparisons_;
+  std::unique_ptr<GlSimilarity> gl_similarity_;  // where the renderer is on a GPU
   Seconds seconds_;
 };
 

@@ -2,9 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <opencv2/imgproc.hpp>
 
 #include "drr/renderer_pyramid.h"
+#include "registration/preprocess/image_operations.h"
 
 namespace isoshift {
 namespace {
@@ -23,24 +23,17 @@ std::unique_ptr<Renderer> renderer_of(const Volume<std::uint8_t>& mask) {
                        RendererOptions{.precision = VolumePrecision::kU8});
 }
 
-// 255 where rays meet the mask, by more than the smear at its rim.
-cv::Mat shadow(Renderer& renderer, const XrayView& view, const Eigen::Isometry3d& room_from_patient) {
+// 1 where rays meet the mask, by more than the smear at its rim, and around that.
+Image<std::uint8_t> shadow(Renderer& renderer, const XrayView& view, const Eigen::Isometry3d& room_from_patient,
+                           int around_px) {
   XrayView of_mask = view;
   of_mask.beam = Beam::kKilovoltage;
   const RenderResult drr = renderer.render(std::span(&of_mask, 1), std::span(&room_from_patient, 1), PixelSet::all());
   constexpr float kRim = 0.02F;  // a millimeter of water
-  cv::Mat mask(view.rows, view.columns, CV_8U);
-  std::ranges::transform(drr.line_integrals(0, 0), mask.begin<std::uint8_t>(),
-                         [](float value) { return value > kRim ? std::uint8_t{255} : std::uint8_t{0}; });
-  return mask;
-}
-
-cv::Mat grown(const cv::Mat& mask, int pixels) {
-  if (pixels < 1) return mask;
-  cv::Mat result;
-  const cv::Size size(2 * pixels + 1, 2 * pixels + 1);
-  cv::dilate(mask, result, cv::getStructuringElement(cv::MORPH_ELLIPSE, size));
-  return result;
+  Image<std::uint8_t> mask(view.columns, view.rows);
+  std::ranges::transform(drr.line_integrals(0, 0), mask.pixels.begin(),
+                         [](float value) { return value > kRim ? std::uint8_t{1} : std::uint8_t{0}; });
+  return grown(mask, around_px);
 }
 
 }  // namespace
@@ -97,10 +90,14 @@ ProjectedRegion::ProjectedRegion(const RegionOfInterest& region) {
 }
 
 void ProjectedRegion::restrict(FixedImage& image, const Eigen::Isometry3d& room_from_patient, double slack_mm) const {
-  cv::Mat field(image.field.rows, image.field.columns, CV_8U, image.field.pixels.data());
   const int slack_px = static_cast<int>(std::lround(slack_mm * pixels_per_mm(image.view)));
-  if (inside_) field.setTo(0, grown(shadow(*inside_, image.view, room_from_patient), slack_px) == 0);
-  for (const auto& outside : outside_) field.setTo(0, grown(shadow(*outside, image.view, room_from_patient), slack_px));
+  const auto keep_where = [&](Renderer& of_mask, std::uint8_t value) {
+    const Image<std::uint8_t> mask = shadow(of_mask, image.view, room_from_patient, slack_px);
+    for (std::size_t n = 0; n < mask.pixels.size(); ++n)
+      if (mask.pixels[n] != value) image.field.pixels[n] = 0;
+  };
+  if (inside_) keep_where(*inside_, 1);
+  for (const auto& outside : outside_) keep_where(*outside, 0);
 }
 
 }  // namespace isoshift

@@ -36,7 +36,7 @@ struct RegistrationOptions {
   void check() const;
 };
 
-// Normalized cross correlation of one view over its whole field, at the resolution of the last stage.
+// Gradient correlation of one view over all that is compared, in pixels twice as large as those of the last stage.
 struct ViewReport {
   double similarity_start = -1.0;
   double similarity_final = -1.0;

@@ -103,6 +103,7 @@ const Buffer& RaycastGlRenderer::render_on_gpu(std::span<const XrayView> views,
 
 // As many poses as one storage buffer can hold.
 std::size_t RaycastGlRenderer::poses_at_once(std::size_t pixels_per_pose) const {
+  context_.make_current();
   GLint64 max_bytes = 0;
   glGetInteger64v(GL_MAX_SHADER_STORAGE_BLOCK_SIZE, &max_bytes);
   const std::size_t pose_bytes = std::max<std::size_t>(1, pixels_per_pose * sizeof(float));

@@ -24,14 +24,18 @@ class RaycastGlRenderer final : public Renderer {
   RendererKind kind() const override { return RendererKind::kRaycast; }
   std::string device() const override { return context_.renderer(); }
   std::optional<double> gpu_seconds() const override { return seconds_of(timer_, context_); }
+  RaycastGlRenderer* on_gpu() override { return this; }
 
   // The same, left on the GPU: line integrals as floats, [pose][view][pixel]. The renderer keeps the buffer, until its
   // next call or its end. Throws Error where the images exceed one storage buffer.
   const Buffer& render_on_gpu(std::span<const XrayView> views, std::span<const Eigen::Isometry3d> room_from_patient,
                               const PixelSet& pixels);
+  // How many poses that is. Throws Error where not even one fits.
+  std::size_t poses_at_once(std::size_t pixels_per_pose) const;
+  // Where the line integrals are.
+  const GlContext& context() const { return context_; }
 
  private:
-  std::size_t poses_at_once(std::size_t pixels_per_pose) const;
   void upload_views(std::span<const XrayView> views, const std::vector<std::size_t>& begins, const PixelSet& pixels);
   void dispatch(std::span<const XrayView> views, std::span<const Eigen::Isometry3d> poses, std::size_t pixels_per_pose,
                 bool has_pixel_list);

@@ -13,13 +13,14 @@ namespace {
 
 constexpr double kMinViewSeparationRad = rad_from_deg(30.0);
 constexpr double kAtBoundShare = 0.99;
-// The search ends on gradient correlation, whose top lies beside that of the NCC by what scatter and noise do to it: a
-// patient exactly on plan may lose a little. On phantoms and real data less than 0.001 was lost.
-constexpr double kNccNoise = 0.005;
-constexpr double kMinNcc = 0.8;
+// A patient exactly on plan may lose a little: noise. On phantoms and real data less than 0.001 was lost.
+constexpr double kSimilarityNoise = 0.005;
+// Of gradient correlation, mean over the views. Right patients reached 0.63 to 0.98 on real data and phantoms, other
+// patients 0.2 to 0.5 where the anatomy differed.
+constexpr double kMinSimilarity = 0.5, kRejectedSimilarity = 0.35;
 constexpr double kMaxSpreadMm = 1.0, kMaxSpreadRad = rad_from_deg(1.0);
 constexpr double kMaxTwoSigmaMm = 1.0, kMaxTwoSigmaRad = rad_from_deg(1.0);
-constexpr double kMaxDisagreeing = 0.1;
+constexpr double kMaxDisagreeing = 0.15;
 // An alternative must leave this much more unexplained (1 - gradient correlation) than the images as they are. On head
 // phantoms, which are nearly symmetric, a mirrored AP view leaves 1.2 to 4 times as much.
 constexpr double kAlternativeMargin = 1.1;
@@ -68,7 +69,7 @@ void judge(std::span<const double> parameters, const RegistrationOptions& option
   for (std::size_t n = 0; n < result.views.size(); ++n) {
     const ViewReport& view = result.views[n];
     mean += view.similarity_final / static_cast<double>(result.views.size());
-    if (!(view.similarity_final >= view.similarity_start - kNccNoise))
+    if (!(view.similarity_final >= view.similarity_start - kSimilarityNoise))
       review(fmt::format("view {} matches worse than at the planned pose (similarity {:.4f}, was {:.4f})", n + 1,
                          view.similarity_final, view.similarity_start));
     const int with_signal = view.consistency.with_signal(), disagreeing = view.consistency.disagreeing();
@@ -76,8 +77,9 @@ void judge(std::span<const double> parameters, const RegistrationOptions& option
       review(fmt::format("{} of {} parts of view {} match elsewhere: anatomy may have moved against the rest",
                          disagreeing, with_signal, n + 1));
   }
-  if (!(mean >= kMinNcc))
-    review(fmt::format("the final normalized cross correlation {:.3f} is below {:.2f}", mean, kMinNcc));
+  if (!(mean >= kMinSimilarity))
+    demote(mean >= kRejectedSimilarity ? Verdict::kReview : Verdict::kRejected,
+           fmt::format("the final gradient correlation {:.3f} is below {:.2f}", mean, kMinSimilarity));
 
   if (!result.uncertainty) {
     review("the images do not determine the pose");

@@ -16,8 +16,8 @@ constexpr double kStepMm = 0.3;   // of the differences, also of rotations on th
 // What the sandwich leaves out: errors common to all tiles, such as those of the model of beam and scatter. The factor
 // and the floor bring the share of true errors within one and two sigma to 68 and 95 % over the cases of
 // docs/evaluation.md.
-constexpr double kCalibration = 1.0;
-constexpr double kFloorMm = 0.0;
+constexpr double kCalibration = 1.2;
+constexpr double kFloorMm = 0.035;
 
 // Centered, and of unit norm.
 Eigen::VectorXd normalized(const std::vector<float>& values) {

@@ -169,7 +169,7 @@ double normalized_mutual_information(const JointHistogram& histogram) {
 }
 
 Comparison::Comparison(SimilarityKind kind, std::vector<float> xray, std::vector<Neighbors> neighbors)
-    : kind_(kind), neighbors_(std::move(neighbors)) {
+    : kind_(kind), pixels_(xray.size()), neighbors_(std::move(neighbors)) {
   switch (kind) {
     case SimilarityKind::kNcc: values_ = std::move(xray); break;
     case SimilarityKind::kGradientCorrelation: gradients_ = gradients(xray, neighbors_); break;

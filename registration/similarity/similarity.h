@@ -4,7 +4,7 @@
 //   const Comparison comparison(SimilarityKind::kStochasticRankCorrelation, xray_pixels);
 //   const double similarity = comparison.of(drr_pixels);
 //
-// similarity.comp computes the same on a GPU.
+// GlSimilarity computes the same on a GPU (similarity.comp).
 
 #include <array>
 #include <cstdint>
@@ -85,6 +85,7 @@ class Comparison {
   double of(std::span<const float> drr) const;
 
   SimilarityKind kind() const { return kind_; }
+  std::size_t pixels() const { return pixels_; }  // of a DRR
   std::size_t pixels_compared() const;
   // What the kind needs of the X-ray: line integrals, ranks or (as numbers) bins; or gradients and neighbors.
   std::span<const float> values() const { return values_; }
@@ -94,6 +95,7 @@ class Comparison {
 
  private:
   SimilarityKind kind_;
+  std::size_t pixels_;
   std::vector<float> values_;
   std::vector<std::uint32_t> bins_;
   std::vector<Neighbors> neighbors_;

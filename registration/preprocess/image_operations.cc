@@ -1,0 +1,66 @@
+#include "registration/preprocess/image_operations.h"
+
+#include <algorithm>
+#include <opencv2/imgproc.hpp>
+
+namespace isoshift {
+namespace {
+
+// OpenCV's view of an image; what it is given to is not changed.
+cv::Mat mat_of(const Image<float>& image) {
+  return {image.rows, image.columns, CV_32F, const_cast<float*>(image.pixels.data())};
+}
+cv::Mat mat_of(const Image<std::uint8_t>& image) {
+  return {image.rows, image.columns, CV_8U, const_cast<std::uint8_t*>(image.pixels.data())};
+}
+
+cv::Rect rectangle(const PixelSquare& square) { return {square.column, square.row, square.edge, square.edge}; }
+
+// The top of a parabola through three values, from the middle one.
+double top_of(float before, float at, float after) {
+  const float curvature = before - 2.0F * at + after;
+  return curvature < 0.0F ? std::clamp(0.5 * (before - after) / curvature, -0.5, 0.5) : 0.0;
+}
+
+}  // namespace
+
+Image<float> high_pass(const Image<float>& image, double sigma_px) {
+  Image<float> result(image.columns, image.rows);
+  cv::Mat slow, fast = mat_of(result);
+  cv::GaussianBlur(mat_of(image), slow, cv::Size(0, 0), sigma_px, sigma_px, cv::BORDER_REPLICATE);
+  cv::subtract(mat_of(image), slow, fast);
+  return result;
+}
+
+Image<std::uint8_t> grown(const Image<std::uint8_t>& mask, int radius_px) {
+  if (radius_px < 1) return mask;
+  Image<std::uint8_t> result(mask.columns, mask.rows);
+  cv::Mat target = mat_of(result);
+  const cv::Size size(2 * radius_px + 1, 2 * radius_px + 1);
+  cv::dilate(mat_of(mask), target, cv::getStructuringElement(cv::MORPH_ELLIPSE, size));
+  return result;
+}
+
+double share_inside(const Image<std::uint8_t>& mask, const PixelSquare& square) {
+  return static_cast<double>(cv::countNonZero(mat_of(mask)(rectangle(square)))) / rectangle(square).area();
+}
+
+SquareMatch best_match(const Image<float>& image, const PixelSquare& square, const Image<float>& in, int reach_px) {
+  const cv::Rect here = rectangle(square);
+  const cv::Rect around =
+      cv::Rect(here.x - reach_px, here.y - reach_px, here.width + 2 * reach_px, here.height + 2 * reach_px) &
+      cv::Rect(0, 0, in.columns, in.rows);
+  cv::Mat correlation;
+  cv::matchTemplate(mat_of(in)(around), mat_of(image)(here), correlation, cv::TM_CCOEFF_NORMED);
+  const cv::Point middle(here.x - around.x, here.y - around.y);
+  SquareMatch match{.correlation_here = correlation.at<float>(middle)};
+  cv::Point best;
+  cv::minMaxLoc(correlation, nullptr, &match.correlation_there, nullptr, &best);
+  match.displacement_px = {best.x - middle.x, best.y - middle.y};
+  const auto at = [&](int dx, int dy) { return correlation.at<float>(best.y + dy, best.x + dx); };
+  if (best.x > 0 && best.x + 1 < correlation.cols) match.displacement_px.x() += top_of(at(-1, 0), at(0, 0), at(1, 0));
+  if (best.y > 0 && best.y + 1 < correlation.rows) match.displacement_px.y() += top_of(at(0, -1), at(0, 0), at(0, 1));
+  return match;
+}
+
+}  // namespace isoshift
