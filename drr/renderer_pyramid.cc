@@ -3,6 +3,7 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 
 namespace isoshift {
@@ -49,7 +50,8 @@ CoarserCt coarser_ct(const Volume<float>& ct_hu, const AttenuationModel& model, 
 }
 
 RendererPyramid::RendererPyramid(RendererKind kind, const Volume<float>& ct_hu, const AttenuationModel& model,
-                                 std::span<const Beam> beams, const RendererOptions& options) {
+                                 std::span<const Beam> beams, const RendererOptions& options)
+    : voxel_mm_(std::cbrt(ct_hu.spacing_mm().prod())) {
   levels_.push_back(
       {.edge_mm = ct_hu.spacing_mm().maxCoeff(), .renderer = make_renderer(kind, ct_hu, model, beams, options)});
   Eigen::Vector3i last = Eigen::Vector3i::Ones();

@@ -29,12 +29,16 @@ class RendererPyramid {
   // The coarsest whose voxels have edges up to `edge_mm`; the finest where there is none.
   Renderer& with_voxels_up_to(double edge_mm) const;
 
+  // Edge of a cube as large as a voxel of the CT.
+  double voxel_mm() const { return voxel_mm_; }
+
  private:
   struct Level {
     double edge_mm;  // the longest
     std::unique_ptr<Renderer> renderer;
   };
   std::vector<Level> levels_;  // finest first
+  double voxel_mm_;
 };
 
 }  // namespace isoshift

@@ -86,7 +86,7 @@ RegistrationResult register_views(const RendererPyramid& renderers, std::span<co
                                   .min_pixels = static_cast<std::size_t>(last.min_pixels),
                                   .seed = options.seed});
   result.uncertainty =
-      estimated_uncertainty(gradient_correlation, result.actual_room_from_patient, options.dof == Dof::kTranslation);
+      estimated_uncertainty(gradient_correlation, result.actual_room_from_patient, options.dof == Dof::kTranslation, renderers.voxel_mm());
   if (options.check_alternatives)
     result.alternatives = compare_alternatives(renderers, fixed, start_room_from_patient, search_options);
 

@@ -10,7 +10,7 @@ namespace {
 
 // All lengths at the isocenter.
 constexpr double kPixelMm = 1.5;
-constexpr double kTileMm = 30.0;
+constexpr double kTileMm = 40.0;
 constexpr double kSearchMm = 12.0;
 constexpr double kSmoothMm = 15.0;  // slower changes are scatter and hardening, not anatomy
 constexpr double kMinField = 0.9;   // share of a tile that must lie in the field

@@ -13,11 +13,11 @@ namespace {
 constexpr double kTileMm = 25.0;  // residuals are alike over about this distance, at the isocenter
 constexpr double kStepMm = 0.3;   // of the differences, also of rotations on the sphere of kLeverMm
 
-// What the sandwich leaves out: errors common to all tiles, such as those of the model of beam and scatter. The factor
-// and the floor bring the share of true errors within one and two sigma to 68 and 95 % over the cases of
-// docs/evaluation.md.
+// What the sandwich leaves out: errors common to all tiles, such as those of the model of beam and scatter, and of
+// voxels of finite size. The factor and the floors bring the share of true errors within one and two sigma to about 68
+// and 95 % over the cases of docs/evaluation.md.
 constexpr double kCalibration = 1.2;
-constexpr double kFloorMm = 0.035;
+constexpr double kFloorVoxels = 0.03, kFloorMm = 0.025;
 
 // Centered, and of unit norm.
 Eigen::VectorXd normalized(const std::vector<float>& values) {
@@ -90,7 +90,7 @@ Sandwich sandwich_at(Objective& objective, const Eigen::Isometry3d& pose, int ax
 }  // namespace
 
 std::optional<Uncertainty> estimated_uncertainty(Objective& objective, const Eigen::Isometry3d& room_from_patient,
-                                                 bool translation_only) {
+                                                 bool translation_only, double voxel_mm) {
   const int axes = translation_only ? 3 : 6;
   const Sandwich sandwich = sandwich_at(objective, room_from_patient, axes);
   constexpr double kSingular = 1e-6;
@@ -101,7 +101,7 @@ std::optional<Uncertainty> estimated_uncertainty(Objective& objective, const Eig
       sandwich.tiles > axes ? static_cast<double>(sandwich.tiles) / (sandwich.tiles - axes) : 1e6;
   const Eigen::MatrixXd covariance = small_sample * bread * sandwich.scatter * bread;
   const auto sigma_mm = [&](int axis) {
-    return std::hypot(kCalibration * std::sqrt(covariance(axis, axis)), kFloorMm);
+    return std::hypot(kCalibration * std::sqrt(covariance(axis, axis)), std::max(kFloorMm, kFloorVoxels * voxel_mm));
   };
   Uncertainty uncertainty;
   for (int axis = 0; axis < 3; ++axis) {

@@ -21,8 +21,8 @@ struct Uncertainty {
 };
 
 // `objective` compares by gradient correlation. Nothing where the images do not determine the pose (a singular
-// curvature). With `translation_only`, rotations are taken as known and get 0.
+// curvature). With `translation_only`, rotations are taken as known and get 0. `voxel_mm`: edge of the CT's voxels.
 std::optional<Uncertainty> estimated_uncertainty(Objective& objective, const Eigen::Isometry3d& room_from_patient,
-                                                 bool translation_only);
+                                                 bool translation_only, double voxel_mm);
 
 }  // namespace isoshift
