@@ -110,9 +110,10 @@ int check(int patient_count) {
   std::map<std::string, Count> counts;
   fmt::print(
       "ct,xrays,case,verdict,mtre_mm,ncc,as_is,best_alternative,disagreeing,with_signal,seconds,err_sigma,reasons\n");
+  RegistrationOptions options = preset("setup");
   const auto one = [&](const RendererPyramid& renderers, int ct, int of, const std::string& what,
                        const std::vector<XrayImage>& xrays) {
-    const RegistrationResult result = register_views(renderers, xrays, planned, preset("setup"));
+    const RegistrationResult result = register_views(renderers, xrays, planned, options);
     const Eigen::Isometry3d found = result.actual_room_from_patient * planned.inverse();
     double ncc = 1.0, disagreeing = 0.0, with_signal = 1e-9, best = 0.0;
     for (const ViewReport& view : result.views) {
@@ -146,8 +147,12 @@ int check(int patient_count) {
     count.accepted += result.verdict == Verdict::kAccepted ? 1 : 0;
   };
   for (int ct = 0; ct < patient_count; ++ct) {
-    const RendererPyramid renderers(RendererKind::kCpu, ct_of(patients[static_cast<std::size_t>(ct)]), {},
-                                    std::array{Beam::kKilovoltage});
+    const Volume<float> hu = ct_of(patients[static_cast<std::size_t>(ct)]);
+    const RendererPyramid renderers(RendererKind::kCpu, hu, {}, std::array{Beam::kKilovoltage});
+    RegionOfInterest all_of_the_ct;
+    all_of_the_ct.left_out.push_back(beyond_the_ct(hu, AttenuationModel{}.threshold_hu));
+    const ProjectedRegion region(all_of_the_ct);
+    options.region = &region;
     for (const auto& [what, xrays] : variants(patients[static_cast<std::size_t>(ct)].xrays))
       one(renderers, ct, ct, what, xrays);
     for (int of = 0; of < patient_count; ++of)

@@ -37,7 +37,7 @@ void run_drr(const DrrOptions& options, Console& console) {
 
   std::string listing = fmt::format("rendered by {} on {}", to_string(renderer->kind()), renderer->device());
   for (const auto& [name, value] : options.rendering.settings()) listing += fmt::format(", {} {}", name, value);
-  listing += fmt::format("; attenuation {}, threshold {:.0f} HU\n", options.rendering.attenuation,
+  listing += fmt::format("; attenuation {}, threshold {:.0f} HU\n", options.rendering.attenuation_name(),
                          options.rendering.threshold_hu);
   for (std::size_t n = 0; n < study.xrays.size(); ++n) {
     const XrayView& view = study.xrays[n].view;

@@ -67,9 +67,12 @@ Json configuration_of(const EvaluateOptions& options, const Study& study, const 
           {"truth", matrix},
           {"renderer", to_string(renderer.kind())},
           {"renderer_settings", settings},
-          {"attenuation", options.rendering.attenuation},
+          {"attenuation", options.rendering.attenuation_name()},
           {"threshold_hu", options.rendering.threshold_hu},
           {"preset", options.search.preset},
+          {"similarity", options.search.similarity.value_or("")},
+          {"optimizer", options.search.optimizer.value_or("")},
+          {"pixel_fraction", options.search.pixel_fraction.value_or(0.0)},
           {"dof", options.search.dof},
           {"structures", options.region.structures},
           {"excluded", options.region.excluded},
@@ -170,11 +173,12 @@ int print_table(const EvaluateOptions& options, Console& console) {
   return kExitAccepted;
 }
 
-int run_evaluate(const EvaluateOptions& options, Console& console) {
+int run_evaluate(EvaluateOptions options, Console& console) {
   if (!options.table.empty()) return print_table(options, console);
   if (options.truth.empty() || options.output.empty())
     throw UsageError("an evaluation needs --truth and -o (or --table to look at earlier ones)");
   const StartProtocol protocol = protocol_of(options);
+  if (options.search.is_paper()) options.rendering.default_to_paper();
   const RendererKind kind = options.rendering.kind();
   if (uses_gl(kind) && options.jobs > 1)
     throw UsageError(

@@ -108,7 +108,7 @@ SetupReport make_report(const RegisterOptions& options, const Study& study, cons
         {.description = alternative.description, .similarity = alternative.similarity, .as_is = alternative.as_is});
   report.preset = options.search.preset;
   report.seed = options.search.seed;
-  report.attenuation = options.rendering.attenuation;
+  report.attenuation = options.rendering.attenuation_name();
   const AttenuationModel model = options.rendering.model();
   report.threshold_hu = model.threshold_hu;
   if (model.kind == AttenuationModel::Kind::kWindowed) report.window_hu = {model.window_low_hu, model.window_high_hu};
@@ -156,7 +156,9 @@ void write_pictures(const Study& study, Renderer& renderer, const Eigen::Isometr
 
 }  // namespace
 
-int run_register(const RegisterOptions& options, Console& console) {
+int run_register(const RegisterOptions& given, Console& console) {
+  RegisterOptions options = given;
+  if (options.search.is_paper()) options.rendering.default_to_paper();
   const Stopwatch total;
   OutputFolder output(options.output, options.overwrite);
   std::optional<Eigen::Isometry3d> truth;

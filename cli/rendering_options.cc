@@ -20,6 +20,11 @@ void refuse(bool given, const char* flag, const char* of, RendererKind kind) {
 
 }  // namespace
 
+void RenderingOptions::default_to_paper() {
+  if (!attenuation) attenuation = "windowed";
+  if (!precision && !is_oracle(kind())) precision = "u8";
+}
+
 RendererKind RenderingOptions::kind() const {
   if (renderer == "auto")
     return gl_device_from(gl) == GlDevice::kHardware && has_hardware_gl() ? RendererKind::kRaycast : RendererKind::kCpu;
@@ -28,9 +33,9 @@ RendererKind RenderingOptions::kind() const {
 
 AttenuationModel RenderingOptions::model() const {
   AttenuationModel model;
-  model.kind = attenuation == "physical" ? AttenuationModel::Kind::kPhysical : AttenuationModel::Kind::kWindowed;
+  model.kind = attenuation_name() == "physical" ? AttenuationModel::Kind::kPhysical : AttenuationModel::Kind::kWindowed;
   model.threshold_hu = threshold_hu;
-  if (!window.empty() && attenuation != "windowed")
+  if (!window.empty() && attenuation_name() != "windowed")
     throw UsageError("--window means something to --attenuation windowed only");
   if (!window.empty()) {
     model.window_low_hu = window[0];
@@ -102,7 +107,8 @@ void add_rendering_options(CLI::App& command, RenderingOptions& options) {
       ->group(kGroup);
   add_gl_option(command, options.gl);
   command
-      .add_option("--attenuation", options.attenuation, "From HU to attenuation: a physical curve, or the HU window")
+      .add_option("--attenuation", options.attenuation,
+                  "From HU to attenuation: a physical curve, or the HU window [physical]")
       ->check(CLI::IsMember({"physical", "windowed"}))
       ->capture_default_str()
       ->group(kGroup);

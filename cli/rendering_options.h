@@ -13,15 +13,18 @@ namespace isoshift {
 
 struct RenderingOptions {
   std::string renderer = "auto";
-  std::string attenuation = "physical";
   double threshold_hu = AttenuationModel{}.threshold_hu;
   std::vector<double> window;
   // Unset unless asked for: what the chosen renderer does not have is refused, not ignored.
-  std::optional<std::string> gl, precision, wobble, deposit;
+  std::optional<std::string> attenuation, gl, precision, wobble, deposit;
   std::optional<double> wobble_sigma_mm;
   std::optional<std::uint32_t> wobble_seed;
   std::optional<int> block_edge;
 
+  // What the founding paper rendered, where nothing else is asked for: 8-bit volumes of windowed HU.
+  void default_to_paper();
+
+  std::string attenuation_name() const { return attenuation.value_or("physical"); }
   RendererKind kind() const;  // "auto" settled: raycast on a hardware GPU, else cpu
   // The following throw UsageError for a flag that means nothing to what was chosen.
   AttenuationModel model() const;

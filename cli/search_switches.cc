@@ -1,11 +1,27 @@
 #include "cli/search_switches.h"
 
+#include "geometry/error.h"
 #include "registration/presets.h"
 
 namespace isoshift {
+namespace {
+
+template <class Kinds>
+std::vector<std::string> names_of(const Kinds& kinds) {
+  std::vector<std::string> names;
+  for (const auto kind : kinds) names.emplace_back(to_string(kind));
+  return names;
+}
+
+}  // namespace
 
 RegistrationOptions SearchSwitches::registration() const {
   RegistrationOptions options = isoshift::preset(preset);
+  if ((similarity || optimizer || pixel_fraction) && !is_paper())
+    throw UsageError("--similarity, --optimizer and --pixel-fraction choose what --preset paper does in its one stage");
+  if (similarity) options.stages.front().similarity = similarity_kind_from(*similarity).value();
+  if (optimizer) options.stages.front().optimizer = optimizer_kind_from(*optimizer).value();
+  if (pixel_fraction) options.stages.front().pixel_fraction = *pixel_fraction;
   options.dof = dof == "rigid" ? Dof::kRigid : Dof::kTranslation;
   options.seed = seed;
   return options;
@@ -15,6 +31,13 @@ void add_search_switches(CLI::App& command, SearchSwitches& options) {
   command.add_option("--preset", options.preset, "How to search: docs/presets.md says what is in each")
       ->check(CLI::IsMember(std::vector<std::string>(kPresets.begin(), kPresets.end())))
       ->capture_default_str();
+  command.add_option("--similarity", options.similarity, "Of preset paper [src]")
+      ->check(CLI::IsMember(names_of(kSimilarityKinds)));
+  command.add_option("--optimizer", options.optimizer, "Of preset paper [nelder-mead]")
+      ->check(CLI::IsMember(names_of(kOptimizerKinds)));
+  command
+      .add_option("--pixel-fraction", options.pixel_fraction, "Of preset paper: share of the pixels compared [0.05]")
+      ->check(CLI::Range(0.001, 1.0));
   command.add_option("--dof", options.dof, "Degrees of freedom: six, or the three translations")
       ->check(CLI::IsMember({"rigid", "translation"}))
       ->capture_default_str();

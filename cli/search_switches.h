@@ -2,6 +2,7 @@
 // The flags that say how poses are searched: the same for every command that registers.
 
 #include <CLI/CLI.hpp>
+#include <optional>
 #include <string>
 
 #include "registration/register_views.h"
@@ -10,10 +11,15 @@ namespace isoshift {
 
 struct SearchSwitches {
   std::string preset = "setup";
+  // Of the single stage of preset `paper`.
+  std::optional<std::string> similarity, optimizer;
+  std::optional<double> pixel_fraction;
   std::string dof = "rigid";
   std::uint64_t seed = 1;
 
+  // Throws UsageError for a switch that means nothing to the preset.
   RegistrationOptions registration() const;
+  bool is_paper() const { return preset == "paper"; }
 };
 void add_search_switches(CLI::App& command, SearchSwitches& options);
 

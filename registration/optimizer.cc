@@ -182,6 +182,12 @@ std::string_view to_string(OptimizerKind kind) {
   return "";
 }
 
+std::optional<OptimizerKind> optimizer_kind_from(std::string_view name) {
+  for (const OptimizerKind kind : kOptimizerKinds)
+    if (to_string(kind) == name) return kind;
+  return std::nullopt;
+}
+
 std::vector<OptimizerResult> maximize(const BatchObjective& objective, std::span<const OptimizerOptions> searches) {
   if (searches.size() == 1) return {maximize_one(objective, searches.front())};
   std::vector<OptimizerResult> results(searches.size());

@@ -2,7 +2,9 @@
 // Local optimization within a box, by NLopt. Points come in batches: the differences of a gradient, and of several
 // searches the steps of all, so that one call of the objective fills a machine.
 
+#include <array>
 #include <functional>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -15,7 +17,10 @@ enum class OptimizerKind {
   kNelderMead,  // simplex, no derivatives
   kLbfgs,       // quasi-Newton on central differences, which cost 13 evaluations per step but come in one batch
 };
+inline constexpr std::array kOptimizerKinds = {OptimizerKind::kBobyqa, OptimizerKind::kNelderMead,
+                                               OptimizerKind::kLbfgs};
 std::string_view to_string(OptimizerKind kind);
+std::optional<OptimizerKind> optimizer_kind_from(std::string_view name);
 
 struct OptimizerOptions {
   OptimizerKind kind = OptimizerKind::kBobyqa;

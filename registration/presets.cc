@@ -81,7 +81,8 @@ std::vector<Stage> paper_stages() {
 RegistrationOptions preset(std::string_view name) {
   if (name == "setup") return {.preset = "setup", .stages = setup_stages()};
   if (name == "fast") return {.preset = "fast", .stages = fast_stages(), .check_alternatives = false};
-  if (name == "paper") return {.preset = "paper", .stages = paper_stages(), .check_alternatives = false};
+  if (name == "paper")
+    return {.preset = "paper", .stages = paper_stages(), .eight_bit_xrays = true, .check_alternatives = false};
   throw UsageError(fmt::format("there is no preset {}; the presets are {}", name, fmt::join(kPresets, ", ")));
 }
 

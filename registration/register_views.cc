@@ -2,7 +2,9 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <numeric>
 
 #include "geometry/error.h"
@@ -12,6 +14,14 @@
 
 namespace isoshift {
 namespace {
+
+void round_to_eight_bit(FixedImage& image) {
+  std::vector<float> in_field;
+  for (std::size_t n = 0; n < image.field.pixels.size(); ++n)
+    if (image.field.pixels[n] != 0) in_field.push_back(image.line_integral.pixels[n]);
+  const Range range = range_of(in_field);
+  for (float& value : image.line_integral.pixels) value = std::round(255.0F * std::clamp(range(value), 0.0F, 1.0F));
+}
 
 // Before anything is searched: the CT must appear in every view as planned.
 void require_visible(const RendererPyramid& renderers, std::span<const XrayImage> xrays, const FixedViews& views,
@@ -61,7 +71,10 @@ RegistrationResult register_views(const RendererPyramid& renderers, std::span<co
   const auto begin = std::chrono::steady_clock::now();
   const ProjectedRegion everything;
   FixedViews fixed{.images = {}, .region = options.region != nullptr ? *options.region : everything};
-  for (const XrayImage& xray : xrays) fixed.images.push_back(prepare(xray));
+  for (const XrayImage& xray : xrays) {
+    fixed.images.push_back(prepare(xray));
+    if (options.eight_bit_xrays) round_to_eight_bit(fixed.images.back());
+  }
   require_visible(renderers, xrays, fixed, start_room_from_patient);
 
   const SearchOptions search_options{.stages = options.stages,
@@ -85,8 +98,8 @@ RegistrationResult register_views(const RendererPyramid& renderers, std::span<co
                                   .pixel_fraction = last.pixel_fraction,
                                   .min_pixels = static_cast<std::size_t>(last.min_pixels),
                                   .seed = options.seed});
-  result.uncertainty =
-      estimated_uncertainty(gradient_correlation, result.actual_room_from_patient, options.dof == Dof::kTranslation, renderers.voxel_mm());
+  result.uncertainty = estimated_uncertainty(gradient_correlation, result.actual_room_from_patient,
+                                             options.dof == Dof::kTranslation, renderers.voxel_mm());
   if (options.check_alternatives)
     result.alternatives = compare_alternatives(renderers, fixed, start_room_from_patient, search_options);
 

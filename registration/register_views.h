@@ -26,9 +26,10 @@ struct RegistrationOptions {
   std::string preset;  // what the stages are called
   std::vector<Stage> stages;
   Dof dof = Dof::kRigid;
-  double bound_mm = 50.0;   // the search box about the start
-  double bound_rad = 0.35;  // the same for rotations, about 20 degrees
-  std::uint64_t seed = 1;   // the only source of randomness: same seed, same pose
+  double bound_mm = 50.0;        // the search box about the start
+  double bound_rad = 0.35;       // the same for rotations, about 20 degrees
+  std::uint64_t seed = 1;        // the only source of randomness: same seed, same pose
+  bool eight_bit_xrays = false;  // line integrals of the field in 256 steps, as the founding paper's
   bool check_alternatives = true;
   const ProjectedRegion* region = nullptr;  // borrowed; what of the views is compared. nullptr: all
 

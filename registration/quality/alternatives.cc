@@ -57,10 +57,10 @@ struct Attempt {
   SearchResult found;
 };
 
-// What a search does not explain. An alternative that leaves less than this many times as much as the images as they
-// are is looked at closely: blurred, a head is symmetric.
+// What a search does not explain. Where an alternative and the images as they are differ by less than this factor, they
+// are looked at closely: blurred, a head is symmetric.
 double unexplained(const SearchResult& found) { return 1.0 - found.stages.back().value; }
-constexpr double kClose = 3.0;
+constexpr double kClose = 1.5;
 
 std::vector<Attempt> attempts_with(const FixedViews& views) {
   std::vector<Attempt> attempts = {{.description = "as they are", .views = views}};
@@ -99,7 +99,8 @@ std::vector<Alternative> compare_alternatives(const RendererPyramid& renderers, 
   for (Attempt& attempt : attempts)
     attempt.found = search(renderers, attempt.views, start_room_from_patient, short_search);
   const auto is_close = [&](const Attempt& attempt) {
-    return unexplained(attempt.found) < kClose * unexplained(attempts.front().found);
+    const double ratio = unexplained(attempt.found) / unexplained(attempts.front().found);
+    return ratio < kClose && ratio > 1.0 / kClose;
   };
   const auto closely = [&](const Attempt& attempt) {
     SearchOptions long_search = options;
