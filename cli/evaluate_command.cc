@@ -5,6 +5,7 @@
 
 #include <atomic>
 #include <exception>
+#include <limits>
 #include <memory>
 #include <mutex>
 #include <thread>
@@ -92,13 +93,13 @@ std::string joined(const std::vector<std::string>& reasons) {
   return text;
 }
 
-EvaluatedRun evaluated(int number, const StartPose& start, const Eigen::Isometry3d& truth, const Study& study,
-                       const RegistrationResult& result) {
+void add_errors(const RegistrationResult& result, const Eigen::Isometry3d& truth, const Study& study,
+                EvaluatedRun& run) {
   const std::vector<Eigen::Vector3d> targets_mm = standard_targets_mm();
   const Eigen::Isometry3d found =
       setup_error_from_poses(study.planned_room_from_patient, result.actual_room_from_patient);
-  EvaluatedRun run{.number = number, .start_mtre_mm = start.mtre_mm};
   run.mtre_mm = mean_target_registration_error_mm(found, truth, targets_mm);
+  run.mpd_mm = run.mrpd_mm = 0.0;
   for (const XrayImage& xray : study.xrays) {
     const auto views = static_cast<double>(study.xrays.size());
     run.mpd_mm += mean_projection_distance_mm(found, truth, targets_mm, xray.view) / views;
@@ -107,24 +108,39 @@ EvaluatedRun evaluated(int number, const StartPose& start, const Eigen::Isometry
   run.rotation_share = rotation_share(found, truth, targets_mm);
   const Eigen::Isometry3d error = found * truth.inverse();
   const Eigen::AngleAxisd turn(error.linear());
-  for (int axis = 0; axis < 3; ++axis) {
-    run.error[axis] = error.translation()[axis];
-    run.error[axis + 3] = deg_from_rad(turn.angle()) * turn.axis()[axis];
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const auto n = static_cast<Eigen::Index>(axis);
+    run.error[axis] = error.translation()[n];
+    run.error[axis + 3] = deg_from_rad(turn.angle()) * turn.axis()[n];
   }
-  if (result.uncertainty) {
-    run.sigma.emplace();
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      const auto n = static_cast<Eigen::Index>(axis);
-      (*run.sigma)[axis] = result.uncertainty->translation_mm[n];
-      (*run.sigma)[axis + 3] = deg_from_rad(result.uncertainty->rotation_rad[n]);
-    }
+  if (!result.uncertainty) return;
+  run.sigma.emplace();
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const auto n = static_cast<Eigen::Index>(axis);
+    (*run.sigma)[axis] = result.uncertainty->translation_mm[n];
+    (*run.sigma)[axis + 3] = deg_from_rad(result.uncertainty->rotation_rad[n]);
   }
-  run.verdict = result.verdict;
-  run.reasons = joined(result.reasons);
-  run.evaluations = result.evaluations();
-  run.seconds = result.seconds;
-  run.seconds_rendering = result.seconds_rendering;
-  run.seconds_similarity = result.seconds_similarity;
+}
+
+// A registration that ends with an error counts as one that found nothing.
+EvaluatedRun evaluated(int number, const StartPose& start, const Eigen::Isometry3d& truth, const Study& study,
+                       const RendererPyramid& renderers, const RegistrationOptions& options) {
+  constexpr double kNothing = std::numeric_limits<double>::infinity();
+  EvaluatedRun run{
+      .number = number, .start_mtre_mm = start.mtre_mm, .mtre_mm = kNothing, .mpd_mm = kNothing, .mrpd_mm = kNothing};
+  try {
+    const RegistrationResult result =
+        register_views(renderers, study.xrays, start.setup_error * study.planned_room_from_patient, options);
+    add_errors(result, truth, study, run);
+    run.verdict = result.verdict;
+    run.reasons = joined(result.reasons);
+    run.evaluations = result.evaluations();
+    run.seconds = result.seconds;
+    run.seconds_rendering = result.seconds_rendering;
+    run.seconds_similarity = result.seconds_similarity;
+  } catch (const Error& error) {
+    run.reasons = error.what();
+  }
   return run;
 }
 
@@ -142,10 +158,9 @@ void run_missing(EvaluationFolder& folder, const Study& study, const RendererPyr
   const auto work = [&] {
     for (std::size_t n = next++; n < missing.size(); n = next++) try {
         const int number = missing[n];
-        const Eigen::Isometry3d start = starts[number].setup_error * study.planned_room_from_patient;
-        const RegistrationResult result = register_views(renderers, study.xrays, start, registration);
+        const EvaluatedRun run = evaluated(number, starts[number], truth, study, renderers, registration);
         const std::lock_guard lock(mutex);
-        folder.append(evaluated(number, starts[number], truth, study, result));
+        folder.append(run);
         bar.update(folder.runs().size(), starts.size());
       } catch (...) {
         const std::lock_guard lock(mutex);

@@ -61,6 +61,7 @@ SetupReport::Stage stage_in_report(const Stage& stage, const StageReport& done) 
                                           {"min_pixels", stage.min_pixels},
                                           {"candidates", stage.candidates},
                                           {"starts", stage.starts},
+                                          {"keep", stage.keep},
                                           {"reach_mm", stage.reach_mm},
                                           {"reach_deg", deg_from_rad(stage.reach_rad)},
                                           {"initial_step_mm", stage.initial_step_mm},
@@ -90,13 +91,17 @@ SetupReport make_report(const RegisterOptions& options, const Study& study, cons
   report.setup_error = setup_error_from_poses(study.planned_room_from_patient, result.actual_room_from_patient);
   report.unobservable_room = result.unobservable_room;
   report.translation_only = options.search.dof == "translation";
-  for (std::size_t n = 0; n < study.rt_images.size(); ++n)
+  for (std::size_t n = 0; n < study.rt_images.size(); ++n) {
+    const std::optional<LeftOutView>& left_out = result.views[n].left_out;
     report.views.push_back({.label = study.rt_images[n].label,
                             .sop_instance_uid = study.rt_images[n].sop_instance_uid,
                             .gantry_deg = study.rt_images[n].gantry_angle_deg.value(),
                             .similarity_start = result.views[n].similarity_start,
                             .similarity_final = result.views[n].similarity_final,
+                            .left_out_mm = left_out ? std::optional(left_out->distance_mm) : std::nullopt,
+                            .left_out_deg = left_out ? std::optional(deg_from_rad(left_out->angle_rad)) : std::nullopt,
                             .parts = parts_in_report(result.views[n].consistency)});
+  }
   const RegistrationOptions registration = options.search.registration();
   for (std::size_t n = 0; n < result.stages.size(); ++n)
     report.stages.push_back(stage_in_report(registration.stages[n], result.stages[n]));

@@ -17,6 +17,7 @@
 #include "geometry/xray_image.h"
 #include "registration/quality/alternatives.h"
 #include "registration/quality/consistency.h"
+#include "registration/quality/cross_checks.h"
 #include "registration/quality/uncertainty.h"
 #include "registration/search.h"
 
@@ -31,6 +32,7 @@ struct RegistrationOptions {
   std::uint64_t seed = 1;        // the only source of randomness: same seed, same pose
   bool eight_bit_xrays = false;  // line integrals of the field in 256 steps, as the founding paper's
   bool check_alternatives = true;
+  bool check_vertebrae = false;             // along the spine; on request, for it takes as long as the registration
   const ProjectedRegion* region = nullptr;  // borrowed; what of the views is compared. nullptr: all
 
   // Throws UsageError naming the field and its value.
@@ -41,7 +43,8 @@ struct RegistrationOptions {
 struct ViewReport {
   double similarity_start = -1.0;
   double similarity_final = -1.0;
-  ViewConsistency consistency;  // of its parts with the pose found
+  ViewConsistency consistency;          // of its parts with the pose found
+  std::optional<LeftOutView> left_out;  // with three or more views
 };
 
 struct RegistrationResult {
