@@ -79,6 +79,7 @@ Json configuration_of(const EvaluateOptions& options, const Study& study, const 
           {"excluded", options.region.excluded},
           {"around_isocenter_mm", options.region.around_isocenter_mm.value_or(0.0)},
           {"margin_mm", options.region.margin_mm},
+          {"rectangles", options.region.rectangles},
           {"seed", options.search.seed},
           {"series", options.series},
           {"start_seed", protocol.seed},
@@ -210,6 +211,7 @@ int run_evaluate(EvaluateOptions options, Console& console) {
                                   beams_of(study), options.rendering.options());
   RegistrationOptions registration = options.search.registration();
   registration.region = &region.projected;
+  registration.rectangles = options.region.rectangles_of(study);
   EvaluationFolder folder(options.output, configuration_of(options, study, renderers.finest(), truth, protocol));
   {
     ProgressBar bar(console, "Evaluating");

@@ -139,10 +139,20 @@ SpatialRegistrationLabel label_of(Verdict verdict) {
   return {.content_label = "SETUP_REVIEW", .content_description = "NOT ACCEPTED: REVIEW"};
 }
 
-// One picture per view.
-void write_pictures(const Study& study, Renderer& renderer, const Eigen::Isometry3d& actual_room_from_patient,
+std::vector<ViewComparison::Disagreement> disagreements_of(const ViewReport& view, const XrayView& camera) {
+  std::vector<ViewComparison::Disagreement> list;
+  for (const Tile& tile : view.consistency.tiles)
+    if (tile.disagrees)
+      list.push_back({.center_px = tile.center_px,
+                      .width_px = tile.width_px,
+                      .displacement_px = tile.displacement_mm * pixels_per_mm(camera)});
+  return list;
+}
+
+// One picture per view, of what is rendered for the search.
+void write_pictures(const Study& study, Renderer& renderer, const RegistrationResult& result,
                     const std::filesystem::path& folder) {
-  const std::array poses = {study.planned_room_from_patient, actual_room_from_patient};
+  const std::array poses = {study.planned_room_from_patient, result.actual_room_from_patient};
   for (std::size_t n = 0; n < study.xrays.size(); ++n) {
     const XrayImage& xray = study.xrays[n];
     const RenderResult drrs = renderer.render(std::span(&xray.view, 1), poses, PixelSet::all());
@@ -155,7 +165,8 @@ void write_pictures(const Study& study, Renderer& renderer, const Eigen::Isometr
                           .field = compared.field,
                           .drr_planned = planned,
                           .drr_found = found,
-                          .isocenter_px = xray.view.project(Eigen::Vector3d::Zero()).value()});
+                          .isocenter_px = xray.view.project(Eigen::Vector3d::Zero()).value(),
+                          .disagreements = disagreements_of(result.views[n], xray.view)});
   }
 }
 
@@ -177,6 +188,7 @@ int run_register(const RegisterOptions& given, Console& console) {
                                   beams_of(study), options.rendering.options());
   RegistrationOptions registration = options.search.registration();
   registration.region = &region.projected;
+  registration.rectangles = options.region.rectangles_of(study);
   const double seconds_load = total.seconds();
   RegistrationResult result;
   {
@@ -189,7 +201,7 @@ int run_register(const RegisterOptions& given, Console& console) {
   if (may_write_registration(options, result))
     report.spatial_registration_uid = write_spatial_registration(
         study, result.actual_room_from_patient, label_of(result.verdict), output.path() / kRegistrationFile, notes);
-  write_pictures(study, renderers.finest(), result.actual_room_from_patient, output.path());
+  write_pictures(study, renderers.finest(), result, output.path());
   report.overrides = notes.overrides;
   report.left_aside = notes.left_aside;
   report.warnings = notes.warnings;

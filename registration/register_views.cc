@@ -73,6 +73,8 @@ RegistrationResult register_views(const RendererPyramid& renderers, std::span<co
   FixedViews fixed{.images = {}, .region = options.region != nullptr ? *options.region : everything};
   for (const XrayImage& xray : xrays) {
     fixed.images.push_back(prepare(xray));
+    if (const auto rectangle = options.rectangles.find(xray.label); rectangle != options.rectangles.end())
+      restrict_to(rectangle->second, fixed.images.back());
     if (options.eight_bit_xrays) round_to_eight_bit(fixed.images.back());
   }
   require_visible(renderers, xrays, fixed, start_room_from_patient);
