@@ -78,14 +78,12 @@ void report_spread(const std::vector<OptimizerResult>& found, StageReport& repor
   if (found.size() < 2) return;
   constexpr double kClearlyMore = 1.1;
   const OptimizerResult& best = found.front();
-  const Eigen::Isometry3d of_best = setup_error_from_parameters(best.best);
   report.spread_mm = report.spread_rad = 0.0;
   for (const OptimizerResult& other : found) {
     if (1.0 - other.value > kClearlyMore * (1.0 - best.value)) continue;
-    const Eigen::Isometry3d setup_error = setup_error_from_parameters(other.best);
-    report.spread_mm = std::max(*report.spread_mm, (setup_error.translation() - of_best.translation()).norm());
-    report.spread_rad =
-        std::max(*report.spread_rad, Eigen::AngleAxisd(setup_error.linear() * of_best.linear().transpose()).angle());
+    const PoseDistance distance = distance_between(other.best, best.best);
+    report.spread_mm = std::max(*report.spread_mm, distance.translation_mm);
+    report.spread_rad = std::max(*report.spread_rad, distance.angle_rad);
   }
 }
 

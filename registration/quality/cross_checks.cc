@@ -34,14 +34,12 @@ std::vector<LeftOutView> leave_out_views(const RendererPyramid& renderers, const
   SearchOptions last_stage = options;
   last_stage.stages = options.stages.last(1);
   last_stage.parameters = found.parameters;
-  const Eigen::Isometry3d with_all = setup_error_from_parameters(found.parameters);
   for (std::size_t view = 0; view < views.images.size(); ++view) {
     FixedViews others = views;
     others.images.erase(others.images.begin() + static_cast<std::ptrdiff_t>(view));
     const SearchResult without = search(renderers, others, start_room_from_patient, last_stage);
-    const Eigen::Isometry3d setup_error = setup_error_from_parameters(without.parameters);
-    left_out.push_back({.distance_mm = (setup_error.translation() - with_all.translation()).norm(),
-                        .angle_rad = Eigen::AngleAxisd(setup_error.linear() * with_all.linear().transpose()).angle()});
+    const PoseDistance distance = distance_between(without.parameters, found.parameters);
+    left_out.push_back({.distance_mm = distance.translation_mm, .angle_rad = distance.angle_rad});
   }
   return left_out;
 }
@@ -71,7 +69,8 @@ std::vector<Alternative> compare_vertebrae(const RendererPyramid& renderers, con
       best = Alternative{.description = fmt::format("the patient {:.0f} mm further to the {}", std::abs(moved_mm),
                                                     moved_mm > 0.0 ? "head" : "feet"),
                          .similarity = similarity,
-                         .as_is = found.stages.back().value};
+                         .as_is = found.stages.back().value,
+                         .distance_mm = std::abs(moved_mm)};
     }
     if (best) alternatives.push_back(*best);
   }
