@@ -306,7 +306,8 @@ TEST_P(RendererTest, AgreesWhereRaysRunBothWaysAlongTheirMainAxis) {
   if (!splats()) {
     EXPECT_LT(relative_error(whole, expected), 0.02);  // steps of 2 mm, planes of up to 12 mm
   }
-  const auto sparse = renderer->render(std::span(&view, 1), std::span(&pose, 1), pixels).line_integrals(0, 0);
+  const RenderResult result = renderer->render(std::span(&view, 1), std::span(&pose, 1), pixels);
+  const auto sparse = result.line_integrals(0, 0);
   for (std::size_t n = 0; n < sparse.size(); ++n) ASSERT_NEAR(sparse[n], whole[pixels.of_view[0][n]], 2e-5);
 }
 
@@ -318,7 +319,8 @@ TEST_P(RendererTest, RandomPixelsAreThoseOfTheWholeImageAtEveryAngle) {
     const Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
     const auto whole = rendered(*renderer, view, pose);
     const PixelSet pixels = PixelSet::random(std::span(&view, 1), 0.05, 1);
-    const auto sparse = renderer->render(std::span(&view, 1), std::span(&pose, 1), pixels).line_integrals(0, 0);
+    const RenderResult result = renderer->render(std::span(&view, 1), std::span(&pose, 1), pixels);
+    const auto sparse = result.line_integrals(0, 0);
     for (std::size_t n = 0; n < sparse.size(); ++n)
       ASSERT_NEAR(sparse[n], whole[pixels.of_view[0][n]], 2e-5) << gantry_deg;
   }
@@ -344,8 +346,8 @@ TEST_P(RendererTest, NothingToRenderGivesNothing) {
   const auto renderer = make(ct);
   const XrayView view = centered_view(0, 33, 4.0);
   const Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
-  EXPECT_TRUE(
-      renderer->render(std::span(&view, 1), std::span(&pose, 1), {.of_view = {{}}}).line_integrals(0, 0).empty());
+  const RenderResult nothing = renderer->render(std::span(&view, 1), std::span(&pose, 1), {.of_view = {{}}});
+  EXPECT_TRUE(nothing.line_integrals(0, 0).empty());
   renderer->render(std::span(&view, 1), {}, PixelSet::all());
   renderer->render({}, std::span(&pose, 1), PixelSet::all());
   const auto after = rendered(*renderer, view, pose);

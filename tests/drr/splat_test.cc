@@ -22,7 +22,8 @@ std::vector<float> splatted(const Volume<float>& ct, const XrayView& view, const
                             RendererKind kind = RendererKind::kSplatBuffers) {
   const auto renderer = make_renderer(kind, ct, {}, kBothBeams, {.gl = GlDevice::kSoftware, .splat = splat});
   const Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
-  const auto pixels = renderer->render(std::span(&view, 1), std::span(&pose, 1), PixelSet::all()).line_integrals(0, 0);
+  const RenderResult result = renderer->render(std::span(&view, 1), std::span(&pose, 1), PixelSet::all());
+  const auto pixels = result.line_integrals(0, 0);
   return {pixels.begin(), pixels.end()};
 }
 

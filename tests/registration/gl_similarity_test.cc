@@ -158,9 +158,9 @@ TEST_P(GlSimilarityTest, IsThatOfTheCpuOnDrrsAndXrays) {
   BroughtBack on_cpu(renderer);
   double largest = 0.0;
   for (const double fraction : {1.0, 0.1}) {
-    const ObjectiveOptions options{.similarity = GetParam().kind, .pixel_fraction = fraction};
-    Objective gpu(renderer, scene().images, options);
-    Objective cpu(on_cpu, scene().images, options);
+    const ObjectiveOptions options{.similarity = GetParam().kind, .pixel_fraction = fraction, .min_pixels = 100};
+    Objective gpu(renderer, scene().images, scene().planned, options);
+    Objective cpu(on_cpu, scene().images, scene().planned, options);
     ASSERT_NE(gpu.comparison(0).pixels(), gpu.comparison(1).pixels());
     const auto poses = poses_about_plan(9);
     const auto found = gpu.per_view(poses);
@@ -208,12 +208,12 @@ TEST_P(GlSimilarityTest, LargeOffsetsAndManyPixelsCostNoPrecision) {
 }
 
 TEST_P(GlSimilarityTest, RenderersAndObjectivesDoNotDisturbEachOther) {
-  const ObjectiveOptions options{.similarity = GetParam().kind, .pixel_fraction = 0.1};
+  const ObjectiveOptions options{.similarity = GetParam().kind, .pixel_fraction = 0.1, .min_pixels = 100};
   const auto poses = poses_about_plan(3);
   RaycastGlRenderer first(scene().ct, {}, kBothBeams, device());
   auto second = std::make_unique<RaycastGlRenderer>(scene().ct, AttenuationModel{}, kBothBeams, device());
-  Objective of_first(first, scene().images, options);
-  auto of_second = std::make_unique<Objective>(*second, scene().images, options);
+  Objective of_first(first, scene().images, scene().planned, options);
+  auto of_second = std::make_unique<Objective>(*second, scene().images, scene().planned, options);
   const auto expected = of_first.per_view(poses);
   EXPECT_EQ(of_second->per_view(poses), expected);
   EXPECT_EQ(of_first.per_view(poses), expected);
@@ -253,7 +253,7 @@ TEST(GlSimilarity, TakesMorePosesThanOneBufferHolds) {
   const std::size_t at_once = renderer.poses_at_once(image.field.pixels.size());
   if (at_once > 100) GTEST_SKIP() << "storage buffers hold " << at_once << " poses: too slow";
   const auto poses = random_poses(static_cast<int>(at_once) + 1);
-  Objective objective(renderer, std::span(&image, 1), {});
+  Objective objective(renderer, std::span(&image, 1), poses.front(), {});
   const auto all = objective.per_view(poses);
   ASSERT_EQ(all.size(), poses.size());
   EXPECT_NE(all.back(), all.front());
@@ -271,7 +271,7 @@ TEST(GlSimilarity, OnlyTheComputeRayCasterLeavesItsLineIntegralsOnTheGpu) {
 
 TEST(GlSimilarity, SecondsOfTheObjectiveAddUp) {
   RaycastGlRenderer renderer(scene().ct, {}, kBothBeams, {.gl = GlDevice::kSoftware});
-  Objective objective(renderer, scene().images, {});
+  Objective objective(renderer, scene().images, scene().planned, {});
   const auto begin = std::chrono::steady_clock::now();
   objective.per_view(poses_about_plan(9));
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();

@@ -1,10 +1,13 @@
 #include "registration/quality/judge.h"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <functional>
 #include <limits>
 
+#include "geometry/rotation.h"
 #include "tests/drr/test_views.h"
 #include "tests/support/pose_near.h"
 
@@ -14,75 +17,191 @@ namespace {
 using testing::ElementsAre;
 using testing::HasSubstr;
 
+ViewConsistency parts(int agreeing, int disagreeing, int without_signal = 0) {
+  ViewConsistency consistency;
+  for (int n = 0; n < agreeing; ++n) consistency.tiles.push_back({.has_signal = true});
+  for (int n = 0; n < disagreeing; ++n) consistency.tiles.push_back({.has_signal = true, .disagrees = true});
+  for (int n = 0; n < without_signal; ++n) consistency.tiles.push_back({});
+  return consistency;
+}
+
+// Everything as it should be: 0.2 mm and 0.2 degrees at one sigma, and mirrored images that explain much less.
 RegistrationResult good_result() {
   RegistrationResult result;
-  result.views = {{.similarity_start = 0.8, .similarity_final = 0.97},
-                  {.similarity_start = 0.7, .similarity_final = 0.95}};
-  result.stages = {{.name = "fine", .similarity = "gradient-correlation", .evaluations = 40}};
+  result.views = {{.similarity_start = 0.8, .similarity_final = 0.97, .consistency = parts(20, 0)},
+                  {.similarity_start = 0.7, .similarity_final = 0.95, .consistency = parts(20, 0)}};
+  result.stages = {{.name = "restarts",
+                    .similarity = "gradient-correlation",
+                    .evaluations = 90,
+                    .spread_mm = 0.1,
+                    .spread_rad = rad_from_deg(0.1)},
+                   {.name = "fine", .similarity = "gradient-correlation", .evaluations = 40}};
+  result.uncertainty = Uncertainty{.translation_mm = Eigen::Vector3d::Constant(0.2),
+                                   .rotation_rad = Eigen::Vector3d::Constant(rad_from_deg(0.2))};
+  result.alternatives = {{.description = "view 1 mirrored", .similarity = 0.6, .as_is = 0.96},
+                         {.description = "views 1 and 2 exchanged", .similarity = 0.3, .as_is = 0.96}};
   return result;
 }
 
 constexpr std::array kInside = {1.0, -2.0, 3.0, 0.01, 0.02, -0.03};
 
-TEST(Quality, AcceptsWhatImprovedAndMatchesAndWarnsThatChecksAreIncomplete) {
+// Spoils a good result, and expects review for this one reason.
+void expect_review(const std::function<void(RegistrationResult&)>& spoil, const std::string& reason) {
   RegistrationResult result = good_result();
+  spoil(result);
   judge(kInside, {}, result);
-  EXPECT_EQ(result.verdict, Verdict::kAccepted);
-  EXPECT_THAT(result.warnings, ElementsAre(HasSubstr("not complete")));
+  EXPECT_EQ(result.verdict, Verdict::kReview) << reason;
+  EXPECT_THAT(result.reasons, ElementsAre(HasSubstr(reason)));
+}
+
+void expect_accepted(const std::function<void(RegistrationResult&)>& change) {
+  RegistrationResult result = good_result();
+  change(result);
+  judge(kInside, {}, result);
+  EXPECT_EQ(result.verdict, Verdict::kAccepted) << testing::PrintToString(result.reasons);
+  EXPECT_THAT(result.reasons, testing::IsEmpty());
+}
+
+TEST(Quality, AcceptsWhatImprovedAndMatches) {
+  expect_accepted([](RegistrationResult&) {});
 }
 
 TEST(Quality, AParameterAtItsBoundNeedsReview) {
-  RegistrationResult result = good_result();
-  auto parameters = kInside;
-  parameters[1] = -50.0;
-  judge(parameters, {}, result);
-  EXPECT_EQ(result.verdict, Verdict::kReview);
-  EXPECT_THAT(result.reasons, ElementsAre("the y translation ended at its bound"));
+  constexpr std::array kNames = {"x translation",    "y translation",    "z translation",
+                                 "rotation about x", "rotation about y", "rotation about z"};
+  const RegistrationOptions options{.bound_mm = 20.0, .bound_rad = 0.2};
+  for (std::size_t axis = 0; axis < kInside.size(); ++axis)
+    for (const double sign : {-1.0, 1.0}) {
+      RegistrationResult result = good_result();
+      auto parameters = kInside;
+      parameters[axis] = sign * 20.0;  // 0.2 rad on the sphere of 100 mm is 20 mm, too
+      judge(parameters, options, result);
+      EXPECT_EQ(result.verdict, Verdict::kReview);
+      EXPECT_THAT(result.reasons, ElementsAre(fmt::format("the {} ended at its bound", kNames[axis])));
+    }
+}
+
+TEST(Quality, EveryAxisMustBeKnownToAMillimeterAndADegreeAtTwoSigma) {
+  for (int axis = 0; axis < 3; ++axis) {
+    expect_accepted([&](RegistrationResult& result) {
+      result.uncertainty->translation_mm[axis] = 0.49;
+      result.uncertainty->rotation_rad[axis] = rad_from_deg(0.49);
+    });
+    const std::string name(1, "xyz"[axis]);
+    expect_review([&](RegistrationResult& result) { result.uncertainty->translation_mm[axis] = 0.6; },
+                  "the " + name + " translation is uncertain: 1.2 mm at two sigma");
+    expect_review([&](RegistrationResult& result) { result.uncertainty->rotation_rad[axis] = rad_from_deg(0.6); },
+                  "the rotation about " + name + " is uncertain: 1.2 degrees at two sigma");
+  }
+}
+
+TEST(Quality, AnUncertaintyThatIsMissingOrNoNumberNeedsReview) {
+  expect_review([](RegistrationResult& result) { result.uncertainty.reset(); }, "the images do not determine the pose");
+  constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+  expect_review([&](RegistrationResult& result) { result.uncertainty->translation_mm[1] = kNan; }, "is uncertain");
+  expect_review([&](RegistrationResult& result) { result.uncertainty->rotation_rad[2] = kNan; }, "is uncertain");
+}
+
+TEST(Quality, StartsThatEndApartNeedReview) {
+  const auto spread = [](double mm, double deg) {
+    return [=](RegistrationResult& result) {
+      result.stages[0].spread_mm = mm;
+      result.stages[0].spread_rad = rad_from_deg(deg);
+    };
+  };
+  expect_accepted(spread(0.95, 0.95));
+  expect_review(spread(1.2, 0.1), "end 1.2 mm and 0.1 degrees apart in stage restarts");
+  expect_review(spread(0.1, 1.2), "end 0.1 mm and 1.2 degrees apart in stage restarts");
+  expect_review(spread(std::numeric_limits<double>::infinity(), 0.0), "searches from different starts");
 }
 
 TEST(Quality, SplattingNeedsReview) {
-  RegistrationResult result = good_result();
-  result.renderer = RendererKind::kSplatTexture;
-  judge(kInside, {}, result);
-  EXPECT_EQ(result.verdict, Verdict::kReview);
-  EXPECT_THAT(result.reasons, ElementsAre(HasSubstr("splat-texture are too noisy")));
+  expect_review([](RegistrationResult& result) { result.renderer = RendererKind::kSplatTexture; },
+                "splat-texture are too noisy");
 }
 
 TEST(Quality, AViewThatGotWorseNeedsReview) {
-  RegistrationResult result = good_result();
-  result.views[1] = {.similarity_start = 0.96, .similarity_final = 0.95};
-  judge(kInside, {}, result);
-  EXPECT_EQ(result.verdict, Verdict::kReview);
-  EXPECT_THAT(result.reasons, ElementsAre(HasSubstr("view 2 matches worse")));
-}
-
-TEST(Quality, ASearchThatRanOutOfEvaluationsNeedsReview) {
-  RegistrationResult result = good_result();
-  result.stages.back().reached_limit = true;
-  judge(kInside, {}, result);
-  EXPECT_THAT(result.reasons, ElementsAre(HasSubstr("did not converge")));
-}
-
-TEST(Quality, ASimilarityThatIsNoNumberNeedsReview) {
-  RegistrationResult result = good_result();
-  result.views[0].similarity_final = std::numeric_limits<double>::quiet_NaN();
-  judge(kInside, {}, result);
-  EXPECT_EQ(result.verdict, Verdict::kReview);
+  for (const std::size_t view : {0U, 1U})
+    expect_review(
+        [&](RegistrationResult& result) {
+          result.views[view].similarity_start = 0.99;
+          result.views[view].similarity_final = 0.94;
+        },
+        fmt::format("view {} matches worse", view + 1));
 }
 
 TEST(Quality, ALittleLessInOneViewIsNoise) {
-  RegistrationResult result = good_result();
-  result.views[1] = {.similarity_start = 0.952, .similarity_final = 0.95};
-  judge(kInside, {}, result);
-  EXPECT_EQ(result.verdict, Verdict::kAccepted);
+  expect_accepted([](RegistrationResult& result) { result.views[1].similarity_start = 0.951; });
 }
 
-TEST(Quality, APoorMatchNeedsReview) {
+TEST(Quality, ASearchThatRanOutOfEvaluationsNeedsReview) {
+  expect_review([](RegistrationResult& result) { result.stages.back().reached_limit = true; }, "did not converge");
+  expect_review([](RegistrationResult& result) { result.stages.clear(); }, "did not converge");
+}
+
+TEST(Quality, ASimilarityThatIsNoNumberIsNeverAccepted) {
   RegistrationResult result = good_result();
-  result.views[0] = result.views[1] = {.similarity_start = 0.6, .similarity_final = 0.75};
+  result.views[0].similarity_final = std::numeric_limits<double>::quiet_NaN();
   judge(kInside, {}, result);
-  EXPECT_EQ(result.verdict, Verdict::kReview);
-  EXPECT_THAT(result.reasons, ElementsAre(HasSubstr("0.750 is below 0.80")));
+  EXPECT_NE(result.verdict, Verdict::kAccepted);
+}
+
+TEST(Quality, TheWorseTheMatchTheWorseTheVerdict) {
+  const auto verdict_at = [](double similarity) {
+    RegistrationResult result = good_result();
+    for (ViewReport& view : result.views)
+      view = {.similarity_start = 0.0, .similarity_final = similarity, .consistency = parts(20, 0)};
+    judge(kInside, {}, result);
+    EXPECT_EQ(result.reasons.empty(), result.verdict == Verdict::kAccepted) << similarity;
+    return result.verdict;
+  };
+  EXPECT_EQ(verdict_at(0.97), Verdict::kAccepted);
+  EXPECT_EQ(verdict_at(0.02), Verdict::kRejected);
+  Verdict last = Verdict::kAccepted;
+  int changes = 0;
+  for (int percent = 97; percent > 0; --percent) {
+    const Verdict verdict = verdict_at(0.01 * percent);
+    EXPECT_GE(verdict, last) << percent;
+    changes += verdict != last ? 1 : 0;
+    last = verdict;
+  }
+  EXPECT_EQ(changes, 2);  // there is review in between
+}
+
+TEST(Quality, PartsThatDisagreeNeedReview) {
+  for (const std::size_t view : {0U, 1U})
+    expect_review([&](RegistrationResult& result) { result.views[view].consistency = parts(10, 10, 5); },
+                  fmt::format("10 of 20 parts of view {} match elsewhere", view + 1));
+  // One alone may be anything, and parts without a signal say nothing.
+  expect_accepted([](RegistrationResult& result) { result.views[0].consistency = parts(1, 1); });
+  expect_accepted([](RegistrationResult& result) { result.views[0].consistency = parts(0, 0, 30); });
+}
+
+TEST(Quality, AnAlternativeAsGoodAsTheImagesNeedsReview) {
+  const auto mirrored = [](double similarity) {
+    return [=](RegistrationResult& result) { result.alternatives[0].similarity = similarity; };
+  };
+  expect_review(mirrored(0.96), "with view 1 mirrored the images match as well or better (0.960; as they are 0.960)");
+  expect_review(mirrored(0.98), "view 1 mirrored");
+  expect_review(mirrored(std::numeric_limits<double>::quiet_NaN()), "view 1 mirrored");
+  expect_review([](RegistrationResult& result) { result.alternatives[1].similarity = 0.97; },
+                "views 1 and 2 exchanged");
+}
+
+TEST(Quality, APresetWithoutTheCheckOfAlternativesNeedsReview) {
+  expect_review([](RegistrationResult& result) { result.alternatives.clear(); }, "leaves out the check");
+}
+
+TEST(Quality, EveryReasonIsGivenAndTheWorstDecides) {
+  RegistrationResult result = good_result();
+  result.views[0].similarity_start = result.views[0].similarity_final = 0.01;
+  result.views[1].similarity_start = result.views[1].similarity_final = 0.01;
+  result.uncertainty.reset();
+  result.stages[1].reached_limit = true;
+  judge(kInside, {}, result);
+  EXPECT_EQ(result.verdict, Verdict::kRejected);
+  EXPECT_THAT(result.reasons, testing::UnorderedElementsAre(HasSubstr("did not converge"), HasSubstr("0.010"),
+                                                            HasSubstr("do not determine the pose")));
 }
 
 TEST(Quality, OneViewCannotSeeDepth) {
@@ -94,6 +213,7 @@ TEST(Quality, OneViewCannotSeeDepth) {
   result.unobservable_room = unobservable;
   judge(kInside, {}, result);
   EXPECT_EQ(result.verdict, Verdict::kReview);
+  EXPECT_THAT(result.reasons, ElementsAre(HasSubstr("nearly the same direction")));
 }
 
 TEST(Quality, OpposedViewsSeeNoDepthEither) {
