@@ -35,6 +35,9 @@ class ProjectedRegion {
   // What is left out never takes more than nine tenths of the field: only a search that has gone astray meets that.
   void restrict(FixedImage& image, const Eigen::Isometry3d& room_from_patient, double slack_mm) const;
 
+  // Whether a volume was chosen: X-rays then show what lies before and behind it, and DRRs do not.
+  bool has_volume() const { return inside_ != nullptr; }
+
  private:
   std::unique_ptr<Renderer> inside_;
   std::vector<std::unique_ptr<Renderer>> outside_;

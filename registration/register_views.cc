@@ -101,7 +101,9 @@ RegistrationResult register_views(const RendererPyramid& renderers, std::span<co
                                   .min_pixels = static_cast<std::size_t>(last.min_pixels),
                                   .seed = options.seed});
   result.uncertainty = estimated_uncertainty(gradient_correlation, result.actual_room_from_patient,
-                                             options.dof == Dof::kTranslation, renderers.voxel_mm());
+                                             {.translation_only = options.dof == Dof::kTranslation,
+                                              .voxel_mm = renderers.voxel_mm(),
+                                              .has_volume_of_interest = fixed.region.has_volume()});
   if (options.check_alternatives)
     result.alternatives = compare_alternatives(renderers, fixed, start_room_from_patient, search_options);
   if (options.check_vertebrae)

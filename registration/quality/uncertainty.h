@@ -20,9 +20,15 @@ struct Uncertainty {
   Eigen::Vector3d rotation_rad = Eigen::Vector3d::Zero();
 };
 
+struct UncertaintyOptions {
+  bool translation_only = false;        // rotations are taken as known and get 0
+  double voxel_mm = 1.0;                // edge of the CT's voxels
+  bool has_volume_of_interest = false;  // what overlaps it is in the X-rays only
+};
+
 // `objective` compares by gradient correlation. Nothing where the images do not determine the pose (a singular
-// curvature). With `translation_only`, rotations are taken as known and get 0. `voxel_mm`: edge of the CT's voxels.
+// curvature).
 std::optional<Uncertainty> estimated_uncertainty(Objective& objective, const Eigen::Isometry3d& room_from_patient,
-                                                 bool translation_only, double voxel_mm);
+                                                 const UncertaintyOptions& options);
 
 }  // namespace isoshift
