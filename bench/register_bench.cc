@@ -8,7 +8,7 @@
 namespace isoshift {
 namespace {
 
-void register_two_views(benchmark::State& state) {
+void register_two_views(benchmark::State& state, const char* name) {
   const RendererPyramid renderers(RendererKind::kCpu, bench_ct(), {}, std::array{Beam::kKilovoltage});
   Placement placement;
   placement.translation_mm = Eigen::Vector3d(6, -6, 5);
@@ -23,15 +23,22 @@ void register_two_views(benchmark::State& state) {
   }
   Eigen::Isometry3d planned = Eigen::Isometry3d::Identity();  // HFS: (x, y, z) of the room is (x, z, -y) of the patient
   planned.linear() << 1, 0, 0, 0, 0, 1, 0, -1, 0;
-  double evaluations = 0.0;
+  double evaluations = 0.0, rendering = 0.0, similarity = 0.0, seconds = 0.0;
   for (auto _ : state) {
-    const RegistrationResult result = register_views(renderers, xrays, planned, preset("setup"));
+    const RegistrationResult result = register_views(renderers, xrays, planned, preset(name));
     evaluations = result.evaluations();
+    rendering += result.seconds_rendering;
+    similarity += result.seconds_similarity;
+    seconds += result.seconds;
     benchmark::DoNotOptimize(result);
   }
   state.counters["evaluations"] = evaluations;
+  state.counters["rendering_share"] = rendering / seconds;  // of the search; checks render, too
+  state.counters["similarity_share"] = similarity / seconds;
 }
-BENCHMARK(register_two_views)->UseRealTime()->Unit(benchmark::kMillisecond)->Iterations(3);
+BENCHMARK_CAPTURE(register_two_views, setup, "setup")->UseRealTime()->Unit(benchmark::kMillisecond)->Iterations(5);
+BENCHMARK_CAPTURE(register_two_views, fast, "fast")->UseRealTime()->Unit(benchmark::kMillisecond)->Iterations(5);
+BENCHMARK_CAPTURE(register_two_views, paper, "paper")->UseRealTime()->Unit(benchmark::kMillisecond)->Iterations(5);
 
 }  // namespace
 }  // namespace isoshift

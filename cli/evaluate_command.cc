@@ -5,15 +5,14 @@
 
 #include <atomic>
 #include <exception>
+#include <limits>
 #include <memory>
 #include <mutex>
 #include <thread>
 
 #include "cli/commands.h"
 #include "cli/evaluation_files.h"
-#include "cli/region_switches.h"
-#include "cli/rendering_options.h"
-#include "cli/search_switches.h"
+#include "cli/registration_setup.h"
 #include "cli/study_options.h"
 #include "cli/truth.h"
 #include "geometry/couch_shift.h"
@@ -30,9 +29,7 @@ using Json = nlohmann::ordered_json;
 
 struct EvaluateOptions {
   StudyOptions study;
-  RenderingOptions rendering;
-  SearchSwitches search;
-  RegionSwitches region;
+  RegistrationFlags flags;
   std::string series = "bins";
   std::optional<int> starts;
   std::optional<double> distance_mm;
@@ -52,11 +49,11 @@ StartProtocol protocol_of(const EvaluateOptions& options) {
 }
 
 // All that the runs depend on: an evaluation is continued only where it is the same.
-Json configuration_of(const EvaluateOptions& options, const Study& study, const Renderer& renderer,
+Json configuration_of(const RegistrationFlags& flags, const Study& study, const Renderer& renderer,
                       const Eigen::Isometry3d& truth, const StartProtocol& protocol) {
   Json images = Json::array(), settings = Json::object(), matrix = Json::array();
   for (const RtImage& image : study.rt_images) images.push_back(image.sop_instance_uid);
-  for (const auto& [name, value] : options.rendering.settings()) settings[name] = value;
+  for (const auto& [name, value] : flags.rendering.settings()) settings[name] = value;
   for (int row = 0; row < 3; ++row)
     for (int column = 0; column < 4; ++column) matrix.push_back(truth.matrix()(row, column));
   std::vector<XrayView> views;
@@ -67,19 +64,20 @@ Json configuration_of(const EvaluateOptions& options, const Study& study, const 
           {"truth", matrix},
           {"renderer", to_string(renderer.kind())},
           {"renderer_settings", settings},
-          {"attenuation", options.rendering.attenuation_name()},
-          {"threshold_hu", options.rendering.threshold_hu},
-          {"preset", options.search.preset},
-          {"similarity", options.search.similarity.value_or("")},
-          {"optimizer", options.search.optimizer.value_or("")},
-          {"pixel_fraction", options.search.pixel_fraction.value_or(0.0)},
-          {"dof", options.search.dof},
-          {"structures", options.region.structures},
-          {"excluded", options.region.excluded},
-          {"around_isocenter_mm", options.region.around_isocenter_mm.value_or(0.0)},
-          {"margin_mm", options.region.margin_mm},
-          {"seed", options.search.seed},
-          {"series", options.series},
+          {"attenuation", flags.rendering.attenuation_name()},
+          {"threshold_hu", flags.rendering.threshold_hu},
+          {"preset", flags.search.preset},
+          {"similarity", flags.search.similarity.value_or("")},
+          {"optimizer", flags.search.optimizer.value_or("")},
+          {"pixel_fraction", flags.search.pixel_fraction.value_or(0.0)},
+          {"dof", flags.search.dof},
+          {"structures", flags.region.structures},
+          {"excluded", flags.region.excluded},
+          {"around_isocenter_mm", flags.region.around_isocenter_mm.value_or(0.0)},
+          {"margin_mm", flags.region.margin_mm},
+          {"rectangles", flags.region.rectangles},
+          {"seed", flags.search.seed},
+          {"series", protocol.series == StartProtocol::Series::kPaper ? "paper" : "bins"},
           {"start_seed", protocol.seed},
           {"starts", protocol.count},
           {"distance_mm", protocol.distance_mm},
@@ -92,13 +90,13 @@ std::string joined(const std::vector<std::string>& reasons) {
   return text;
 }
 
-EvaluatedRun evaluated(int number, const StartPose& start, const Eigen::Isometry3d& truth, const Study& study,
-                       const RegistrationResult& result) {
+void add_errors(const RegistrationResult& result, const Eigen::Isometry3d& truth, const Study& study,
+                EvaluatedRun& run) {
   const std::vector<Eigen::Vector3d> targets_mm = standard_targets_mm();
   const Eigen::Isometry3d found =
       setup_error_from_poses(study.planned_room_from_patient, result.actual_room_from_patient);
-  EvaluatedRun run{.number = number, .start_mtre_mm = start.mtre_mm};
   run.mtre_mm = mean_target_registration_error_mm(found, truth, targets_mm);
+  run.mpd_mm = run.mrpd_mm = 0.0;
   for (const XrayImage& xray : study.xrays) {
     const auto views = static_cast<double>(study.xrays.size());
     run.mpd_mm += mean_projection_distance_mm(found, truth, targets_mm, xray.view) / views;
@@ -107,32 +105,46 @@ EvaluatedRun evaluated(int number, const StartPose& start, const Eigen::Isometry
   run.rotation_share = rotation_share(found, truth, targets_mm);
   const Eigen::Isometry3d error = found * truth.inverse();
   const Eigen::AngleAxisd turn(error.linear());
-  for (int axis = 0; axis < 3; ++axis) {
-    run.error[axis] = error.translation()[axis];
-    run.error[axis + 3] = deg_from_rad(turn.angle()) * turn.axis()[axis];
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const auto n = static_cast<Eigen::Index>(axis);
+    run.error[axis] = error.translation()[n];
+    run.error[axis + 3] = deg_from_rad(turn.angle()) * turn.axis()[n];
   }
-  if (result.uncertainty) {
-    run.sigma.emplace();
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      const auto n = static_cast<Eigen::Index>(axis);
-      (*run.sigma)[axis] = result.uncertainty->translation_mm[n];
-      (*run.sigma)[axis + 3] = deg_from_rad(result.uncertainty->rotation_rad[n]);
-    }
+  if (!result.uncertainty) return;
+  run.sigma.emplace();
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const auto n = static_cast<Eigen::Index>(axis);
+    (*run.sigma)[axis] = result.uncertainty->translation_mm[n];
+    (*run.sigma)[axis + 3] = deg_from_rad(result.uncertainty->rotation_rad[n]);
   }
-  run.verdict = result.verdict;
-  run.reasons = joined(result.reasons);
-  run.evaluations = result.evaluations();
-  run.seconds = result.seconds;
-  run.seconds_rendering = result.seconds_rendering;
-  run.seconds_similarity = result.seconds_similarity;
+}
+
+// A registration that ends with an error counts as one that found nothing.
+EvaluatedRun evaluated(int number, const StartPose& start, const Eigen::Isometry3d& truth, const Study& study,
+                       const RegistrationSetup& setup) {
+  constexpr double kNothing = std::numeric_limits<double>::infinity();
+  EvaluatedRun run{
+      .number = number, .start_mtre_mm = start.mtre_mm, .mtre_mm = kNothing, .mpd_mm = kNothing, .mrpd_mm = kNothing};
+  try {
+    const RegistrationResult result = register_views(
+        setup.renderers(), study.xrays, start.setup_error * study.planned_room_from_patient, setup.options());
+    add_errors(result, truth, study, run);
+    run.verdict = result.verdict;
+    run.reasons = joined(result.reasons);
+    run.evaluations = result.evaluations();
+    run.seconds = result.seconds;
+    run.seconds_rendering = result.seconds_rendering;
+    run.seconds_similarity = result.seconds_similarity;
+  } catch (const Error& error) {
+    run.reasons = error.what();
+  }
   return run;
 }
 
 // Runs what is missing, several at a time, each on one thread; alone, one uses all. What it finds does not depend on
 // that.
-void run_missing(EvaluationFolder& folder, const Study& study, const RendererPyramid& renderers,
-                 const RegistrationOptions& registration, const Eigen::Isometry3d& truth,
-                 const std::vector<StartPose>& starts, int jobs, ProgressBar& bar) {
+void run_missing(EvaluationFolder& folder, const Study& study, const RegistrationSetup& setup,
+                 const Eigen::Isometry3d& truth, const std::vector<StartPose>& starts, int jobs, ProgressBar& bar) {
   std::vector<int> missing;
   for (int number = 0; number < static_cast<int>(starts.size()); ++number)
     if (!folder.has(number)) missing.push_back(number);
@@ -142,10 +154,9 @@ void run_missing(EvaluationFolder& folder, const Study& study, const RendererPyr
   const auto work = [&] {
     for (std::size_t n = next++; n < missing.size(); n = next++) try {
         const int number = missing[n];
-        const Eigen::Isometry3d start = starts[number].setup_error * study.planned_room_from_patient;
-        const RegistrationResult result = register_views(renderers, study.xrays, start, registration);
+        const EvaluatedRun run = evaluated(number, starts[number], truth, study, setup);
         const std::lock_guard lock(mutex);
-        folder.append(evaluated(number, starts[number], truth, study, result));
+        folder.append(run);
         bar.update(folder.runs().size(), starts.size());
       } catch (...) {
         const std::lock_guard lock(mutex);
@@ -178,8 +189,8 @@ int run_evaluate(EvaluateOptions options, Console& console) {
   if (options.truth.empty() || options.output.empty())
     throw UsageError("an evaluation needs --truth and -o (or --table to look at earlier ones)");
   const StartProtocol protocol = protocol_of(options);
-  if (options.search.is_paper()) options.rendering.default_to_paper();
-  const RendererKind kind = options.rendering.kind();
+  options.flags.settle();
+  const RendererKind kind = options.flags.rendering.kind();
   if (uses_gl(kind) && options.jobs > 1)
     throw UsageError(
         fmt::format("--jobs {}: {} renders for one registration at a time", options.jobs, to_string(kind)));
@@ -188,17 +199,13 @@ int run_evaluate(EvaluateOptions options, Console& console) {
   const Eigen::Isometry3d truth = read_setup_error(options.truth);
 
   Notes notes;
-  options.rendering.check();
   const Study study = load(options.study, notes, console);
-  const RegionOfStudy region = region_of(options.region, study, options.rendering.threshold_hu);
-  const RendererPyramid renderers(options.rendering.kind(), region.rendered_ct, options.rendering.model(),
-                                  beams_of(study), options.rendering.options());
-  RegistrationOptions registration = options.search.registration();
-  registration.region = &region.projected;
-  EvaluationFolder folder(options.output, configuration_of(options, study, renderers.finest(), truth, protocol));
+  const RegistrationSetup setup(options.flags, study);
+  EvaluationFolder folder(options.output,
+                          configuration_of(options.flags, study, setup.renderers().finest(), truth, protocol));
   {
     ProgressBar bar(console, "Evaluating");
-    run_missing(folder, study, renderers, registration, truth, start_poses(truth, protocol), jobs, bar);
+    run_missing(folder, study, setup, truth, start_poses(truth, protocol), jobs, bar);
   }
   folder.write_summary();
   for (const std::string& warning : notes.warnings) console.err << "warning: " << warning << "\n";
@@ -237,9 +244,7 @@ void add_evaluate_command(CLI::App& app, Console& console, int& exit_status) {
                    "Registrations at a time, each on one thread; 1: one on all cores, for its time (default: cores)")
       ->check(CLI::PositiveNumber);
   command->add_option("--table", options->table, "Print a table of evaluations made earlier")->type_name("FOLDER...");
-  add_search_switches(*command, options->search);
-  add_region_switches(*command, options->region);
-  add_rendering_options(*command, options->rendering);
+  add_registration_flags(*command, options->flags);
   command->callback([options, &console, &exit_status] { exit_status = run_evaluate(*options, console); });
 }
 

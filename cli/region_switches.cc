@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 
 #include "geometry/error.h"
 #include "geometry/mask.h"
@@ -42,6 +43,27 @@ Volume<std::uint8_t> sphere(const Study& study, double radius_mm) {
 }
 
 }  // namespace
+
+std::map<std::string, PixelRectangle> RegionSwitches::rectangles_of(const Study& study) const {
+  std::map<std::string, PixelRectangle> by_label;
+  for (const std::string& text : rectangles) {
+    const auto equals = text.rfind('=');
+    PixelRectangle r;
+    int read = 0;
+    const std::string numbers = equals == std::string::npos ? "" : text.substr(equals + 1);
+    if (std::sscanf(numbers.c_str(), "%d,%d,%d,%d%n", &r.first_column, &r.first_row, &r.last_column, &r.last_row,
+                    &read) != 4 ||
+        read != static_cast<int>(numbers.size()) || r.last_column <= r.first_column || r.last_row <= r.first_row)
+      throw UsageError(fmt::format(
+          "--rectangle {}: expected LABEL=FIRST_COLUMN,FIRST_ROW,LAST_COLUMN,LAST_ROW, in pixels from 0", text));
+    const std::string label = text.substr(0, equals);
+    const auto has_label = [&](const XrayImage& xray) { return xray.label == label; };
+    if (std::ranges::none_of(study.xrays, has_label))
+      throw UsageError(fmt::format("--rectangle {}: no X-ray is labeled {}", text, label));
+    by_label[label] = r;
+  }
+  return by_label;
+}
 
 RegionOfStudy region_of(const RegionSwitches& switches, const Study& study, double threshold_hu) {
   if (switches.around_isocenter_mm && !(*switches.around_isocenter_mm > 0.0))
@@ -85,6 +107,10 @@ void add_region_switches(CLI::App& command, RegionSwitches& switches) {
       .add_option("--exclude", switches.excluded,
                   "Leave out a structure that moves on its own, such as the mandible, or the couch")
       ->type_name("NAME")
+      ->group(group);
+  command
+      .add_option("--rectangle", switches.rectangles, "Compare this part of the X-ray with that label only, in pixels")
+      ->type_name("LABEL=C0,R0,C1,R1")
       ->group(group);
   command.add_option("--margin", switches.margin_mm, "Around every structure, mm")
       ->type_name("MM")

@@ -2,11 +2,13 @@
 // The flags that say which part of the patient is registered.
 
 #include <CLI/CLI.hpp>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "io/study.h"
+#include "registration/preprocess/preprocess.h"
 #include "registration/region.h"
 
 namespace isoshift {
@@ -16,12 +18,12 @@ struct RegionSwitches {
   std::optional<double> around_isocenter_mm;
   double margin_mm = 5.0;
 
-  // Whether a part was chosen, rather than all that the views show.
-  bool is_chosen() const { return !structures.empty() || around_isocenter_mm.has_value(); }
+  // The rectangles by label. Throws UsageError for one that cannot be read or whose label no X-ray has.
+  std::map<std::string, PixelRectangle> rectangles_of(const Study& study) const;
 };
 void add_region_switches(CLI::App& command, RegionSwitches& switches);
 
-// A study with what is compared of it: rectangles cut from the fields of the X-rays, and the CT as it is rendered.
+// The CT as it is rendered, and what of the views is compared.
 struct RegionOfStudy {
   Volume<float> rendered_ct;  // without what lies outside the volume of interest and without excluded structures
   ProjectedRegion projected;

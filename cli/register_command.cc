@@ -61,6 +61,7 @@ SetupReport::Stage stage_in_report(const Stage& stage, const StageReport& done) 
                                           {"min_pixels", stage.min_pixels},
                                           {"candidates", stage.candidates},
                                           {"starts", stage.starts},
+                                          {"keep", stage.keep},
                                           {"reach_mm", stage.reach_mm},
                                           {"reach_deg", deg_from_rad(stage.reach_rad)},
                                           {"initial_step_mm", stage.initial_step_mm},
@@ -77,7 +78,7 @@ SetupReport::Stage stage_in_report(const Stage& stage, const StageReport& done) 
 }
 
 SetupReport make_report(const RegisterOptions& options, const Study& study, const Renderer& renderer,
-                        const RegistrationResult& result) {
+                        const RegistrationOptions& registration, const RegistrationResult& result) {
   SetupReport report;
   report.verdict = result.verdict;
   report.reasons = result.reasons;
@@ -89,15 +90,18 @@ SetupReport make_report(const RegisterOptions& options, const Study& study, cons
   report.table = study.table;
   report.setup_error = setup_error_from_poses(study.planned_room_from_patient, result.actual_room_from_patient);
   report.unobservable_room = result.unobservable_room;
-  report.translation_only = options.search.dof == "translation";
-  for (std::size_t n = 0; n < study.rt_images.size(); ++n)
+  report.translation_only = registration.dof == Dof::kTranslation;
+  for (std::size_t n = 0; n < study.rt_images.size(); ++n) {
+    const std::optional<LeftOutView>& left_out = result.views[n].left_out;
     report.views.push_back({.label = study.rt_images[n].label,
                             .sop_instance_uid = study.rt_images[n].sop_instance_uid,
                             .gantry_deg = study.rt_images[n].gantry_angle_deg.value(),
                             .similarity_start = result.views[n].similarity_start,
                             .similarity_final = result.views[n].similarity_final,
+                            .left_out_mm = left_out ? std::optional(left_out->distance_mm) : std::nullopt,
+                            .left_out_deg = left_out ? std::optional(deg_from_rad(left_out->angle_rad)) : std::nullopt,
                             .parts = parts_in_report(result.views[n].consistency)});
-  const RegistrationOptions registration = options.search.registration();
+  }
   for (std::size_t n = 0; n < result.stages.size(); ++n)
     report.stages.push_back(stage_in_report(registration.stages[n], result.stages[n]));
   if (result.uncertainty)
@@ -106,15 +110,15 @@ SetupReport make_report(const RegisterOptions& options, const Study& study, cons
   for (const Alternative& alternative : result.alternatives)
     report.alternatives.push_back(
         {.description = alternative.description, .similarity = alternative.similarity, .as_is = alternative.as_is});
-  report.preset = options.search.preset;
-  report.seed = options.search.seed;
-  report.attenuation = options.rendering.attenuation_name();
-  const AttenuationModel model = options.rendering.model();
+  report.preset = registration.preset;
+  report.seed = registration.seed;
+  report.attenuation = options.flags.rendering.attenuation_name();
+  const AttenuationModel model = options.flags.rendering.model();
   report.threshold_hu = model.threshold_hu;
   if (model.kind == AttenuationModel::Kind::kWindowed) report.window_hu = {model.window_low_hu, model.window_high_hu};
   report.renderer = to_string(renderer.kind());
   report.device = renderer.device();
-  report.renderer_settings = options.rendering.settings();
+  report.renderer_settings = options.flags.rendering.settings();
   report.seconds_register = result.seconds;
   report.seconds_rendering = result.seconds_rendering;
   report.seconds_similarity = result.seconds_similarity;
@@ -134,10 +138,20 @@ SpatialRegistrationLabel label_of(Verdict verdict) {
   return {.content_label = "SETUP_REVIEW", .content_description = "NOT ACCEPTED: REVIEW"};
 }
 
-// One picture per view.
-void write_pictures(const Study& study, Renderer& renderer, const Eigen::Isometry3d& actual_room_from_patient,
+std::vector<ViewComparison::Disagreement> disagreements_of(const ViewReport& view, const XrayView& camera) {
+  std::vector<ViewComparison::Disagreement> list;
+  for (const Tile& tile : view.consistency.tiles)
+    if (tile.disagrees)
+      list.push_back({.center_px = tile.center_px,
+                      .width_px = tile.width_px,
+                      .displacement_px = tile.displacement_mm * pixels_per_mm(camera)});
+  return list;
+}
+
+// One picture per view, of what is rendered for the search.
+void write_pictures(const Study& study, Renderer& renderer, const RegistrationResult& result,
                     const std::filesystem::path& folder) {
-  const std::array poses = {study.planned_room_from_patient, actual_room_from_patient};
+  const std::array poses = {study.planned_room_from_patient, result.actual_room_from_patient};
   for (std::size_t n = 0; n < study.xrays.size(); ++n) {
     const XrayImage& xray = study.xrays[n];
     const RenderResult drrs = renderer.render(std::span(&xray.view, 1), poses, PixelSet::all());
@@ -150,7 +164,8 @@ void write_pictures(const Study& study, Renderer& renderer, const Eigen::Isometr
                           .field = compared.field,
                           .drr_planned = planned,
                           .drr_found = found,
-                          .isocenter_px = xray.view.project(Eigen::Vector3d::Zero()).value()});
+                          .isocenter_px = xray.view.project(Eigen::Vector3d::Zero()).value(),
+                          .disagreements = disagreements_of(result.views[n], xray.view)});
   }
 }
 
@@ -158,33 +173,29 @@ void write_pictures(const Study& study, Renderer& renderer, const Eigen::Isometr
 
 int run_register(const RegisterOptions& given, Console& console) {
   RegisterOptions options = given;
-  if (options.search.is_paper()) options.rendering.default_to_paper();
+  options.flags.settle();
   const Stopwatch total;
   OutputFolder output(options.output, options.overwrite);
   std::optional<Eigen::Isometry3d> truth;
   if (!options.truth.empty()) truth = read_setup_error(options.truth);
 
   Notes notes;
-  options.rendering.check();
   const Study study = load(options.study, notes, console);
-  const RegionOfStudy region = region_of(options.region, study, options.rendering.threshold_hu);
-  const RendererPyramid renderers(options.rendering.kind(), region.rendered_ct, options.rendering.model(),
-                                  beams_of(study), options.rendering.options());
-  RegistrationOptions registration = options.search.registration();
-  registration.region = &region.projected;
+  const RegistrationSetup setup(options.flags, study);
+  Renderer& renderer = setup.renderers().finest();
   const double seconds_load = total.seconds();
   RegistrationResult result;
   {
     ProgressBar bar(console, "Registering");
-    result = register_views(renderers, study.xrays, study.planned_room_from_patient, registration,
+    result = register_views(setup.renderers(), study.xrays, study.planned_room_from_patient, setup.options(),
                             [&](double share) { bar.update(share); });
   }
 
-  SetupReport report = make_report(options, study, renderers.finest(), result);
+  SetupReport report = make_report(options, study, renderer, setup.options(), result);
   if (may_write_registration(options, result))
     report.spatial_registration_uid = write_spatial_registration(
         study, result.actual_room_from_patient, label_of(result.verdict), output.path() / kRegistrationFile, notes);
-  write_pictures(study, renderers.finest(), result.actual_room_from_patient, output.path());
+  write_pictures(study, renderer, result, output.path());
   report.overrides = notes.overrides;
   report.left_aside = notes.left_aside;
   report.warnings = notes.warnings;
@@ -221,9 +232,7 @@ void add_register_command(CLI::App& app, Console& console, int& exit_status) {
                     "Write the registration object for a result that needs review, too, marked as not accepted");
   command->add_flag("--overwrite", options->overwrite, "Replace an earlier output in that folder");
   command->add_flag("--json", options->json, "Print result.json instead of the report");
-  add_search_switches(*command, options->search);
-  add_region_switches(*command, options->region);
-  add_rendering_options(*command, options->rendering);
+  add_registration_flags(*command, options->flags);
   command->callback([options, &console, &exit_status] { exit_status = run_register(*options, console); });
 }
 

@@ -6,18 +6,14 @@
 #include <string>
 
 #include "cli/console.h"
-#include "cli/region_switches.h"
-#include "cli/rendering_options.h"
-#include "cli/search_switches.h"
+#include "cli/registration_setup.h"
 #include "cli/study_options.h"
 
 namespace isoshift {
 
 struct RegisterOptions {
   StudyOptions study;
-  RenderingOptions rendering;
-  SearchSwitches search;
-  RegionSwitches region;
+  RegistrationFlags flags;
   std::filesystem::path output;
   std::filesystem::path truth;  // empty: unknown
   bool overwrite = false;

@@ -23,6 +23,7 @@ RegistrationOptions SearchSwitches::registration() const {
   if (optimizer) options.stages.front().optimizer = optimizer_kind_from(*optimizer).value();
   if (pixel_fraction) options.stages.front().pixel_fraction = *pixel_fraction;
   options.dof = dof == "rigid" ? Dof::kRigid : Dof::kTranslation;
+  options.check_vertebrae = check_vertebrae;
   options.seed = seed;
   return options;
 }
@@ -41,6 +42,8 @@ void add_search_switches(CLI::App& command, SearchSwitches& options) {
   command.add_option("--dof", options.dof, "Degrees of freedom: six, or the three translations")
       ->check(CLI::IsMember({"rigid", "translation"}))
       ->capture_default_str();
+  command.add_flag("--check-vertebrae", options.check_vertebrae,
+                   "Compare with the patient one vertebra further to the head and to the feet");
   command.add_option("--seed", options.seed, "Draws the pixels compared; the only randomness")
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();

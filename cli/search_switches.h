@@ -15,6 +15,7 @@ struct SearchSwitches {
   std::optional<std::string> similarity, optimizer;
   std::optional<double> pixel_fraction;
   std::string dof = "rigid";
+  bool check_vertebrae = false;
   std::uint64_t seed = 1;
 
   // Throws UsageError for a switch that means nothing to the preset.

@@ -13,4 +13,10 @@ Eigen::Isometry3d setup_error_from_parameters(std::span<const double> parameters
   return setup_error;
 }
 
+PoseDistance distance_between(std::span<const double> parameters, std::span<const double> other) {
+  const Eigen::Isometry3d a = setup_error_from_parameters(parameters), b = setup_error_from_parameters(other);
+  return {.translation_mm = (a.translation() - b.translation()).norm(),
+          .angle_rad = Eigen::AngleAxisd(a.linear() * b.linear().transpose()).angle()};
+}
+
 }  // namespace isoshift

@@ -13,4 +13,11 @@ inline constexpr double kLeverMm = 100.0;
 
 Eigen::Isometry3d setup_error_from_parameters(std::span<const double> parameters);
 
+// How far two setup errors lie apart: translation at the isocenter, and rotation.
+struct PoseDistance {
+  double translation_mm = 0.0;
+  double angle_rad = 0.0;
+};
+PoseDistance distance_between(std::span<const double> parameters, std::span<const double> other);
+
 }  // namespace isoshift

@@ -16,8 +16,10 @@ std::vector<Stage> setup_stages() {
            .similarity = SimilarityKind::kStochasticRankCorrelation,
            .pixel_mm = 5.0,
            .voxel_mm = 4.0,
+           .pixel_fraction = 0.35,
            .candidates = 60,
-           .starts = 1,
+           .starts = 2,
+           .keep = 2,
            .reach_mm = 20.0,
            .reach_rad = rad_from_deg(8.0),
            .initial_step_mm = 8.0,
@@ -27,8 +29,10 @@ std::vector<Stage> setup_stages() {
            .similarity = SimilarityKind::kStochasticRankCorrelation,
            .pixel_mm = 2.5,
            .voxel_mm = 2.0,
-           .pixel_fraction = 0.5,
-           .min_pixels = 3000,
+           .pixel_fraction = 0.25,
+           .min_pixels = 2000,
+           .starts = 2,
+           .keep = 2,
            .initial_step_mm = 1.5,
            .initial_step_rad = rad_from_deg(0.9),
            .relative_tolerance = 0.05},
@@ -37,8 +41,8 @@ std::vector<Stage> setup_stages() {
            .similarity = SimilarityKind::kGradientCorrelation,
            .pixel_mm = 2.5,
            .voxel_mm = 2.0,
-           .pixel_fraction = 0.5,
-           .min_pixels = 3000,
+           .pixel_fraction = 0.3,
+           .min_pixels = 2500,
            .candidates = 2,
            .starts = 3,
            .reach_mm = 2.0,
@@ -50,7 +54,7 @@ std::vector<Stage> setup_stages() {
            .similarity = SimilarityKind::kGradientCorrelation,
            .pixel_mm = 1.2,
            .voxel_mm = 1.0,
-           .pixel_fraction = 0.4,
+           .pixel_fraction = 0.3,
            .min_pixels = 8000,
            .initial_step_mm = 0.4,
            .initial_step_rad = rad_from_deg(0.25),
@@ -60,7 +64,10 @@ std::vector<Stage> setup_stages() {
 std::vector<Stage> fast_stages() {
   std::vector<Stage> stages = setup_stages();
   std::erase_if(stages, [](const Stage& stage) { return stage.name == "restarts"; });
-  for (Stage& stage : stages) stage.candidates = 0;
+  for (Stage& stage : stages) {
+    stage.candidates = 0;
+    stage.starts = stage.keep = 1;
+  }
   return stages;
 }
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 
 #include "drr/renderer_pyramid.h"
 #include "registration/preprocess/image_operations.h"
@@ -91,13 +92,22 @@ ProjectedRegion::ProjectedRegion(const RegionOfInterest& region) {
 
 void ProjectedRegion::restrict(FixedImage& image, const Eigen::Isometry3d& room_from_patient, double slack_mm) const {
   const int slack_px = static_cast<int>(std::lround(slack_mm * pixels_per_mm(image.view)));
-  const auto keep_where = [&](Renderer& of_mask, std::uint8_t value) {
+  const auto only_where = [&](Renderer& of_mask, std::uint8_t value) {
     const Image<std::uint8_t> mask = shadow(of_mask, image.view, room_from_patient, slack_px);
+    Image<std::uint8_t> field = image.field;
     for (std::size_t n = 0; n < mask.pixels.size(); ++n)
-      if (mask.pixels[n] != value) image.field.pixels[n] = 0;
+      if (mask.pixels[n] != value) field.pixels[n] = 0;
+    return field;
   };
-  if (inside_) keep_where(*inside_, 1);
-  for (const auto& outside : outside_) keep_where(*outside, 0);
+  const auto count = [](const Image<std::uint8_t>& field) {
+    return static_cast<double>(std::ranges::count_if(field.pixels, std::identity()));
+  };
+  if (inside_) image.field = only_where(*inside_, 1);
+  constexpr double kMinLeft = 0.1;
+  for (const auto& outside : outside_) {
+    Image<std::uint8_t> field = only_where(*outside, 0);
+    if (count(field) >= kMinLeft * count(image.field)) image.field = std::move(field);
+  }
 }
 
 }  // namespace isoshift

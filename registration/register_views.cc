@@ -73,6 +73,8 @@ RegistrationResult register_views(const RendererPyramid& renderers, std::span<co
   FixedViews fixed{.images = {}, .region = options.region != nullptr ? *options.region : everything};
   for (const XrayImage& xray : xrays) {
     fixed.images.push_back(prepare(xray));
+    if (const auto rectangle = options.rectangles.find(xray.label); rectangle != options.rectangles.end())
+      restrict_to(rectangle->second, fixed.images.back());
     if (options.eight_bit_xrays) round_to_eight_bit(fixed.images.back());
   }
   require_visible(renderers, xrays, fixed, start_room_from_patient);
@@ -102,6 +104,12 @@ RegistrationResult register_views(const RendererPyramid& renderers, std::span<co
                                              options.dof == Dof::kTranslation, renderers.voxel_mm());
   if (options.check_alternatives)
     result.alternatives = compare_alternatives(renderers, fixed, start_room_from_patient, search_options);
+  if (options.check_vertebrae)
+    std::ranges::copy(compare_vertebrae(renderers, fixed, start_room_from_patient, search_options, found),
+                      std::back_inserter(result.alternatives));
+  const std::vector<LeftOutView> left_out =
+      leave_out_views(renderers, fixed, start_room_from_patient, search_options, found);
+  for (std::size_t view = 0; view < left_out.size(); ++view) result.views[view].left_out = left_out[view];
 
   std::vector<XrayView> views;
   for (const XrayImage& xray : xrays) views.push_back(xray.view);

@@ -7,6 +7,7 @@
 
 #include <Eigen/Geometry>
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <span>
 #include <string>
@@ -17,6 +18,7 @@
 #include "geometry/xray_image.h"
 #include "registration/quality/alternatives.h"
 #include "registration/quality/consistency.h"
+#include "registration/quality/cross_checks.h"
 #include "registration/quality/uncertainty.h"
 #include "registration/search.h"
 
@@ -31,7 +33,9 @@ struct RegistrationOptions {
   std::uint64_t seed = 1;        // the only source of randomness: same seed, same pose
   bool eight_bit_xrays = false;  // line integrals of the field in 256 steps, as the founding paper's
   bool check_alternatives = true;
-  const ProjectedRegion* region = nullptr;  // borrowed; what of the views is compared. nullptr: all
+  bool check_vertebrae = false;  // along the spine; on request, for it takes as long as the registration
+  std::map<std::string, PixelRectangle> rectangles;  // of the views with these labels: nothing else of them is compared
+  const ProjectedRegion* region = nullptr;           // borrowed; what of the views is compared. nullptr: all
 
   // Throws UsageError naming the field and its value.
   void check() const;
@@ -41,7 +45,8 @@ struct RegistrationOptions {
 struct ViewReport {
   double similarity_start = -1.0;
   double similarity_final = -1.0;
-  ViewConsistency consistency;  // of its parts with the pose found
+  ViewConsistency consistency;          // of its parts with the pose found
+  std::optional<LeftOutView> left_out;  // with three or more views
 };
 
 struct RegistrationResult {

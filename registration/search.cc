@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <functional>
 #include <numeric>
 #include <random>
 
@@ -40,13 +41,13 @@ OptimizerOptions optimizer_options(const Stage& stage, const SearchOptions& opti
   return from_start;
 }
 
-// Where a stage begins: where the last one ended and, drawn around it, its candidates.
-std::vector<Parameters> candidates_of(const Stage& stage, const SearchOptions& options, const Parameters& last,
-                                      std::mt19937_64& random) {
-  std::vector<Parameters> candidates = {last};
+// Poses drawn around one.
+std::vector<Parameters> candidates_about(const Parameters& pose, const Stage& stage, const SearchOptions& options,
+                                         std::mt19937_64& random) {
+  std::vector<Parameters> candidates;
   std::uniform_real_distribution<double> uniform(-1.0, 1.0);
   for (int n = 0; n < stage.candidates; ++n) {
-    Parameters candidate = last;
+    Parameters candidate = pose;
     for (std::size_t axis = 0; axis < candidate.size(); ++axis) {
       const double reach = axis < 3 ? stage.reach_mm : stage.reach_rad * kLeverMm;
       const double bound = bound_of(axis, options);
@@ -57,29 +58,32 @@ std::vector<Parameters> candidates_of(const Stage& stage, const SearchOptions& o
   return candidates;
 }
 
-// The best `count` of them, if there are more.
-std::vector<Parameters> best_of(std::vector<Parameters> candidates, std::size_t count, const BatchObjective& objective,
+// The best of some poses.
+std::vector<Parameters> best_of(std::vector<Parameters> poses, std::size_t count, const BatchObjective& objective,
                                 int& evaluations) {
-  if (candidates.size() <= count) return candidates;
-  const std::vector<double> values = objective(candidates);
+  if (poses.size() <= count) return poses;
+  if (count == 0) return {};
+  const std::vector<double> values = objective(poses);
   evaluations += static_cast<int>(values.size());
-  std::vector<std::size_t> order(candidates.size());
+  std::vector<std::size_t> order(poses.size());
   std::iota(order.begin(), order.end(), 0);
   std::ranges::stable_sort(order, std::greater(), [&](std::size_t n) { return values[n]; });
   std::vector<Parameters> best;
-  for (std::size_t n = 0; n < count; ++n) best.push_back(candidates[order[n]]);
+  for (std::size_t n = 0; n < count; ++n) best.push_back(poses[order[n]]);
   return best;
 }
 
-void report_spread(const std::vector<OptimizerResult>& found, const OptimizerResult& best, StageReport& report) {
+// `found` is sorted, best first.
+void report_spread(const std::vector<OptimizerResult>& found, StageReport& report) {
   if (found.size() < 2) return;
-  const Eigen::Isometry3d of_best = setup_error_from_parameters(best.best);
+  constexpr double kClearlyMore = 1.1;
+  const OptimizerResult& best = found.front();
   report.spread_mm = report.spread_rad = 0.0;
   for (const OptimizerResult& other : found) {
-    const Eigen::Isometry3d setup_error = setup_error_from_parameters(other.best);
-    report.spread_mm = std::max(*report.spread_mm, (setup_error.translation() - of_best.translation()).norm());
-    report.spread_rad =
-        std::max(*report.spread_rad, Eigen::AngleAxisd(setup_error.linear() * of_best.linear().transpose()).angle());
+    if (1.0 - other.value > kClearlyMore * (1.0 - best.value)) continue;
+    const PoseDistance distance = distance_between(other.best, best.best);
+    report.spread_mm = std::max(*report.spread_mm, distance.translation_mm);
+    report.spread_rad = std::max(*report.spread_rad, distance.angle_rad);
   }
 }
 
@@ -98,12 +102,13 @@ std::vector<FixedImage> FixedViews::reduced_to(double pixel_mm, const Eigen::Iso
 SearchResult search(const RendererPyramid& renderers, const FixedViews& views,
                     const Eigen::Isometry3d& start_room_from_patient, const SearchOptions& options,
                     const SearchProgress& progress) {
-  SearchResult result{.parameters = options.parameters};
-  if (result.parameters.empty()) result.parameters.resize(options.dof == Dof::kRigid ? 6 : 3, 0.0);
+  SearchResult result;
+  std::vector<Parameters> kept = {options.parameters};
+  if (options.parameters.empty()) kept.front().resize(options.dof == Dof::kRigid ? 6 : 3, 0.0);
   std::mt19937_64 random(options.seed);
   for (const Stage& stage : options.stages) {
     const auto begin = std::chrono::steady_clock::now();
-    const Eigen::Isometry3d about = setup_error_from_parameters(result.parameters) * start_room_from_patient;
+    const Eigen::Isometry3d about = setup_error_from_parameters(kept.front()) * start_room_from_patient;
     const std::vector<FixedImage> level = views.reduced_to(stage.pixel_mm, about, stage.initial_step_mm);
     Objective objective(renderers.with_voxels_up_to(stage.voxel_mm), level, about,
                         {.similarity = stage.similarity,
@@ -118,24 +123,30 @@ SearchResult search(const RendererPyramid& renderers, const FixedViews& views,
     };
 
     StageReport report{.name = stage.name, .similarity = std::string(to_string(stage.similarity))};
+    const std::size_t more = static_cast<std::size_t>(stage.starts) - std::min<std::size_t>(stage.starts, kept.size());
+    std::ranges::copy(
+        best_of(candidates_about(kept.front(), stage, options, random), more, similarity_at, report.evaluations),
+        std::back_inserter(kept));
     std::vector<OptimizerOptions> searches;
-    for (const Parameters& start : best_of(candidates_of(stage, options, result.parameters, random),
-                                           static_cast<std::size_t>(stage.starts), similarity_at, report.evaluations))
-      searches.push_back(optimizer_options(stage, options, start));
-    const std::vector<OptimizerResult> found = maximize(similarity_at, searches);
-    const OptimizerResult& best = *std::ranges::max_element(found, {}, &OptimizerResult::value);
-    result.parameters = best.best;
-    for (const OptimizerResult& of_start : found) report.evaluations += of_start.evaluations;
-    report.value = best.value;
-    report.termination = best.termination;
-    report.reached_limit = best.evaluations >= stage.max_evaluations;
-    report_spread(found, best, report);
+    for (const Parameters& start : kept) searches.push_back(optimizer_options(stage, options, start));
+    std::vector<OptimizerResult> found = maximize(similarity_at, searches);
+    std::ranges::stable_sort(found, std::greater(), &OptimizerResult::value);
+    kept.clear();
+    for (const OptimizerResult& end : found) {
+      report.evaluations += end.evaluations;
+      if (static_cast<int>(kept.size()) < stage.keep) kept.push_back(end.best);
+    }
+    report.value = found.front().value;
+    report.termination = found.front().termination;
+    report.reached_limit = found.front().evaluations >= stage.max_evaluations;
+    if (stage.keep == 1) report_spread(found, report);  // several that are kept may differ
     report.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
     result.stages.push_back(report);
     result.seconds_rendering += objective.seconds().rendering;
     result.seconds_similarity += objective.seconds().similarity;
     if (progress) progress(static_cast<double>(result.stages.size()) / static_cast<double>(options.stages.size()));
   }
+  result.parameters = kept.front();
   return result;
 }
 

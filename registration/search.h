@@ -19,8 +19,8 @@ namespace isoshift {
 
 enum class Dof { kRigid, kTranslation };
 
-// One stage. It begins where the one before ended, and around it at `candidates` poses drawn within `reach`: all are
-// evaluated, and the best `starts` of them searched from, in step.
+// One stage. It begins where the one before ended, at one pose or the several that it kept, and at the best of
+// `candidates` poses drawn around within `reach`: `starts` in all, searched from in step. The best `keep` ends go on.
 struct Stage {
   std::string name;
   SimilarityKind similarity = SimilarityKind::kNcc;
@@ -31,6 +31,7 @@ struct Stage {
   int min_pixels = 1000;        // of every view, if the field has them
   int candidates = 0;
   int starts = 1;
+  int keep = 1;
   double reach_mm = 0.0;             // candidates are drawn in a box of this half width
   double reach_rad = 0.0;            // the same for the rotations
   double initial_step_mm = 5.0;      // first trust-region radius of the translations
@@ -56,7 +57,8 @@ struct StageReport {
   double value = 0.0;  // the similarity reached
   std::string termination = "not run";
   bool reached_limit = false;  // the evaluations ran out before the search converged
-  // Between the poses that the starts ended at, where there were several: the largest distance from the best one.
+  // Between the poses that the starts ended at, where there were several: the largest distance of those that leave not
+  // clearly more unexplained than the best one from that.
   std::optional<double> spread_mm, spread_rad;
 };
 

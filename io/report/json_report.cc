@@ -138,6 +138,8 @@ std::string json_report(const SetupReport& report) {
                              {"gantry_deg", view.gantry_deg},
                              {"similarity_start", view.similarity_start},
                              {"similarity_final", view.similarity_final},
+                             {"left_out_mm", or_null(view.left_out_mm)},
+                             {"left_out_deg", or_null(view.left_out_deg)},
                              {"parts", parts_json(view)}});
     images.push_back(view.sop_instance_uid);
   }

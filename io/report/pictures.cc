@@ -97,6 +97,27 @@ void mark(Image<Rgb>& page, int x, int y) {
         page.at(x + dx, y + dy) = {255, 220, 0};
 }
 
+void put(Image<Rgb>& page, int x, int y) {
+  if (x >= 0 && x < page.columns && y >= 0 && y < page.rows) page.at(x, y) = {255, 220, 0};
+}
+
+// The outline of a square about a point, and a line from there.
+void mark_disagreement(Image<Rgb>& page, const Eigen::Vector2d& center, double width, const Eigen::Vector2d& way) {
+  const int half = static_cast<int>(0.25 * width) - 1;  // parts overlap by half
+  const int x = static_cast<int>(center.x()), y = static_cast<int>(center.y());
+  for (int d = -half; d <= half; ++d) {
+    put(page, x + d, y - half);
+    put(page, x + d, y + half);
+    put(page, x - half, y + d);
+    put(page, x + half, y + d);
+  }
+  const int steps = std::max(1, static_cast<int>(way.lpNorm<Eigen::Infinity>()));
+  for (int n = 0; n <= steps; ++n) {
+    const Eigen::Vector2d at = center + way * n / steps;
+    put(page, static_cast<int>(at.x()), static_cast<int>(at.y()));
+  }
+}
+
 // Draws a line of text with cairo onto the page's own pixels.
 void write_caption(Image<Rgb>& page, int x, int y, const std::string& text) {
   const std::unique_ptr<cairo_surface_t, decltype(&cairo_surface_destroy)> surface(
@@ -149,6 +170,10 @@ void write_comparison_png(const std::filesystem::path& path, const ViewCompariso
       mark(page, x + static_cast<int>((comparison.isocenter_px.x() + 0.5) / zoom),
            y + static_cast<int>((comparison.isocenter_px.y() + 0.5) / zoom));
       write_caption(page, x, y - kCaptionPx, tiles[t].caption);
+      if (n != 1 || t != 2) continue;
+      for (const ViewComparison::Disagreement& part : comparison.disagreements)
+        mark_disagreement(page, Eigen::Vector2d(x, y) + part.center_px / zoom, part.width_px / zoom,
+                          part.displacement_px / zoom);
     }
   }
   write_png(path, page);

@@ -30,6 +30,7 @@ struct SetupReport {
     double gantry_deg = 0.0;
     double similarity_start = -1.0;
     double similarity_final = -1.0;
+    std::optional<double> left_out_mm, left_out_deg;  // how far the pose moves without this view
     std::vector<Part> parts;
   };
   struct Stage {

@@ -195,6 +195,14 @@ FixedImage reduced(const FixedImage& image, int factor) {
   return result;
 }
 
+void restrict_to(const PixelRectangle& rectangle, FixedImage& image) {
+  for (int row = 0; row < image.field.rows; ++row)
+    for (int column = 0; column < image.field.columns; ++column)
+      if (column < rectangle.first_column || column > rectangle.last_column || row < rectangle.first_row ||
+          row > rectangle.last_row)
+        image.field.at(column, row) = 0;
+}
+
 FixedImage prepare(const XrayImage& xray) {
   const auto [darkest, brightest] = std::ranges::minmax(xray.values.pixels);
   const bool is_intensity = xray.meaning == XrayImage::Meaning::kIntensity;

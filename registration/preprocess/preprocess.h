@@ -29,6 +29,14 @@ struct FixedImage {
 };
 FixedImage reduced(const FixedImage& image, int factor);
 
+// Columns and rows of an X-ray, bounds included.
+struct PixelRectangle {
+  int first_column = 0, first_row = 0, last_column = 0, last_row = 0;
+};
+
+// Takes out of the field what lies outside the rectangle.
+void restrict_to(const PixelRectangle& rectangle, FixedImage& image);
+
 // The whole way for one X-ray, at full resolution. Throws Error for a blank one.
 FixedImage prepare(const XrayImage& xray);
 

@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "geometry/rotation.h"
+#include "registration/pose_parameters.h"
 
 namespace isoshift {
 namespace {
@@ -16,6 +17,7 @@ std::vector<Stage> short_stages() {
            .similarity = SimilarityKind::kStochasticRankCorrelation,
            .pixel_mm = 5.0,
            .voxel_mm = 4.0,
+           .pixel_fraction = 0.35,
            .initial_step_mm = 8.0,
            .initial_step_rad = rad_from_deg(3.5),
            .relative_tolerance = 0.05,
@@ -24,6 +26,7 @@ std::vector<Stage> short_stages() {
            .similarity = SimilarityKind::kGradientCorrelation,
            .pixel_mm = 4.0,
            .voxel_mm = 3.0,
+           .pixel_fraction = 0.4,
            .initial_step_mm = 1.5,
            .initial_step_rad = rad_from_deg(0.9),
            .relative_tolerance = 0.05,
@@ -106,20 +109,23 @@ std::vector<Alternative> compare_alternatives(const RendererPyramid& renderers, 
     SearchOptions long_search = options;
     long_search.stages = long_list;
     long_search.parameters = attempt.found.parameters;
-    return search(renderers, attempt.views, start_room_from_patient, long_search).stages.back().value;
+    return search(renderers, attempt.views, start_room_from_patient, long_search);
   };
-  std::optional<double> as_is_closely;
+  std::optional<SearchResult> as_is_closely;
   std::vector<Alternative> alternatives;
   for (std::size_t n = 1; n < attempts.size(); ++n) {
-    Alternative alternative{.description = attempts[n].description,
-                            .similarity = attempts[n].found.stages.back().value,
-                            .as_is = attempts.front().found.stages.back().value};
+    SearchResult as_is = attempts.front().found, as_other = attempts[n].found;
     if (is_close(attempts[n])) {
       if (!as_is_closely) as_is_closely = closely(attempts.front());
-      alternative.as_is = *as_is_closely;
-      alternative.similarity = closely(attempts[n]);
+      as_is = *as_is_closely;
+      as_other = closely(attempts[n]);
     }
-    alternatives.push_back(std::move(alternative));
+    const PoseDistance distance = distance_between(as_is.parameters, as_other.parameters);
+    alternatives.push_back({.description = attempts[n].description,
+                            .similarity = as_other.stages.back().value,
+                            .as_is = as_is.stages.back().value,
+                            .distance_mm = distance.translation_mm,
+                            .angle_rad = distance.angle_rad});
   }
   return alternatives;
 }

@@ -11,9 +11,11 @@
 namespace isoshift {
 
 struct Alternative {
-  std::string description;  // "view 1 mirrored"
-  double similarity = 0.0;  // gradient correlation that the search reaches with it,
-  double as_is = 0.0;       // and in the same way with the images as they are
+  std::string description;   // "view 1 mirrored"
+  double similarity = 0.0;   // gradient correlation that the search reaches with it,
+  double as_is = 0.0;        // and in the same way with the images as they are
+  double distance_mm = 0.0;  // between the poses found: translation at the isocenter,
+  double angle_rad = 0.0;    // and rotation
 };
 
 // Searches with short stages, each time from the start; where an alternative comes close, with `options.stages` to the
