@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "geometry/couch_shift.h"
 #include "geometry/error.h"
@@ -149,6 +150,31 @@ TEST(RegisterViews, SameSeedSamePose) {
   const auto third = register_views(*scene.renderers, scene.xrays, scene.planned, other_seed);
   EXPECT_NE(first.actual_room_from_patient.matrix(), third.actual_room_from_patient.matrix());  // the seed is used
   EXPECT_THAT(third.actual_room_from_patient, PoseNear(first.actual_room_from_patient, 0.1, 0.05));
+}
+
+// Intensities changed one by one, growing with what they were.
+template <class Change>
+Eigen::Isometry3d found_after(const Scene& scene, const RegistrationOptions& options, Change&& change) {
+  std::vector<XrayImage> xrays = scene.xrays;
+  for (XrayImage& xray : xrays) std::ranges::transform(xray.values.pixels, xray.values.pixels.begin(), change);
+  return register_views(*scene.renderers, xrays, scene.planned, options).actual_room_from_patient;
+}
+
+TEST(RegisterViews, RankCorrelationIsBlindToMonotoneIntensityChanges) {
+  const Scene scene = make_scene(PatientPosition::kHfs, 0.0, {0.0, 90.0});
+  RegistrationOptions options = preset("setup");
+  options.stages.resize(2);  // those that end on stochastic rank correlation
+  options.stages[1].pixel_fraction = 1.0;
+  options.stages[1].relative_tolerance = 0.01;
+  options.check_alternatives = false;
+  const Eigen::Isometry3d plain = found_after(scene, options, [](float intensity) { return intensity; });
+  for (const float gamma : {0.5F, 2.0F})
+    EXPECT_THAT(found_after(scene, options, [=](float intensity) { return std::pow(intensity, gamma); }),
+                PoseNear(plain, 0.1, 0.1))
+        << "gamma " << gamma;
+  // The window of a receptor: what is darker or brighter saturates.
+  EXPECT_THAT(found_after(scene, options, [](float intensity) { return std::clamp(intensity, 0.02F, 0.9F); }),
+              PoseNear(plain, 0.1, 0.1));
 }
 
 TEST(RegisterViews, TranslationOnlyLeavesTheRotationAlone) {
