@@ -46,7 +46,8 @@ void report_views(const RendererPyramid& renderers, const FixedViews& views, con
   const auto similarity = gradient_correlation.per_view(poses);
   std::vector<ViewConsistency> consistency = regional_consistency(renderers, views, found);
   for (std::size_t view = 0; view < consistency.size(); ++view)
-    result.views.push_back({.similarity_start = similarity[0][view],
+    result.views.push_back({.label = views.images[view].label,
+                            .similarity_start = similarity[0][view],
                             .similarity_final = similarity[1][view],
                             .consistency = std::move(consistency[view])});
 }

@@ -43,6 +43,7 @@ struct RegistrationOptions {
 
 // Gradient correlation of one view over all that is compared, in pixels twice as large as those of the last stage.
 struct ViewReport {
+  std::string label;  // of the X-ray
   double similarity_start = -1.0;
   double similarity_final = -1.0;
   ViewConsistency consistency;          // of its parts with the pose found

@@ -179,7 +179,8 @@ Image<std::uint8_t> irradiated_field(const XrayImage& xray, const Image<float>& 
 FixedImage reduced(const FixedImage& image, int factor) {
   FixedImage result{.view = image.view.downscaled(factor),
                     .line_integral = Image<float>(image.view.columns / factor, image.view.rows / factor),
-                    .field = Image<std::uint8_t>(image.view.columns / factor, image.view.rows / factor)};
+                    .field = Image<std::uint8_t>(image.view.columns / factor, image.view.rows / factor),
+                    .label = image.label};
   for (int row = 0; row < result.field.rows; ++row)
     for (int column = 0; column < result.field.columns; ++column) {
       double sum = 0.0;
@@ -193,6 +194,10 @@ FixedImage reduced(const FixedImage& image, int factor) {
       result.field.at(column, row) = inside;
     }
   return result;
+}
+
+std::string name_of_view(std::string_view label, std::size_t index) {
+  return label.empty() ? fmt::format("view {}", index + 1) : std::string(label);
 }
 
 void restrict_to(const PixelRectangle& rectangle, FixedImage& image) {
@@ -213,6 +218,7 @@ FixedImage prepare(const XrayImage& xray) {
                     xray.label, is_intensity ? "intensities" : "line integrals", darkest, brightest));
   FixedImage image;
   image.view = xray.view;
+  image.label = xray.label;
   image.line_integral = line_integrals(xray);
   image.field = irradiated_field(xray, image.line_integral);
   return image;

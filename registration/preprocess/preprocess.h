@@ -2,6 +2,8 @@
 // From X-ray pixels to what a DRR can be compared with. The only part of isoshift that uses OpenCV.
 
 #include <cstdint>
+#include <string>
+#include <string_view>
 #include <vector>
 
 #include "geometry/image.h"
@@ -26,7 +28,12 @@ struct FixedImage {
   XrayView view;
   Image<float> line_integral;
   Image<std::uint8_t> field;
+  std::string label;  // of the X-ray; may be empty
 };
+
+// How view number `index` is called in what a person reads: by its label, else "view 1" and so on.
+std::string name_of_view(std::string_view label, std::size_t index);
+
 FixedImage reduced(const FixedImage& image, int factor);
 
 // Columns and rows of an X-ray, bounds included.

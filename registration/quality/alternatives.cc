@@ -71,15 +71,16 @@ std::vector<Attempt> attempts_with(const FixedViews& views) {
     attempts.push_back({.description = std::move(description), .views = views});
     attempts.back().views.images[view] = std::move(image);
   };
+  const auto name = [&](std::size_t view) { return name_of_view(views.images[view].label, view); };
   for (std::size_t view = 0; view < views.images.size(); ++view) {
-    with(fmt::format("view {} mirrored", view + 1), view, mirrored(views.images[view]));
-    with(fmt::format("view {} turned by 180 degrees", view + 1), view, turned(views.images[view]));
+    with(fmt::format("{} mirrored", name(view)), view, mirrored(views.images[view]));
+    with(fmt::format("{} turned by 180 degrees", name(view)), view, turned(views.images[view]));
   }
   for (std::size_t view = 1; view < views.images.size(); ++view) {
     const XrayView& first = views.images[0].view;
     const XrayView& other = views.images[view].view;
     if (first.columns != other.columns || first.rows != other.rows) continue;  // not exchanged unseen
-    attempts.push_back({.description = fmt::format("views 1 and {} exchanged", view + 1), .views = views});
+    attempts.push_back({.description = fmt::format("{} and {} exchanged", name(0), name(view)), .views = views});
     std::swap(attempts.back().views.images[0].view, attempts.back().views.images[view].view);
   }
   return attempts;

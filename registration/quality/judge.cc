@@ -68,17 +68,18 @@ void judge(std::span<const double> parameters, const RegistrationOptions& option
   double mean = 0.0;
   for (std::size_t n = 0; n < result.views.size(); ++n) {
     const ViewReport& view = result.views[n];
+    const std::string name = name_of_view(view.label, n);
     mean += view.similarity_final / static_cast<double>(result.views.size());
     if (!(view.similarity_final >= view.similarity_start - kSimilarityNoise))
-      review(fmt::format("view {} matches worse than at the planned pose (similarity {:.4f}, was {:.4f})", n + 1,
+      review(fmt::format("{} matches worse than at the planned pose (similarity {:.4f}, was {:.4f})", name,
                          view.similarity_final, view.similarity_start));
     if (view.left_out && (view.left_out->distance_mm > kMaxSpreadMm || view.left_out->angle_rad > kMaxSpreadRad))
-      review(fmt::format("without view {} the pose lies {:.1f} mm and {:.1f} degrees away", n + 1,
-                         view.left_out->distance_mm, deg_from_rad(view.left_out->angle_rad)));
+      review(fmt::format("without {} the pose lies {:.1f} mm and {:.1f} degrees away", name, view.left_out->distance_mm,
+                         deg_from_rad(view.left_out->angle_rad)));
     const int with_signal = view.consistency.with_signal(), disagreeing = view.consistency.disagreeing();
     if (disagreeing > 1 && disagreeing > kMaxDisagreeing * with_signal)
-      review(fmt::format("{} of {} parts of view {} match elsewhere: anatomy may have moved against the rest",
-                         disagreeing, with_signal, n + 1));
+      review(fmt::format("{} of {} parts of {} match elsewhere: anatomy may have moved against the rest", disagreeing,
+                         with_signal, name));
   }
   if (!(mean >= kMinSimilarity))
     demote(mean >= kRejectedSimilarity ? Verdict::kReview : Verdict::kRejected,

@@ -44,7 +44,7 @@ void mirror(Image<T>& image) {
 double gain(const Alternative& alternative) { return (1.0 - alternative.as_is) / (1.0 - alternative.similarity); }
 
 constexpr std::array kAll = {"view 1 mirrored", "view 2 mirrored", "view 1 turned by 180 degrees",
-                             "view 2 turned by 180 degrees", "views 1 and 2 exchanged"};
+                             "view 2 turned by 180 degrees", "view 1 and view 2 exchanged"};
 
 TEST(Alternatives, ImagesThatAreWhatTheySayWin) {
   const auto alternatives = alternatives_of(asymmetric_scene());
@@ -89,14 +89,14 @@ TEST(Alternatives, ATurnedViewIsFound) {
 }
 
 TEST(Alternatives, ExchangedViewsAreFound) {
-  expect_wins("views 1 and 2 exchanged",
+  expect_wins("view 1 and view 2 exchanged",
               [](std::vector<FixedImage>& images) { std::swap(images[0].view, images[1].view); });
 }
 
 TEST(Alternatives, ViewsOfDifferentSizesCannotBeExchangedUnseen) {
   RegistrationScene scene = asymmetric_scene();
   scene.images[1] = reduced(scene.images[1], 2);
-  EXPECT_FALSE(alternatives_of(scene).contains("views 1 and 2 exchanged"));
+  EXPECT_FALSE(alternatives_of(scene).contains("view 1 and view 2 exchanged"));
 }
 
 TEST(Alternatives, OfOneViewAreItsOwn) {

@@ -39,7 +39,7 @@ RegistrationResult good_result() {
   result.uncertainty = Uncertainty{.translation_mm = Eigen::Vector3d::Constant(0.2),
                                    .rotation_rad = Eigen::Vector3d::Constant(rad_from_deg(0.2))};
   result.alternatives = {{.description = "view 1 mirrored", .similarity = 0.6, .as_is = 0.96},
-                         {.description = "views 1 and 2 exchanged", .similarity = 0.3, .as_is = 0.96}};
+                         {.description = "view 1 and view 2 exchanged", .similarity = 0.3, .as_is = 0.96}};
   return result;
 }
 
@@ -185,7 +185,7 @@ TEST(Quality, AnAlternativeAsGoodAsTheImagesNeedsReview) {
   expect_review(mirrored(0.98), "view 1 mirrored");
   expect_review(mirrored(std::numeric_limits<double>::quiet_NaN()), "view 1 mirrored");
   expect_review([](RegistrationResult& result) { result.alternatives[1].similarity = 0.97; },
-                "views 1 and 2 exchanged");
+                "view 1 and view 2 exchanged");
 }
 
 TEST(Quality, APresetWithoutTheCheckOfAlternativesNeedsReview) {
