@@ -9,6 +9,7 @@
 #include "cli/truth.h"
 #include "drr/gl/context.h"
 #include "drr/renderer.h"
+#include "geometry/target_error.h"
 #include "io/ct_series.h"
 #include "io/study.h"
 #include "tests/drr/test_views.h"

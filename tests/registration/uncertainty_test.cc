@@ -28,7 +28,8 @@ Objective gradient_correlation(const RegistrationScene& scene) {
 
 std::optional<Uncertainty> uncertainty_at_truth(const RegistrationScene& scene, bool translation_only = false) {
   Objective objective = gradient_correlation(scene);
-  return estimated_uncertainty(objective, scene.actual(), translation_only, scene.renderers->voxel_mm());
+  return estimated_uncertainty(objective, scene.actual(),
+                               {.translation_only = translation_only, .voxel_mm = scene.renderers->voxel_mm()});
 }
 
 TEST(Uncertainty, MoreNoiseMakesEveryAxisLessCertain) {
@@ -67,7 +68,8 @@ TEST(Uncertainty, SaysHowFarOffNoisyRegistrationsEnd) {
     off << error.translation(), turn.angle() * turn.axis();
     squares += off.cwiseAbs2() / kDraws;
     Objective objective = gradient_correlation(scene);
-    const auto said = estimated_uncertainty(objective, error * scene.actual(), false, scene.renderers->voxel_mm());
+    const auto said = estimated_uncertainty(objective, error * scene.actual(),
+                                            {.translation_only = false, .voxel_mm = scene.renderers->voxel_mm()});
     ASSERT_TRUE(said);
     Eigen::Matrix<double, 6, 1> of_draw;
     of_draw << said->translation_mm, said->rotation_rad;
