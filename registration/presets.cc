@@ -16,7 +16,6 @@ std::vector<Stage> setup_stages() {
            .similarity = SimilarityKind::kStochasticRankCorrelation,
            .pixel_mm = 5.0,
            .voxel_mm = 4.0,
-           .pixel_fraction = 0.35,
            .candidates = 60,
            .starts = 2,
            .keep = 2,

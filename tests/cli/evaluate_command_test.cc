@@ -248,6 +248,17 @@ TEST(RegionSwitchesTest, AStructureOfAStudyWithoutAnyIsAnError) {
   EXPECT_THAT(outcome.err, HasSubstr("structure Spine: the study holds no RT Structure Set"));
 }
 
+TEST(RegionSwitchesTest, ARectangleNeedsALabelOfAnXrayAndFourNumbers) {
+  const SmallStudy study;
+  for (const char* rectangle : {"KV_G000", "KV_G000=1,2,3", "KV_G000=1,2,3,x", "KV_G000=10,10,5,20",
+                                "KV_G000=1,2,30,40,5", "OTHER=10,10,80,80"}) {
+    const CommandOutcome outcome = register_study(study, {"--rectangle", rectangle});
+    EXPECT_EQ(outcome.exit_status, 2) << rectangle;
+    EXPECT_THAT(outcome.err, HasSubstr(fmt::format("--rectangle {}: ", rectangle)));
+  }
+  EXPECT_THAT(register_study(study, {"--preset", "fast", "--rectangle", "KV_G000=10,10,80,80"}).exit_status, 3);
+}
+
 TEST(RegionSwitchesTest, ADistanceThatIsNoneIsAUsageError) {
   const SmallStudy study;
   for (const char* distance : {"0", "-5", "nan"})

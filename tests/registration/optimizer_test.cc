@@ -29,9 +29,7 @@ BatchObjective batched(Function&& function) {
   };
 }
 
-double parabola(const std::vector<double>& x) {
-  return -(x[0] - 3) * (x[0] - 3) - 2 * (x[1] + 1.5) * (x[1] + 1.5) + 7;
-}
+double parabola(const std::vector<double>& x) { return -(x[0] - 3) * (x[0] - 3) - 2 * (x[1] + 1.5) * (x[1] + 1.5) + 7; }
 
 OptimizerResult maximize_alone(const BatchObjective& objective, const OptimizerOptions& options) {
   return maximize(objective, std::span(&options, 1)).front();

@@ -89,5 +89,20 @@ TEST(Preprocess, ReducedImagesAverageAndKeepTheField) {
   EXPECT_EQ(half.field.at(40, 42), 1);
 }
 
+TEST(Preprocess, ARectangleLimitsTheFieldAndIncludesItsBounds) {
+  FixedImage image = prepare(collimated([](int, int) { return true; }));
+  const FixedImage whole = image;
+  restrict_to({.first_column = 20, .first_row = 30, .last_column = 59, .last_row = 100}, image);
+  for (int row = 0; row < kPixels; ++row)
+    for (int column = 0; column < kPixels; ++column) {
+      const bool inside = column >= 20 && column <= 59 && row >= 30 && row <= 100;
+      ASSERT_EQ(image.field.at(column, row), inside ? whole.field.at(column, row) : 0) << column << ", " << row;
+    }
+  // What was not in the field is not added to it.
+  restrict_to({.first_column = 0, .first_row = 0, .last_column = 199, .last_row = 199}, image);
+  EXPECT_EQ(image.field.at(0, 0), 0);
+  EXPECT_EQ(image.field.at(100, 50), 0);
+}
+
 }  // namespace
 }  // namespace isoshift

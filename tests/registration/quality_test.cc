@@ -38,8 +38,9 @@ RegistrationResult good_result() {
                    {.name = "fine", .similarity = "gradient-correlation", .evaluations = 40}};
   result.uncertainty = Uncertainty{.translation_mm = Eigen::Vector3d::Constant(0.2),
                                    .rotation_rad = Eigen::Vector3d::Constant(rad_from_deg(0.2))};
-  result.alternatives = {{.description = "view 1 mirrored", .similarity = 0.6, .as_is = 0.96},
-                         {.description = "view 1 and view 2 exchanged", .similarity = 0.3, .as_is = 0.96}};
+  result.alternatives = {
+      {.description = "view 1 mirrored", .similarity = 0.6, .as_is = 0.96, .distance_mm = 9.0},
+      {.description = "views 1 and 2 exchanged", .similarity = 0.3, .as_is = 0.96, .angle_rad = 0.5}};
   return result;
 }
 
@@ -177,19 +178,51 @@ TEST(Quality, PartsThatDisagreeNeedReview) {
   expect_accepted([](RegistrationResult& result) { result.views[0].consistency = parts(0, 0, 30); });
 }
 
-TEST(Quality, AnAlternativeAsGoodAsTheImagesNeedsReview) {
-  const auto mirrored = [](double similarity) {
-    return [=](RegistrationResult& result) { result.alternatives[0].similarity = similarity; };
+TEST(Quality, AnAlternativeThatIsBetterNeedsReviewWhereverItLies) {
+  const auto mirrored = [](double similarity, double distance_mm) {
+    return [=](RegistrationResult& result) {
+      result.alternatives[0].similarity = similarity;
+      result.alternatives[0].distance_mm = distance_mm;
+    };
   };
-  expect_review(mirrored(0.96), "with view 1 mirrored the images match as well or better (0.960; as they are 0.960)");
-  expect_review(mirrored(0.98), "view 1 mirrored");
-  expect_review(mirrored(std::numeric_limits<double>::quiet_NaN()), "view 1 mirrored");
-  expect_review([](RegistrationResult& result) { result.alternatives[1].similarity = 0.97; },
-                "view 1 and view 2 exchanged");
+  expect_review(mirrored(0.99, 9.0), "with view 1 mirrored the images match better (0.990; as they are 0.960)");
+  expect_review(mirrored(0.99, 0.0), "view 1 mirrored");
+}
+
+TEST(Quality, AnAlternativeAsGoodNeedsReviewUnlessItMeansTheSamePose) {
+  const auto exchanged = [](double similarity, double distance_mm, double angle_deg) {
+    return [=](RegistrationResult& result) {
+      Alternative& alternative = result.alternatives[1];
+      alternative.similarity = similarity;
+      alternative.distance_mm = distance_mm;
+      alternative.angle_rad = rad_from_deg(angle_deg);
+    };
+  };
+  expect_review(exchanged(0.96, 5.0, 0.0), "views 1 and 2 exchanged the images match as well");
+  expect_review(exchanged(0.96, 0.0, 5.0), "5.0 degrees away");
+  expect_review(exchanged(std::numeric_limits<double>::quiet_NaN(), 5.0, 0.0), "views 1 and 2 exchanged");
+  expect_accepted(exchanged(0.96, 0.5, 0.5));
+  expect_accepted(exchanged(0.5, 50.0, 50.0));  // another pose, but not as good
 }
 
 TEST(Quality, APresetWithoutTheCheckOfAlternativesNeedsReview) {
-  expect_review([](RegistrationResult& result) { result.alternatives.clear(); }, "leaves out the check");
+  RegistrationResult result = good_result();
+  result.alternatives.clear();
+  judge(kInside, {.check_alternatives = false}, result);
+  EXPECT_EQ(result.verdict, Verdict::kReview);
+  EXPECT_THAT(result.reasons, ElementsAre(HasSubstr("leaves out the check")));
+}
+
+TEST(Quality, AViewThatPullsThePoseNeedsReview) {
+  const auto without_second_view = [](double mm, double deg) {
+    return [=](RegistrationResult& result) {
+      result.views[0].left_out = LeftOutView{.distance_mm = 0.1, .angle_rad = 0.0};
+      result.views[1].left_out = LeftOutView{.distance_mm = mm, .angle_rad = rad_from_deg(deg)};
+    };
+  };
+  expect_accepted(without_second_view(0.9, 0.9));
+  expect_review(without_second_view(1.4, 0.1), "without view 2 the pose lies 1.4 mm and 0.1 degrees away");
+  expect_review(without_second_view(0.1, 1.4), "without view 2 the pose lies 0.1 mm and 1.4 degrees away");
 }
 
 TEST(Quality, EveryReasonIsGivenAndTheWorstDecides) {

@@ -258,8 +258,8 @@ TEST(Region, ASpineOfWhichTheCtHoldsAPartIsRegistered) {
               testing::Not(PoseNear(scene.truth, 0.7, 0.5)));
 }
 
-// Disabled: in front of a belly that the CT cuts, what lies beyond covers the whole anterior view, and nothing is left
-// to compare.
+// Disabled: in front of a belly that the CT cuts, what lies beyond covers the whole anterior view; as that cannot be
+// left out, what lies above and below is not either, and the search ends at another vertebra.
 TEST(Region, DISABLED_APatientThickerThanTheCtIsRegistered) {
   const RegistrationScene scene = cut_spine({320.0, 210.0, 100.0});
   EXPECT_THAT(registered(scene), PoseNear(scene.truth, 0.7, 0.5));

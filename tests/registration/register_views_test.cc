@@ -62,7 +62,7 @@ TEST(RegisterViews, RecoversKnownOffsetFromTwoOrthogonalViewsInEveryPatientPosit
   for (const PatientPosition position : kPatientPositions) {
     const double couch_deg = position == PatientPosition::kHfs ? 0.0 : 20.0;
     Scene scene = make_scene(position, couch_deg, {0.0, 90.0});
-    const auto result = register_views(*scene.renderers, scene.xrays, scene.planned, preset("fast"));
+    const auto result = register_views(*scene.renderers, scene.xrays, scene.planned, without_alternatives());
     // Pixels of 1.1 mm at the isocenter and slices of 2 mm: about a fourth of a pixel, and its angle at 100 mm.
     EXPECT_THAT(setup_error_from_poses(scene.planned, result.actual_room_from_patient), PoseNear(scene.truth, 0.3, 0.2))
         << to_string(position);
@@ -120,12 +120,11 @@ TEST(RegisterViews, RecoversFromObliqueAndFromThreeViews) {
   }
 }
 
-// No view may seem to match worse, no part to disagree.
-TEST(RegisterViews, APatientExactlyOnPlanLacksNothing) {
+TEST(RegisterViews, APatientExactlyOnPlanIsAccepted) {
   Scene scene = make_scene(PatientPosition::kHfs, 0.0, {0.0, 90.0}, Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero());
-  const auto result = register_views(*scene.renderers, scene.xrays, scene.planned, without_alternatives());
+  const auto result = register_views(*scene.renderers, scene.xrays, scene.planned, preset("setup"));
   EXPECT_THAT(setup_error_from_poses(scene.planned, result.actual_room_from_patient), PoseNear(scene.truth, 0.3, 0.2));
-  EXPECT_THAT(result.reasons, testing::ElementsAre(testing::HasSubstr("leaves out the check")));
+  EXPECT_EQ(result.verdict, Verdict::kAccepted) << testing::PrintToString(result.reasons);
 }
 
 TEST(RegisterViews, ABlankXrayIsAnError) {
@@ -150,31 +149,6 @@ TEST(RegisterViews, SameSeedSamePose) {
   const auto third = register_views(*scene.renderers, scene.xrays, scene.planned, other_seed);
   EXPECT_NE(first.actual_room_from_patient.matrix(), third.actual_room_from_patient.matrix());  // the seed is used
   EXPECT_THAT(third.actual_room_from_patient, PoseNear(first.actual_room_from_patient, 0.1, 0.05));
-}
-
-// Intensities changed one by one, growing with what they were.
-template <class Change>
-Eigen::Isometry3d found_after(const Scene& scene, const RegistrationOptions& options, Change&& change) {
-  std::vector<XrayImage> xrays = scene.xrays;
-  for (XrayImage& xray : xrays) std::ranges::transform(xray.values.pixels, xray.values.pixels.begin(), change);
-  return register_views(*scene.renderers, xrays, scene.planned, options).actual_room_from_patient;
-}
-
-TEST(RegisterViews, RankCorrelationIsBlindToMonotoneIntensityChanges) {
-  const Scene scene = make_scene(PatientPosition::kHfs, 0.0, {0.0, 90.0});
-  RegistrationOptions options = preset("setup");
-  options.stages.resize(2);  // those that end on stochastic rank correlation
-  options.stages[1].pixel_fraction = 1.0;
-  options.stages[1].relative_tolerance = 0.01;
-  options.check_alternatives = false;
-  const Eigen::Isometry3d plain = found_after(scene, options, [](float intensity) { return intensity; });
-  for (const float gamma : {0.5F, 2.0F})
-    EXPECT_THAT(found_after(scene, options, [=](float intensity) { return std::pow(intensity, gamma); }),
-                PoseNear(plain, 0.1, 0.1))
-        << "gamma " << gamma;
-  // The window of a receptor: what is darker or brighter saturates.
-  EXPECT_THAT(found_after(scene, options, [](float intensity) { return std::clamp(intensity, 0.02F, 0.9F); }),
-              PoseNear(plain, 0.1, 0.1));
 }
 
 TEST(RegisterViews, TranslationOnlyLeavesTheRotationAlone) {

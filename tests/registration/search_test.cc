@@ -103,16 +103,35 @@ TEST(Search, SpreadIsReportedForSeveralStarts) {
   EXPECT_LT(*agreeing.stages[0].spread_mm, 1.5);
   EXPECT_LT(*agreeing.stages[0].spread_rad, rad_from_deg(2.0));
 
-  // Stopped at once, they are still where they were drawn.
-  several.max_evaluations = 8;
-  several.initial_step_mm = 0.01;
-  several.initial_step_rad = rad_from_deg(0.01);
-  several.reach_mm = 20.0;
+  // Several that go on to the next stage may differ, and the next stage begins with them.
+  several.keep = 2;
+  Stage next = coarse_stage();
+  const SearchResult kept = search_in(near_scene(), {several, next});
+  EXPECT_FALSE(kept.stages[0].spread_mm);
+  EXPECT_TRUE(kept.stages[1].spread_mm);
+}
+
+TEST(Search, SpreadIsOfPosesThatMatchAsWell) {
+  // A ball, turned any way, looks the same.
+  SceneOptions options{
+      .shapes = {make_shape(Shape::Kind::kEllipsoid, {0, 0, 0}, Vector3d::Constant(50.0), {.water = 1.0})}};
+  const RegistrationScene ball = make_scene(options);
+  Stage several = coarse_stage();
+  several.candidates = 2;
+  several.starts = 3;
+  several.reach_mm = 1.0;
   several.reach_rad = rad_from_deg(15.0);
-  const SearchResult apart = search_in(near_scene(), {several});
-  EXPECT_GT(*apart.stages[0].spread_mm, 5.0);
-  EXPECT_GT(*apart.stages[0].spread_rad, rad_from_deg(3.0));
-  EXPECT_TRUE(apart.stages[0].reached_limit);
+  several.initial_step_rad = rad_from_deg(0.1);
+  const SearchResult undecided = search_in(ball, {several});
+  ASSERT_TRUE(undecided.stages[0].spread_rad);
+  EXPECT_GT(*undecided.stages[0].spread_rad, rad_from_deg(2.0));
+  EXPECT_LT(*undecided.stages[0].spread_mm, 1.0);
+
+  // Where anatomy tells them apart, those that were left behind do not count.
+  several.max_evaluations = 20;
+  several.reach_mm = 25.0;
+  several.reach_rad = rad_from_deg(20.0);
+  EXPECT_LT(*search_in(near_scene(), {several}).stages[0].spread_mm, 1.0);
 }
 
 TEST(Search, SameSeedSameResult) {

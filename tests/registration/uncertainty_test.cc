@@ -120,6 +120,21 @@ TEST(Uncertainty, OfTranslationsTakesRotationsAsKnown) {
   }
 }
 
+TEST(Uncertainty, IsLargerWithAVolumeOfInterestAndWithCoarserVoxels) {
+  const RegistrationScene scene = make_scene(small_scene(200.0));
+  Objective objective = gradient_correlation(scene);
+  const auto with = [&](const UncertaintyOptions& options) {
+    return estimated_uncertainty(objective, scene.actual(), options).value();
+  };
+  const Uncertainty fine = with({.voxel_mm = 1.0}), coarse = with({.voxel_mm = 10.0});
+  const Uncertainty overlapped = with({.voxel_mm = 1.0, .has_volume_of_interest = true});
+  for (int axis = 0; axis < 3; ++axis) {
+    EXPECT_GT(coarse.translation_mm[axis], fine.translation_mm[axis]);
+    EXPECT_GT(overlapped.translation_mm[axis], 1.2 * fine.translation_mm[axis]);
+    EXPECT_GT(overlapped.rotation_rad[axis], 1.2 * fine.rotation_rad[axis]);
+  }
+}
+
 TEST(Uncertainty, OneViewIsLessCertainAlongItsRays) {
   SceneOptions options = small_scene(500.0);
   options.gantry_angles_deg = {0.0};
