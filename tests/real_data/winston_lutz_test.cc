@@ -31,7 +31,8 @@ class WinstonLutz : public testing::Test {
     const CommandOutcome outcome = run_command(
         {"register", (folder_ / set).string(), "--ct", (folder_ / "ball").string(), "-o", output.string(), "--dof",
          "translation", "--isocenter", "0,0,0", "--patient-position", "HFS", "--intensity", "LIN+"});
-    EXPECT_EQ(outcome.exit_status, 0) << outcome.err;
+    // A ball looks the same from opposite sides: off center, exchanged views would mean another pose, for review.
+    EXPECT_THAT(outcome.exit_status, testing::AnyOf(kExitAccepted, kExitReview)) << outcome.err;
     return read_setup_error(output / "result.json").translation();
   }
 
