@@ -5,6 +5,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "cli/console.h"
 #include "cli/truth.h"
 #include "io/rt_image.h"
 #include "registration/preprocess/preprocess.h"
