@@ -150,7 +150,7 @@ int check(int patient_count) {
     const Volume<float> hu = ct_of(patients[static_cast<std::size_t>(ct)]);
     const RendererPyramid renderers(RendererKind::kCpu, hu, {}, std::array{Beam::kKilovoltage});
     RegionOfInterest all_of_the_ct;
-    all_of_the_ct.left_out.push_back(beyond_the_ct(hu, AttenuationModel{}.threshold_hu));
+    all_of_the_ct.cut_ends = beyond_the_ct(hu, AttenuationModel{}.threshold_hu);
     const ProjectedRegion region(all_of_the_ct);
     options.region = &region;
     for (const auto& [what, xrays] : variants(patients[static_cast<std::size_t>(ct)].xrays))

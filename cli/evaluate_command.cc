@@ -48,20 +48,27 @@ StartProtocol protocol_of(const EvaluateOptions& options) {
   return protocol;
 }
 
+// The upper three rows.
+Json rows_of(const Eigen::Isometry3d& transform) {
+  Json rows = Json::array();
+  for (int row = 0; row < 3; ++row)
+    for (int column = 0; column < 4; ++column) rows.push_back(transform.matrix()(row, column));
+  return rows;
+}
+
 // All that the runs depend on: an evaluation is continued only where it is the same.
 Json configuration_of(const RegistrationFlags& flags, const Study& study, const Renderer& renderer,
                       const Eigen::Isometry3d& truth, const StartProtocol& protocol) {
-  Json images = Json::array(), settings = Json::object(), matrix = Json::array();
+  Json images = Json::array(), settings = Json::object();
   for (const RtImage& image : study.rt_images) images.push_back(image.sop_instance_uid);
   for (const auto& [name, value] : flags.rendering.settings()) settings[name] = value;
-  for (int row = 0; row < 3; ++row)
-    for (int column = 0; column < 4; ++column) matrix.push_back(truth.matrix()(row, column));
   std::vector<XrayView> views;
   for (const XrayImage& xray : study.xrays) views.push_back(xray.view);
   return {{"program", fmt::format("isoshift {} ({})", kVersion, kCommit)},
           {"ct_series", study.ct.series_instance_uid},
           {"images", images},
-          {"truth", matrix},
+          {"truth", rows_of(truth)},
+          {"planned_room_from_patient", rows_of(study.planned_room_from_patient)},
           {"renderer", to_string(renderer.kind())},
           {"renderer_settings", settings},
           {"attenuation", flags.rendering.attenuation_name()},

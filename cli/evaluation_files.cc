@@ -118,6 +118,15 @@ BarChart success_chart(const std::vector<EvaluatedRun>& runs, bool by_mrpd, cons
   return chart;
 }
 
+// In place of what is there, at once.
+void replace_text(const std::filesystem::path& file, std::string_view text) {
+  std::filesystem::path aside = file;
+  aside += ".new";
+  std::filesystem::remove(aside);
+  write_text(aside, text);
+  std::filesystem::rename(aside, file);
+}
+
 Json parsed(const std::filesystem::path& file) {
   std::ifstream stream(file);
   if (!stream) throw Error(fmt::format("{}: cannot be opened; is this the folder of an evaluation?", file.string()));
@@ -172,10 +181,7 @@ void EvaluationFolder::read_runs() {
     }
     whole += line + "\n";
   }
-  if (!cut) return;
-  const std::filesystem::path aside = path_ / "runs.csv.new";
-  write_text(aside, whole);
-  std::filesystem::rename(aside, path_ / kRunsFile);
+  if (cut) replace_text(path_ / kRunsFile, whole);
 }
 
 bool EvaluationFolder::has(int number) const {
@@ -191,9 +197,9 @@ void EvaluationFolder::append(const EvaluatedRun& run) {
 
 void EvaluationFolder::write_summary() const {
   const EvaluationSummary summary = summarized(runs_, judged_by_mrpd());
-  write_text(path_ / "summary.json", json_of(summary).dump(2) + "\n");
-  write_bar_chart_svg(path_ / "success.svg", success_chart(runs_, judged_by_mrpd(), summary));
-  write_bar_chart_svg(path_ / "errors.svg", error_histogram(runs_, summary));
+  replace_text(path_ / "summary.json", json_of(summary).dump(2) + "\n");
+  replace_text(path_ / "success.svg", bar_chart_svg(success_chart(runs_, judged_by_mrpd(), summary)));
+  replace_text(path_ / "errors.svg", bar_chart_svg(error_histogram(runs_, summary)));
 }
 
 std::string evaluation_table(const std::vector<std::pair<std::string, EvaluationSummary>>& rows) {

@@ -79,7 +79,7 @@ RegionOfStudy region_of(const RegionSwitches& switches, const Study& study, doub
       region.volume = mask;
   }
   if (region.volume) result.rendered_ct = only_inside(result.rendered_ct, dilated(*region.volume, kRenderedBeyondMm));
-  region.left_out.push_back(beyond_the_ct(study.ct.hu, threshold_hu));
+  region.cut_ends = beyond_the_ct(study.ct.hu, threshold_hu);
   for (const std::string& name : switches.excluded) {
     const Volume<std::uint8_t> mask = mask_in_ct(study, name);
     result.rendered_ct = without(result.rendered_ct, mask);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <numbers>
 
 #include "drr/renderer_pyramid.h"
 #include "registration/preprocess/image_operations.h"
@@ -39,32 +40,38 @@ Image<std::uint8_t> shadow(Renderer& renderer, const XrayView& view, const Eigen
 
 }  // namespace
 
-Volume<std::uint8_t> beyond_the_ct(const Volume<float>& ct_hu, double threshold_hu, double reach_mm) {
+std::vector<CutEnds> beyond_the_ct(const Volume<float>& ct_hu, double threshold_hu, double reach_mm) {
   constexpr double kVoxelMm = 4.0;
   const Eigen::Vector3i block = (kVoxelMm / ct_hu.spacing_mm().array()).cast<int>().max(1);
   const Volume<float> coarse = coarser_ct(ct_hu, {.threshold_hu = threshold_hu}, block).hu;
+  const Eigen::Vector3i whole = (ct_hu.size.array() / block.array()).max(1);  // a last, smaller block is half air
   const auto attenuates = [&](const Eigen::Vector3i& at) {
     return coarse.at(at.x(), at.y(), at.z()) > static_cast<float>(threshold_hu);
   };
-  const Eigen::Vector3i reach = (reach_mm / coarse.spacing_mm().array()).ceil().cast<int>();
-  Volume<std::uint8_t> beyond(coarse.size + 2 * reach,
-                              coarse.patient_from_voxel * Eigen::Translation3d(-reach.cast<double>()));
+  std::vector<CutEnds> result;
   for (int axis = 0; axis < 3; ++axis) {
     const int u = (axis + 1) % 3, v = (axis + 2) % 3;
+    const int reach = static_cast<int>(std::ceil(reach_mm / coarse.spacing_mm()[axis]));
+    const Eigen::Vector3i before = reach * Eigen::Vector3i::Unit(axis);
+    Volume<std::uint8_t> beyond(whole + 2 * before,
+                                coarse.patient_from_voxel * Eigen::Translation3d(-before.cast<double>()));
+    bool is_cut = false;
     Eigen::Vector3i at;
-    for (at[u] = 0; at[u] < coarse.size[u]; ++at[u])
-      for (at[v] = 0; at[v] < coarse.size[v]; ++at[v])
-        for (const bool at_end : {false, true}) {
-          at[axis] = at_end ? coarse.size[axis] - 1 : 0;
+    for (at[u] = 0; at[u] < whole[u]; ++at[u])
+      for (at[v] = 0; at[v] < whole[v]; ++at[v])
+        for (const int outward : {-1, 1}) {
+          at[axis] = outward > 0 ? whole[axis] - 1 : 0;
           if (!attenuates(at)) continue;
-          for (int step = 1; step <= reach[axis]; ++step) {
-            Eigen::Vector3i out = at + reach;
-            out[axis] += at_end ? step : -step;
+          is_cut = true;
+          Eigen::Vector3i out = at + before;
+          for (int step = 1; step <= reach; ++step) {
+            out[axis] += outward;
             beyond.at(out.x(), out.y(), out.z()) = 1;
           }
         }
+    if (is_cut) result.push_back({std::move(beyond), ct_hu.patient_from_voxel.linear().col(axis).normalized()});
   }
-  return beyond;
+  return result;
 }
 
 Volume<float> only_inside(const Volume<float>& ct_hu, const Volume<std::uint8_t>& mask) {
@@ -88,6 +95,7 @@ ProjectedRegion::ProjectedRegion(const RegionOfInterest& region) {
   if (region.volume) inside_ = renderer_of(*region.volume);
   for (const Volume<std::uint8_t>& volume : region.left_out)
     if (!is_empty(volume)) outside_.push_back(renderer_of(volume));
+  for (const CutEnds& ends : region.cut_ends) ends_.push_back({renderer_of(ends.columns), ends.along_patient});
 }
 
 void ProjectedRegion::restrict(FixedImage& image, const Eigen::Isometry3d& room_from_patient, double slack_mm) const {
@@ -104,10 +112,14 @@ void ProjectedRegion::restrict(FixedImage& image, const Eigen::Isometry3d& room_
   };
   if (inside_) image.field = only_where(*inside_, 1);
   constexpr double kMinLeft = 0.1;
-  for (const auto& outside : outside_) {
-    Image<std::uint8_t> field = only_where(*outside, 0);
+  const auto leave_out = [&](Renderer& outside) {
+    Image<std::uint8_t> field = only_where(outside, 0);
     if (count(field) >= kMinLeft * count(image.field)) image.field = std::move(field);
-  }
+  };
+  for (const auto& outside : outside_) leave_out(*outside);
+  const Eigen::Vector3d looking = room_from_patient.linear().transpose() * image.view.central_direction_room();
+  for (const Ends& ends : ends_)
+    if (std::abs(looking.dot(ends.along_patient)) < 0.5 * std::numbers::sqrt2) leave_out(*ends.renderer);
 }
 
 }  // namespace isoshift

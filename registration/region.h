@@ -11,14 +11,22 @@
 namespace isoshift {
 
 // Volumes hold 1 inside and 0 outside, in the CT's patient coordinates; their lattices may differ from the CT's.
+
+// Where a CT ends although the body goes on: the columns of space beyond two opposite faces where the outermost voxels
+// attenuate. The X-ray shows what lies there, the DRR does not.
+struct CutEnds {
+  Volume<std::uint8_t> columns;
+  Eigen::Vector3d along_patient = Eigen::Vector3d::UnitZ();  // normal of the faces
+};
+
 struct RegionOfInterest {
   std::optional<Volume<std::uint8_t>> volume;  // unset: all
   std::vector<Volume<std::uint8_t>> left_out;  // such as a jaw that moves on its own
+  std::vector<CutEnds> cut_ends;               // left out in views that do not look along them
 };
 
-// Where a CT ends although the body goes on: the columns of space beyond its faces, up to `reach_mm` away, where the
-// outermost voxels attenuate. The X-ray shows what lies there, the DRR does not.
-Volume<std::uint8_t> beyond_the_ct(const Volume<float>& ct_hu, double threshold_hu, double reach_mm = 150.0);
+// For each pair of faces that cuts the body, columns up to `reach_mm` long.
+std::vector<CutEnds> beyond_the_ct(const Volume<float>& ct_hu, double threshold_hu, double reach_mm = 150.0);
 
 // A CT without what lies outside a mask of the same size (1 inside): that becomes air.
 Volume<float> only_inside(const Volume<float>& ct_hu, const Volume<std::uint8_t>& mask);
@@ -41,6 +49,11 @@ class ProjectedRegion {
  private:
   std::unique_ptr<Renderer> inside_;
   std::vector<std::unique_ptr<Renderer>> outside_;
+  struct Ends {
+    std::unique_ptr<Renderer> renderer;
+    Eigen::Vector3d along_patient;
+  };
+  std::vector<Ends> ends_;
 };
 
 }  // namespace isoshift

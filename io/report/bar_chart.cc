@@ -9,7 +9,6 @@
 #include <memory>
 
 #include "geometry/error.h"
-#include "io/output_folder.h"
 
 namespace isoshift {
 namespace {
@@ -101,7 +100,7 @@ void draw(cairo_t* context, const BarChart& chart) {
 
 }  // namespace
 
-void write_bar_chart_svg(const std::filesystem::path& path, const BarChart& chart) {
+std::string bar_chart_svg(const BarChart& chart) {
   std::string svg;
   const auto append = [](void* closure, const unsigned char* bytes, unsigned int count) {
     static_cast<std::string*>(closure)->append(reinterpret_cast<const char*>(bytes), count);
@@ -115,8 +114,8 @@ void write_bar_chart_svg(const std::filesystem::path& path, const BarChart& char
   }
   cairo_surface_finish(surface.get());
   if (const auto status = cairo_surface_status(surface.get()); status != CAIRO_STATUS_SUCCESS)
-    throw Error(fmt::format("{}: cannot be written: {}", path.string(), cairo_status_to_string(status)));
-  write_text(path, svg);
+    throw Error(fmt::format("a chart cannot be drawn: {}", cairo_status_to_string(status)));
+  return svg;
 }
 
 }  // namespace isoshift

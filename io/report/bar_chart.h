@@ -1,7 +1,6 @@
 #pragma once
 // A bar chart as SVG: text and lines, readable in gray.
 
-#include <filesystem>
 #include <optional>
 #include <string>
 #include <vector>
@@ -19,7 +18,6 @@ struct BarChart {
   std::optional<double> reference_line;  // dashed, at this y
 };
 
-// Throws Error naming the file if it cannot be written.
-void write_bar_chart_svg(const std::filesystem::path& path, const BarChart& chart);
+std::string bar_chart_svg(const BarChart& chart);
 
 }  // namespace isoshift

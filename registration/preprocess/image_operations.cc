@@ -50,6 +50,9 @@ SquareMatch best_match(const Image<float>& image, const PixelSquare& square, con
   const cv::Rect around =
       cv::Rect(here.x - reach_px, here.y - reach_px, here.width + 2 * reach_px, here.height + 2 * reach_px) &
       cv::Rect(0, 0, in.columns, in.rows);
+  cv::Scalar mean, deviation;
+  cv::meanStdDev(mat_of(image)(here), mean, deviation);
+  if (deviation[0] == 0.0) return {};  // OpenCV would find it everywhere
   cv::Mat correlation;
   cv::matchTemplate(mat_of(in)(around), mat_of(image)(here), correlation, cv::TM_CCOEFF_NORMED);
   const cv::Point middle(here.x - around.x, here.y - around.y);

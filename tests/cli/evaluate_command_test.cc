@@ -117,8 +117,7 @@ TEST_F(EvaluateCommandTest, StoppedAndStartedAgainGivesTheSameRuns) {
   EXPECT_TRUE(std::filesystem::exists(folder_ / "stopped" / "summary.json"));
 }
 
-// Disabled, as the next: the summary of before is in the way.
-TEST_F(EvaluateCommandTest, DISABLED_AWholeOneStartedAgainIsLeftAsItIs) {
+TEST_F(EvaluateCommandTest, AWholeOneStartedAgainIsLeftAsItIs) {
   ASSERT_EQ(evaluate(folder_ / "evaluation").exit_status, 0);
   const std::string runs = content_of(folder_ / "evaluation" / "runs.csv");
   const std::string summary = content_of(folder_ / "evaluation" / "summary.json");
@@ -128,7 +127,7 @@ TEST_F(EvaluateCommandTest, DISABLED_AWholeOneStartedAgainIsLeftAsItIs) {
   EXPECT_EQ(content_of(folder_ / "evaluation" / "summary.json"), summary);
 }
 
-TEST_F(EvaluateCommandTest, DISABLED_RunsLostFromAWholeOneAreMadeAgain) {
+TEST_F(EvaluateCommandTest, RunsLostFromAWholeOneAreMadeAgain) {
   ASSERT_EQ(evaluate(folder_ / "evaluation").exit_status, 0);
   const std::vector<std::string> expected = runs_without_times(folder_ / "evaluation");
   const std::vector<std::string> lines = lines_of(folder_ / "evaluation" / "runs.csv");
@@ -163,8 +162,8 @@ TEST_F(EvaluateCommandTest, AnotherEvaluationIsNotContinued) {
   EXPECT_EQ(content_of(folder_ / "evaluation" / "runs.csv"), runs);
 }
 
-// A planned pose given by hand makes other runs. Disabled: it is not in evaluation.json.
-TEST_F(EvaluateCommandTest, DISABLED_AnotherPlanIsAnotherEvaluation) {
+// A planned pose given by hand makes other runs.
+TEST_F(EvaluateCommandTest, AnotherPlanIsAnotherEvaluation) {
   ASSERT_EQ(evaluate(folder_ / "evaluation", {"--starts", "1"}).exit_status, 0);
   const CommandOutcome outcome = evaluate(folder_ / "evaluation", {"--starts", "1", "--isocenter", "-2.5,38,-410"});
   EXPECT_EQ(outcome.exit_status, 1);
