@@ -105,6 +105,9 @@ RegistrationResult register_views(const RendererPyramid& renderers, std::span<co
                                              {.translation_only = options.dof == Dof::kTranslation,
                                               .voxel_mm = renderers.voxel_mm(),
                                               .has_volume_of_interest = fixed.region.has_volume()});
+  for (const StageReport& stage : result.stages)
+    if (result.uncertainty && stage.spread_mm)
+      result.uncertainty = widened_to_spread(*result.uncertainty, *stage.spread_mm, *stage.spread_rad);
   if (options.check_alternatives)
     result.alternatives = compare_alternatives(renderers, fixed, start_room_from_patient, search_options);
   if (options.check_vertebrae)

@@ -116,4 +116,13 @@ std::optional<Uncertainty> estimated_uncertainty(Objective& objective, const Eig
   return uncertainty;
 }
 
+Uncertainty widened_to_spread(const Uncertainty& uncertainty, double spread_mm, double spread_rad) {
+  constexpr double kSigmas = 4.0;
+  const auto widened = [](const Eigen::Vector3d& sigma, double spread) -> Eigen::Vector3d {
+    return sigma.isZero() ? sigma : std::max(1.0, spread / (kSigmas * sigma.norm())) * sigma;
+  };
+  return {.translation_mm = widened(uncertainty.translation_mm, spread_mm),
+          .rotation_rad = widened(uncertainty.rotation_rad, spread_rad)};
+}
+
 }  // namespace isoshift

@@ -31,4 +31,8 @@ struct UncertaintyOptions {
 std::optional<Uncertainty> estimated_uncertainty(Objective& objective, const Eigen::Isometry3d& room_from_patient,
                                                  const UncertaintyOptions& options);
 
+// Restarts that end further apart than four sigma say more than the curvature does: sigma is then a quarter of their
+// spread. Turning a ball, say, changes the voxels' edges in its DRRs, which bends the similarity for nothing.
+Uncertainty widened_to_spread(const Uncertainty& uncertainty, double spread_mm, double spread_rad);
+
 }  // namespace isoshift

@@ -6,6 +6,8 @@
 
 #include "geometry/rotation.h"
 #include "registration/pose_parameters.h"
+#include "registration/presets.h"
+#include "registration/register_views.h"
 #include "tests/drr/test_views.h"
 #include "tests/support/registration_scene.h"
 
@@ -83,16 +85,30 @@ TEST(Uncertainty, SaysHowFarOffNoisyRegistrationsEnd) {
   }
 }
 
-// Turning a ball does not change its shadow: nothing is known about the rotations. Disabled: the voxels of its CT turn
-// with it, and what that changes in the DRR is taken for a derivative.
-TEST(Uncertainty, DISABLED_OfABallIsAbsentOrLarge) {
+// Turning a ball does not change its shadow.
+TEST(Uncertainty, OfABallIsNotAccepted) {
   SceneOptions options{
       .shapes = {make_shape(Shape::Kind::kEllipsoid, {0, 0, 0}, Vector3d::Constant(50.0), {.water = 1.0})},
       .photons = 300.0};
-  const auto uncertainty = uncertainty_at_truth(make_scene(options));
-  if (uncertainty) {
-    EXPECT_GT(uncertainty->rotation_rad.minCoeff(), rad_from_deg(1.0));
+  for (const Vector3d& turned_deg : {Vector3d(3.0, -2.0, 4.0), Vector3d(-5.0, 1.0, 2.0), Vector3d(0.5, -6.0, -3.0)}) {
+    options.placement.rotation_deg = turned_deg;
+    options.placement.translation_mm = Vector3d(2.0, -3.0, 1.0);
+    const RegistrationScene scene = make_scene(options);
+    const RegistrationResult result = register_views(*scene.renderers, scene.xrays, scene.planned, preset("setup"));
+    EXPECT_NE(result.verdict, Verdict::kAccepted);
+    ASSERT_TRUE(result.uncertainty);
+    EXPECT_GT(result.uncertainty->rotation_rad.minCoeff(), rad_from_deg(0.5));
   }
+}
+
+TEST(Uncertainty, IsAtLeastAQuarterOfTheSpreadOfRestarts) {
+  const Uncertainty curvature{.translation_mm = {0.1, 0.2, 0.2}, .rotation_rad = {0.003, 0.0, 0.004}};
+  const Uncertainty widened = widened_to_spread(curvature, /*spread_mm=*/1.0, /*spread_rad=*/0.2);
+  EXPECT_EQ(widened.translation_mm, curvature.translation_mm);  // 0.3 mm in all: four sigma are 1.2 mm
+  EXPECT_NEAR(widened.rotation_rad.norm(), 0.05, 1e-12);
+  EXPECT_NEAR(widened.rotation_rad.x() / widened.rotation_rad.z(), 0.75, 1e-12);
+  const Uncertainty of_translation{.translation_mm = {0.1, 0.1, 0.1}};
+  EXPECT_EQ(widened_to_spread(of_translation, 0.0, 0.1).rotation_rad, Vector3d::Zero());
 }
 
 // A cylinder along the patient (room y) may turn about it and, longer than the views, move along it.
