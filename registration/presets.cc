@@ -39,7 +39,7 @@ std::vector<Stage> setup_stages() {
           {.name = "restarts",
            .similarity = SimilarityKind::kGradientCorrelation,
            .pixel_mm = 2.5,
-           .voxel_mm = 2.0,
+           .voxel_mm = 3.0,
            .pixel_fraction = 0.3,
            .min_pixels = 2500,
            .candidates = 2,
@@ -48,18 +48,19 @@ std::vector<Stage> setup_stages() {
            .reach_rad = rad_from_deg(1.5),
            .initial_step_mm = 1.0,
            .initial_step_rad = rad_from_deg(0.6),
-           .relative_tolerance = 0.05},
+           .relative_tolerance = 0.08},
           {.name = "fine",
            .similarity = SimilarityKind::kGradientCorrelation,
            .pixel_mm = 1.2,
            .voxel_mm = 1.0,
-           .pixel_fraction = 0.3,
+           .pixel_fraction = 0.2,
            .min_pixels = 8000,
            .initial_step_mm = 0.4,
            .initial_step_rad = rad_from_deg(0.25),
-           .relative_tolerance = 0.015}};
+           .relative_tolerance = 0.03}};
 }
 
+// As setup from one start, without the candidates of a far search, and ending on pixels of 2 mm.
 std::vector<Stage> fast_stages() {
   std::vector<Stage> stages = setup_stages();
   std::erase_if(stages, [](const Stage& stage) { return stage.name == "restarts"; });
@@ -67,6 +68,11 @@ std::vector<Stage> fast_stages() {
     stage.candidates = 0;
     stage.starts = stage.keep = 1;
   }
+  Stage& fine = stages.back();
+  fine.pixel_mm = 2.0;
+  fine.voxel_mm = 2.0;
+  fine.min_pixels = 3000;
+  fine.relative_tolerance = 0.05;
   return stages;
 }
 

@@ -109,7 +109,7 @@ RegistrationResult register_views(const RendererPyramid& renderers, std::span<co
     if (result.uncertainty && stage.spread_mm)
       result.uncertainty = widened_to_spread(*result.uncertainty, *stage.spread_mm, *stage.spread_rad);
   if (options.check_alternatives)
-    result.alternatives = compare_alternatives(renderers, fixed, start_room_from_patient, search_options);
+    result.alternatives = compare_alternatives(renderers, fixed, start_room_from_patient, search_options, found);
   if (options.check_vertebrae)
     std::ranges::copy(compare_vertebrae(renderers, fixed, start_room_from_patient, search_options, found),
                       std::back_inserter(result.alternatives));

@@ -1,9 +1,10 @@
 #include "registration/quality/alternatives.h"
 
 #include <fmt/format.h>
+#include <tbb/parallel_for_each.h>
 
 #include <algorithm>
-#include <optional>
+#include <array>
 
 #include "geometry/rotation.h"
 #include "registration/pose_parameters.h"
@@ -11,7 +12,8 @@
 namespace isoshift {
 namespace {
 
-// Wide enough to find a pose of its own for every alternative, and ending on what tells structures apart.
+// Wide enough to find a pose of its own for every alternative, and ending on
+// what tells structures apart.
 std::vector<Stage> short_stages() {
   return {{.name = "coarse",
            .similarity = SimilarityKind::kStochasticRankCorrelation,
@@ -53,17 +55,23 @@ FixedImage turned(FixedImage image) {
   return image;
 }
 
-// A search for the images as something.
+// Searches for the images as something, each level closer than the one before.
 struct Attempt {
   std::string description;
   FixedViews views;
-  SearchResult found;
+  std::vector<SearchResult> found = {};
 };
 
-// What a search does not explain. Where an alternative and the images as they are differ by less than this factor, they
-// are looked at closely: blurred, a head is symmetric.
+// Blurred, a head is symmetric, and a short search may fail: an alternative that leaves less than this many times as
+// much unexplained as the images as they are is searched for more closely. After each level but the last:
+constexpr std::array kClose = {1.5, 1.25};
+
 double unexplained(const SearchResult& found) { return 1.0 - found.stages.back().value; }
-constexpr double kClose = 1.5;
+
+bool is_close(const Attempt& attempt, const Attempt& as_is, std::size_t level) {
+  if (attempt.found.size() <= level) return false;
+  return unexplained(attempt.found[level]) < kClose[level] * unexplained(as_is.found[level]);
+}
 
 std::vector<Attempt> attempts_with(const FixedViews& views) {
   std::vector<Attempt> attempts = {{.description = "as they are", .views = views}};
@@ -86,45 +94,53 @@ std::vector<Attempt> attempts_with(const FixedViews& views) {
   return attempts;
 }
 
+// At once, where the renderers can.
+template <class Items, class Work>
+void for_each_on(const RendererPyramid& renderers, const Items& items, Work&& work) {
+  if (uses_gl(renderers.finest().kind()))
+    std::ranges::for_each(items, work);
+  else
+    tbb::parallel_for_each(items, work);
+}
+
 }  // namespace
 
 std::vector<Alternative> compare_alternatives(const RendererPyramid& renderers, const FixedViews& views,
                                               const Eigen::Isometry3d& start_room_from_patient,
-                                              const SearchOptions& options) {
-  const std::vector<Stage> short_list = short_stages();
-  SearchOptions short_search = options;
-  short_search.stages = short_list;
-  // The last stage to the end, and before it one from where the short ones leave off.
-  std::vector<Stage> long_list = {short_list.back(), options.stages.back()};
-  long_list.front().pixel_mm = 2.0 * options.stages.back().pixel_mm;
-  long_list.front().voxel_mm = 2.0 * options.stages.back().voxel_mm;
+                                              const SearchOptions& options, const SearchResult& found) {
+  Stage closer = short_stages().back();
+  closer.pixel_mm = 2.0 * options.stages.back().pixel_mm;
+  closer.voxel_mm = 2.0 * options.stages.back().voxel_mm;
+  const std::array<std::vector<Stage>, kClose.size() + 1> levels = {short_stages(), std::vector{closer},
+                                                                    std::vector{options.stages.back()}};
 
   std::vector<Attempt> attempts = attempts_with(views);
-  for (Attempt& attempt : attempts)
-    attempt.found = search(renderers, attempt.views, start_room_from_patient, short_search);
-  const auto is_close = [&](const Attempt& attempt) {
-    const double ratio = unexplained(attempt.found) / unexplained(attempts.front().found);
-    return ratio < kClose && ratio > 1.0 / kClose;
-  };
-  const auto closely = [&](const Attempt& attempt) {
-    SearchOptions long_search = options;
-    long_search.stages = long_list;
-    long_search.parameters = attempt.found.parameters;
-    return search(renderers, attempt.views, start_room_from_patient, long_search);
-  };
-  std::optional<SearchResult> as_is_closely;
+  const Attempt& as_is = attempts.front();
+  std::vector<Attempt*> searched;
+  for (Attempt& attempt : attempts) searched.push_back(&attempt);
+  for (std::size_t level = 0; level < levels.size() && !searched.empty(); ++level) {
+    SearchOptions of_level = options;
+    of_level.stages = levels[level];
+    for_each_on(renderers, searched, [&](Attempt* attempt) {
+      SearchOptions from_there = of_level;
+      if (level > 0)
+        from_there.parameters = level == 1 && attempt == &as_is ? found.parameters : attempt->found.back().parameters;
+      attempt->found.push_back(search(renderers, attempt->views, start_room_from_patient, from_there));
+    });
+    searched.clear();
+    for (Attempt& attempt : attempts)
+      if (&attempt != &as_is && level < kClose.size() && is_close(attempt, as_is, level)) searched.push_back(&attempt);
+    if (!searched.empty()) searched.push_back(&attempts.front());
+  }
+
   std::vector<Alternative> alternatives;
-  for (std::size_t n = 1; n < attempts.size(); ++n) {
-    SearchResult as_is = attempts.front().found, as_other = attempts[n].found;
-    if (is_close(attempts[n])) {
-      if (!as_is_closely) as_is_closely = closely(attempts.front());
-      as_is = *as_is_closely;
-      as_other = closely(attempts[n]);
-    }
-    const PoseDistance distance = distance_between(as_is.parameters, as_other.parameters);
-    alternatives.push_back({.description = attempts[n].description,
+  for (const Attempt& attempt : std::span(attempts).subspan(1)) {
+    const SearchResult& as_other = attempt.found.back();
+    const SearchResult& as_they_are = as_is.found[attempt.found.size() - 1];
+    const PoseDistance distance = distance_between(as_they_are.parameters, as_other.parameters);
+    alternatives.push_back({.description = attempt.description,
                             .similarity = as_other.stages.back().value,
-                            .as_is = as_is.stages.back().value,
+                            .as_is = as_they_are.stages.back().value,
                             .distance_mm = distance.translation_mm,
                             .angle_rad = distance.angle_rad});
   }

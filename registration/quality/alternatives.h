@@ -18,10 +18,10 @@ struct Alternative {
   double angle_rad = 0.0;    // and rotation
 };
 
-// Searches with short stages, each time from the start; where an alternative comes close, with `options.stages` to the
-// end.
+// Searches with short stages, each time from the start; where an alternative comes close, more closely, at last with
+// the last of `options.stages`, and for the images as they are from the pose that registration found.
 std::vector<Alternative> compare_alternatives(const RendererPyramid& renderers, const FixedViews& views,
                                               const Eigen::Isometry3d& start_room_from_patient,
-                                              const SearchOptions& options);
+                                              const SearchOptions& options, const SearchResult& found);
 
 }  // namespace isoshift

@@ -28,8 +28,10 @@ std::map<std::string, Alternative> alternatives_of(const RegistrationScene& scen
                    .initial_step_rad = rad_from_deg(0.4),
                    .relative_tolerance = 0.05};
   std::map<std::string, Alternative> named;
+  const SearchOptions options{.stages = std::span(&fine, 1)};
+  const SearchResult found = search(*scene.renderers, scene.views(), scene.planned, options);
   for (const Alternative& alternative :
-       compare_alternatives(*scene.renderers, scene.views(), scene.planned, {.stages = std::span(&fine, 1)}))
+       compare_alternatives(*scene.renderers, scene.views(), scene.planned, options, found))
     named[alternative.description] = alternative;
   return named;
 }

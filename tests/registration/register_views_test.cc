@@ -120,8 +120,9 @@ TEST(RegisterViews, RecoversFromObliqueAndFromThreeViews) {
   }
 }
 
+// Oblique views: from the front this head and its mirror image are hard to tell apart.
 TEST(RegisterViews, APatientExactlyOnPlanIsAccepted) {
-  Scene scene = make_scene(PatientPosition::kHfs, 0.0, {0.0, 90.0}, Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero());
+  Scene scene = make_scene(PatientPosition::kHfs, 0.0, {30.0, 120.0}, Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero());
   const auto result = register_views(*scene.renderers, scene.xrays, scene.planned, preset("setup"));
   EXPECT_THAT(setup_error_from_poses(scene.planned, result.actual_room_from_patient), PoseNear(scene.truth, 0.3, 0.2));
   EXPECT_EQ(result.verdict, Verdict::kAccepted) << testing::PrintToString(result.reasons);
