@@ -111,15 +111,17 @@ void ProjectedRegion::restrict(FixedImage& image, const Eigen::Isometry3d& room_
     return static_cast<double>(std::ranges::count_if(field.pixels, std::identity()));
   };
   if (inside_) image.field = only_where(*inside_, 1);
-  constexpr double kMinLeft = 0.1;
-  const auto leave_out = [&](Renderer& outside) {
+  const auto leave_out = [&](Renderer& outside, double min_left) {
     Image<std::uint8_t> field = only_where(outside, 0);
-    if (count(field) >= kMinLeft * count(image.field)) image.field = std::move(field);
+    if (count(field) >= min_left * count(image.field)) image.field = std::move(field);
   };
-  for (const auto& outside : outside_) leave_out(*outside);
+  constexpr double kMinLeft = 0.1, kMinLeftAlong = 0.5;
+  for (const auto& outside : outside_) leave_out(*outside, kMinLeft);
   const Eigen::Vector3d looking = room_from_patient.linear().transpose() * image.view.central_direction_room();
-  for (const Ends& ends : ends_)
-    if (std::abs(looking.dot(ends.along_patient)) < 0.5 * std::numbers::sqrt2) leave_out(*ends.renderer);
+  for (const Ends& ends : ends_) {
+    const bool is_along = std::abs(looking.dot(ends.along_patient)) > 0.5 * std::numbers::sqrt2;
+    leave_out(*ends.renderer, is_along ? kMinLeftAlong : kMinLeft);
+  }
 }
 
 }  // namespace isoshift

@@ -22,7 +22,7 @@ struct CutEnds {
 struct RegionOfInterest {
   std::optional<Volume<std::uint8_t>> volume;  // unset: all
   std::vector<Volume<std::uint8_t>> left_out;  // such as a jaw that moves on its own
-  std::vector<CutEnds> cut_ends;               // left out in views that do not look along them
+  std::vector<CutEnds> cut_ends;
 };
 
 // For each pair of faces that cuts the body, columns up to `reach_mm` long.
@@ -40,7 +40,8 @@ class ProjectedRegion {
   explicit ProjectedRegion(const RegionOfInterest& region);
 
   // Takes out of the field of an image what is not compared with the patient at a pose known to within `slack_mm`.
-  // What is left out never takes more than nine tenths of the field: only a search that has gone astray meets that.
+  // What is left out never takes more than nine tenths of the field: only a search that has gone astray meets that. Ends
+  // that the view looks along never take more than half: all of a body too thick for the CT lies between them.
   void restrict(FixedImage& image, const Eigen::Isometry3d& room_from_patient, double slack_mm) const;
 
   // Whether a volume was chosen: X-rays then show what lies before and behind it, and DRRs do not.

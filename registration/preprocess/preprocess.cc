@@ -208,6 +208,22 @@ void restrict_to(const PixelRectangle& rectangle, FixedImage& image) {
         image.field.at(column, row) = 0;
 }
 
+// Takes out of the field what lies at the least or the largest value, where many pixels do: a receptor that saturated, or
+// a display window, has cut them off, and their true values are not known.
+void leave_out_clipped(FixedImage& image) {
+  constexpr double kMany = 0.0005;
+  std::vector<float> values;
+  for (std::size_t n = 0; n < image.field.pixels.size(); ++n)
+    if (image.field.pixels[n] != 0) values.push_back(image.line_integral.pixels[n]);
+  if (values.empty()) return;
+  const auto [least, largest] = std::ranges::minmax(values);
+  for (const float extreme : {least, largest}) {
+    if (static_cast<double>(std::ranges::count(values, extreme)) < kMany * static_cast<double>(values.size())) continue;
+    for (std::size_t n = 0; n < image.field.pixels.size(); ++n)
+      if (image.line_integral.pixels[n] == extreme) image.field.pixels[n] = 0;
+  }
+}
+
 FixedImage prepare(const XrayImage& xray) {
   const auto [darkest, brightest] = std::ranges::minmax(xray.values.pixels);
   const bool is_intensity = xray.meaning == XrayImage::Meaning::kIntensity;
@@ -221,6 +237,7 @@ FixedImage prepare(const XrayImage& xray) {
   image.label = xray.label;
   image.line_integral = line_integrals(xray);
   image.field = irradiated_field(xray, image.line_integral);
+  leave_out_clipped(image);
   return image;
 }
 
