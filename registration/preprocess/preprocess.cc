@@ -208,8 +208,8 @@ void restrict_to(const PixelRectangle& rectangle, FixedImage& image) {
         image.field.at(column, row) = 0;
 }
 
-// Takes out of the field what lies at the least or the largest value, where many pixels do: a receptor that saturated, or
-// a display window, has cut them off, and their true values are not known.
+// Takes out of the field what lies at the least or the largest value, where many pixels do: a receptor that saturated,
+// or a display window, has cut them off, and their true values are not known.
 void leave_out_clipped(FixedImage& image) {
   constexpr double kMany = 0.0005;
   std::vector<float> values;

@@ -23,7 +23,7 @@ Image<float> line_integrals(const XrayImage& xray);
 Image<std::uint8_t> irradiated_field(const XrayImage& xray, const Image<float>& line_integral);
 
 // One level of the pyramid: blocks of factor x factor pixels averaged over the field, and the blocks that lie wholly in
-// it.
+// it. What the receptor or a display window has cut off is not in the field.
 struct FixedImage {
   XrayView view;
   Image<float> line_integral;

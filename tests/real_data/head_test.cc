@@ -5,13 +5,17 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "cli/truth.h"
 #include "drr/gl/context.h"
 #include "drr/renderer.h"
+#include "drr/renderer_pyramid.h"
+#include "geometry/couch_shift.h"
 #include "geometry/target_error.h"
 #include "io/ct_series.h"
 #include "io/study.h"
+#include "registration/presets.h"
 #include "tests/drr/test_views.h"
 #include "tests/support/command.h"
 #include "tests/support/pose_near.h"
@@ -66,6 +70,37 @@ TEST(HeadRegistration, ObjectMeansTheTruthToPydicomAndPassesDciodvfy) {
                   (kHead / "head-kv-pair" / "truth.json").string()));
   EXPECT_EQ(checked.exit_status, 0) << checked.out;
   EXPECT_THAT(checked.out, testing::Not(testing::HasSubstr("Error"))) << checked.out;
+}
+
+// Ranks do not change with a monotone change of the X-ray's intensity, as long as it cuts off nothing.
+TEST(HeadRegistration, RankCorrelationIsBlindToMonotoneChanges) {
+  ISOSHIFT_NEED_REAL_DATA("head/head-kv-pair");
+  Notes notes;
+  StudyRequest request;
+  request.parts = {.study = kHead / "head-kv-pair", .ct = {kHead / "CT"}, .images = {}, .plan = {}};
+  const Study study = load_study(request, notes, {});
+  const RendererPyramid renderers(RendererKind::kCpu, study.ct.hu, {}, kBothBeams);
+  RegistrationOptions by_ranks = preset("paper");
+  by_ranks.stages.front().pixel_fraction = 1.0;
+  by_ranks.stages.front().pixel_mm = 2.0;
+  const auto found_with = [&](auto&& change) {
+    std::vector<XrayImage> xrays = study.xrays;
+    for (XrayImage& xray : xrays) {
+      const auto [least, most] = std::ranges::minmax(xray.values.pixels);
+      for (float& value : xray.values.pixels) value = most * static_cast<float>(change(value / most, least / most));
+    }
+    const auto result = register_views(renderers, xrays, study.planned_room_from_patient, by_ranks);
+    return setup_error_from_poses(study.planned_room_from_patient, result.actual_room_from_patient);
+  };
+  const Eigen::Isometry3d as_is = found_with([](double share, double) { return share; });
+  EXPECT_LT(mean_target_registration_error_mm(as_is, read_setup_error(kHead / "head-kv-pair" / "truth.json"),
+                                              standard_targets_mm()),
+            0.5);
+  for (const double gamma : {0.5, 0.7, 1.5, 2.0})
+    EXPECT_THAT(found_with([&](double share, double) { return std::pow(share, gamma); }), PoseNear(as_is, 0.1, 0.1))
+        << gamma;
+  EXPECT_THAT(found_with([](double share, double least) { return (share - least) / (1.0 - least); }),
+              PoseNear(as_is, 0.1, 0.1));  // a display window as wide as the image
 }
 
 TEST(HeadRenderers, AreWithinHalfAPercentOfTheirOracle) {

@@ -12,22 +12,23 @@ namespace {
 
 constexpr int kPixels = 200;  // of 2 mm on the panel: 1.33 mm at the isocenter
 
-// An open field around a disc of absorber, and 3 % of the intensity outside `inside`.
+// An open field, not quite even, around a disc of absorber, and 3 % of the intensity outside `inside`.
 template <class Inside>
-XrayImage collimated(Inside inside) {
+XrayImage collimated(Inside inside, double unevenness = 1e-5) {
   XrayImage xray;
   xray.view = centered_view(0, kPixels, 2.0);
   xray.values = Image<float>(kPixels, kPixels);
   for (int row = 0; row < kPixels; ++row)
     for (int column = 0; column < kPixels; ++column) {
       const double absorbed = std::hypot(column - 99.5, row - 99.5) < 30 ? std::exp(-2.0) : 1.0;
-      xray.values.at(column, row) = static_cast<float>(1000.0 * absorbed * (inside(column, row) ? 1.0 : 0.03));
+      xray.values.at(column, row) = static_cast<float>(1000.0 * absorbed * (inside(column, row) ? 1.0 : 0.03) *
+                                                       (1.0 - unevenness * (column + 0.3 * row)));
     }
   return xray;
 }
 
 TEST(Preprocess, LineIntegralsAreTheLogarithmOfTheIntensity) {
-  XrayImage xray = collimated([](int, int) { return true; });
+  XrayImage xray = collimated([](int, int) { return true; }, 0.0);
   const Image<float> line_integral = line_integrals(xray);
   EXPECT_NEAR(line_integral.at(5, 5), 0.0, 1e-6);
   EXPECT_NEAR(line_integral.at(100, 100), 2.0, 1e-5);
@@ -75,6 +76,23 @@ TEST(Preprocess, FieldMayBeTurnedByTheCollimator) {
     }
   EXPECT_EQ(wrong, 0);
   EXPECT_GT(in_field, 0.85 * 120 * 90);
+}
+
+// A saturated receptor, or a display window: what was cut off is not known. A few pixels at an extreme are just that.
+TEST(Preprocess, WhatIsCutOffIsLeftOutOfTheField) {
+  XrayImage xray = collimated([](int, int) { return true; });
+  const FixedImage whole = prepare(xray);
+  EXPECT_EQ(whole.field.at(150, 100), 1);
+  EXPECT_EQ(whole.field.at(100, 100), 1);
+  XrayImage saturated = xray, windowed = xray;
+  for (float& value : saturated.values.pixels) value = std::min(value, 500.0F);
+  for (float& value : windowed.values.pixels) value = std::max(value, 500.0F);
+  EXPECT_EQ(prepare(saturated).field.at(150, 100), 0);
+  EXPECT_EQ(prepare(saturated).field.at(100, 100), 1);
+  EXPECT_EQ(prepare(windowed).field.at(150, 100), 1);
+  EXPECT_EQ(prepare(windowed).field.at(100, 100), 0);
+  for (int column = 145; column < 155; ++column) xray.values.at(column, 100) = 2000.0F;
+  EXPECT_EQ(prepare(xray).field.at(150, 100), 1);
 }
 
 TEST(Preprocess, ReducedImagesAverageAndKeepTheField) {

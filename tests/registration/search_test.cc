@@ -55,7 +55,7 @@ TEST(Search, FindsANearPoseWithoutCandidates) {
 }
 
 TEST(Search, CandidatesFindAPoseThatALocalSearchMisses) {
-  const RegistrationScene far = scene_with({5.0, -4.0, 3.0}, {50.0, -40.0, 45.0});
+  const RegistrationScene far = scene_with({5.0, -4.0, 3.0}, {75.0, -60.0, 68.0});
   Stage local = coarse_stage();
   local.similarity = SimilarityKind::kGradientCorrelation;
   Stage wide = local;
