@@ -82,7 +82,6 @@ TEST(HeadRegistration, RankCorrelationIsBlindToMonotoneChanges) {
   const RendererPyramid renderers(RendererKind::kCpu, study.ct.hu, {}, kBothBeams);
   RegistrationOptions by_ranks = preset("paper");
   by_ranks.stages.front().pixel_fraction = 1.0;
-  by_ranks.stages.front().pixel_mm = 2.0;
   const auto found_with = [&](auto&& change) {
     std::vector<XrayImage> xrays = study.xrays;
     for (XrayImage& xray : xrays) {
@@ -96,7 +95,7 @@ TEST(HeadRegistration, RankCorrelationIsBlindToMonotoneChanges) {
   EXPECT_LT(mean_target_registration_error_mm(as_is, read_setup_error(kHead / "head-kv-pair" / "truth.json"),
                                               standard_targets_mm()),
             0.5);
-  for (const double gamma : {0.5, 0.7, 1.5, 2.0})
+  for (const double gamma : {0.5, 2.0})
     EXPECT_THAT(found_with([&](double share, double) { return std::pow(share, gamma); }), PoseNear(as_is, 0.1, 0.1))
         << gamma;
   EXPECT_THAT(found_with([](double share, double least) { return (share - least) / (1.0 - least); }),
