@@ -12,6 +12,7 @@
 #include <random>
 
 #include "bench/scene.h"
+#include "geometry/error.h"
 #include "geometry/target_error.h"
 #include "registration/presets.h"
 
@@ -113,7 +114,15 @@ int check(int patient_count) {
   RegistrationOptions options = preset("setup");
   const auto one = [&](const RendererPyramid& renderers, int ct, int of, const std::string& what,
                        const std::vector<XrayImage>& xrays) {
-    const RegistrationResult result = register_views(renderers, xrays, planned, options);
+    Count& count = counts[what];
+    ++count.all;
+    RegistrationResult result;
+    try {
+      result = register_views(renderers, xrays, planned, options);
+    } catch (const Error& error) {
+      fmt::print("{},{},{},error,,,,,,,,,\"{}\"\n", ct, of, what, error.what());
+      return;
+    }
     const Eigen::Isometry3d found = result.actual_room_from_patient * planned.inverse();
     double ncc = 1.0, disagreeing = 0.0, with_signal = 1e-9, best = 0.0;
     for (const ViewReport& view : result.views) {
@@ -142,8 +151,6 @@ int check(int patient_count) {
                                                  standard_targets_mm()),
                ncc, as_is, best, disagreeing, with_signal, result.seconds, errors, reasons);
     std::fflush(stdout);
-    Count& count = counts[what];
-    ++count.all;
     count.accepted += result.verdict == Verdict::kAccepted ? 1 : 0;
   };
   for (int ct = 0; ct < patient_count; ++ct) {
