@@ -35,6 +35,7 @@ int run_isoshift(int argc, const char* const* argv, Console& console) {
   app.set_version_flag("--version", fmt::format("isoshift {} ({})", kVersion, kCommit));
   app.get_formatter()->column_width(34);
   add_inspect_command(app, console, exit_status);
+  add_check_command(app, console, exit_status);
   add_register_command(app, console, exit_status);
   add_drr_command(app, console, exit_status);
   add_phantom_command(app, console, exit_status);

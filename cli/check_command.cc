@@ -1,0 +1,213 @@
+// isoshift check: what a Spatial Registration object means, what is wrong with it, and how far two lie apart.
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "cli/commands.h"
+#include "geometry/couch_shift.h"
+#include "geometry/error.h"
+#include "io/registration_check.h"
+#include "io/report/setup_report.h"
+#include "io/rt_plan.h"
+
+namespace isoshift {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+struct CheckOptions {
+  std::vector<std::filesystem::path> registrations;
+  std::filesystem::path plan;
+  std::vector<double> isocenter;
+  std::string patient_position;
+  double couch_angle_deg = 0.0;
+  bool as_json = false;
+};
+
+// Where the patient was planned to lie.
+struct PlannedSetup {
+  PatientPosition patient_position = PatientPosition::kHfs;
+  TableAngles table;
+  Eigen::Vector3d isocenter_patient_mm = Eigen::Vector3d::Zero();
+};
+
+std::optional<PlannedSetup> planned_setup(const CheckOptions& options) {
+  std::optional<Eigen::Vector3d> isocenter;
+  std::optional<std::string> position;
+  if (!options.plan.empty()) {
+    for (const RtPlan::Beam& beam : read_rt_plan(options.plan).beams) {
+      if (isocenter && beam.isocenter_patient_mm && *beam.isocenter_patient_mm != *isocenter)
+        throw Error(
+            fmt::format("{}: has several isocenters.\n       Name one: --isocenter X,Y,Z", options.plan.string()));
+      if (beam.isocenter_patient_mm) isocenter = beam.isocenter_patient_mm;
+      if (beam.patient_position) position = beam.patient_position;
+    }
+  }
+  if (!options.isocenter.empty()) isocenter = Eigen::Vector3d(options.isocenter.data());
+  if (!options.patient_position.empty()) position = options.patient_position;
+  if (!isocenter && !position) return std::nullopt;
+  if (!isocenter) throw UsageError("the shift needs the planned isocenter: --plan FILE or --isocenter X,Y,Z");
+  if (!position) throw UsageError("the shift needs the patient position: --plan FILE or --patient-position HFS");
+  const auto known = patient_position_from(*position);
+  if (!known) throw UsageError(fmt::format("the patient position is {}, expected HFS, HFP, FFS, FFP, ...", *position));
+  return PlannedSetup{.patient_position = *known,
+                      .table = {.support_rad = rad_from_deg(options.couch_angle_deg)},
+                      .isocenter_patient_mm = *isocenter};
+}
+
+// The setup error that a matrix from a treatment frame to the planning CT means: the inverse of ct_from_treatment().
+Eigen::Isometry3d setup_error_of(const Eigen::Isometry3d& ct_from_treatment, const PlannedSetup& setup) {
+  const Eigen::Isometry3d planned =
+      planned_room_from_patient(setup.patient_position, setup.table, setup.isocenter_patient_mm);
+  Eigen::Isometry3d room_from_treatment = Eigen::Isometry3d::Identity();
+  room_from_treatment.linear() = planned.linear();
+  return setup_error_from_poses(planned, room_from_treatment * ct_from_treatment.inverse());
+}
+
+std::optional<Eigen::Isometry3d> rigid_of(const CheckedRegistration& checked) {
+  return checked.registered_from_source ? as_rigid(*checked.registered_from_source) : std::nullopt;
+}
+
+Json json_of(const CouchShift& shift) {
+  return {{"lateral_mm", shift.translation_mm.x()},        {"longitudinal_mm", shift.translation_mm.y()},
+          {"vertical_mm", shift.translation_mm.z()},       {"yaw_deg", deg_from_rad(shift.change.z_rad)},
+          {"pitch_deg", deg_from_rad(shift.change.x_rad)}, {"roll_deg", deg_from_rad(shift.change.y_rad)}};
+}
+
+// The shift that a registration means; nothing, and a finding, where its origin lies nowhere near the planned
+// isocenter.
+std::optional<CouchShift> shift_of(CheckedRegistration& checked, const PlannedSetup& setup) {
+  const std::optional<Eigen::Isometry3d> matrix = rigid_of(checked);
+  if (!matrix) return std::nullopt;
+  constexpr double kMaxSetupErrorMm = 200.0;
+  const auto off_isocenter_mm = [&](const Eigen::Isometry3d& pose) {
+    return (pose.translation() - setup.isocenter_patient_mm).norm();
+  };
+  if (off_isocenter_mm(*matrix) < kMaxSetupErrorMm) return couch_shift_for(setup_error_of(*matrix, setup), setup.table);
+  const bool is_inverted = off_isocenter_mm(matrix->inverse()) < kMaxSetupErrorMm;
+  checked.findings.push_back(
+      {.is_error = is_inverted,
+       .text = fmt::format("its origin lies {:.0f} mm from the planned isocenter: {}", off_isocenter_mm(*matrix),
+                           is_inverted ? "the matrix looks inverted, as its inverse begins near it"
+                                       : "it is not the machine's isocenter, and the shift is not known")});
+  return std::nullopt;
+}
+
+// As text, and the same for machines.
+struct Described {
+  std::string text;
+  Json json;
+};
+
+Described describe(const std::filesystem::path& path, const CheckedRegistration& checked,
+                   const std::optional<CouchShift>& shift) {
+  const char* outcome = checked.has_errors() ? "ERRORS" : "passes";
+  Described described{
+      .text = fmt::format("{}: {}\n", path.string(), outcome),
+      .json = {{"file", path.string()}, {"passes", !checked.has_errors()}, {"findings", Json::array()}}};
+  for (const RegistrationFinding& finding : checked.findings) {
+    const char* kind = finding.is_error ? "error" : "note";
+    described.text += fmt::format("  {:<6} {}\n", kind, finding.text);
+    described.json["findings"].push_back({{"kind", kind}, {"text", finding.text}});
+  }
+  if (const auto matrix = rigid_of(checked)) {
+    const Eigen::Vector3d origin = matrix->translation();
+    const double angle_deg = deg_from_rad(Eigen::AngleAxisd(matrix->linear()).angle());
+    described.text +=
+        fmt::format("  takes  {}\n  to     {}\n  with   the origin at ({:.3f}) mm, turned by {:.3f} deg\n",
+                    checked.source_frame_uid, checked.registered_frame_uid, fmt::join(origin, ", "), angle_deg);
+    described.json["origin_mm"] = {origin.x(), origin.y(), origin.z()};
+    described.json["rotation_deg"] = angle_deg;
+  }
+  if (shift) {
+    described.text += fmt::format(
+        "  means  a couch shift of lateral {:+.2f}, longitudinal {:+.2f}, vertical {:+.2f} mm, yaw {:+.2f}, pitch "
+        "{:+.2f}, roll {:+.2f} deg\n",
+        shift->translation_mm.x(), shift->translation_mm.y(), shift->translation_mm.z(),
+        deg_from_rad(shift->change.z_rad), deg_from_rad(shift->change.x_rad), deg_from_rad(shift->change.y_rad));
+    described.json["couch_shift"] = json_of(*shift);
+  }
+  return described;
+}
+
+// Whether the two can be compared is said, too.
+Described compare(const CheckedRegistration& first, const CheckedRegistration& other, bool& is_inverted) {
+  Described described;
+  const auto cannot = [&](const char* why) {
+    described.text = fmt::format("difference: none, {}\n", why);
+    described.json = {{"reason", why}};
+    return described;
+  };
+  const auto a = rigid_of(first), b = rigid_of(other);
+  if (!a || !b) return cannot("as not both hold one rigid matrix");
+  if (first.registered_frame_uid != other.registered_frame_uid)
+    return cannot("as they register different frames (CTs)");
+  const RegistrationDifference difference = difference_between(*a, *b);
+  is_inverted = difference.other_is_inverted;
+  described.text = fmt::format("difference: {:.3f} mm at the isocenter, {:.3f} deg\n", difference.translation_mm,
+                               deg_from_rad(difference.angle_rad));
+  if (first.source_frame_uid != other.source_frame_uid)
+    described.text += "  their treatment frames differ; both are taken to begin at the machine's isocenter\n";
+  if (is_inverted) described.text += "  error  the second one looks inverted: its inverse lies near the first\n";
+  described.json = {{"translation_mm", difference.translation_mm},
+                    {"rotation_deg", deg_from_rad(difference.angle_rad)},
+                    {"looks_inverted", is_inverted}};
+  return described;
+}
+
+int run_check(const CheckOptions& options, Console& console) {
+  const std::optional<PlannedSetup> setup = planned_setup(options);
+  std::vector<CheckedRegistration> checked;
+  Json json = {{"registrations", Json::array()}};
+  std::string text;
+  bool has_errors = false;
+  for (const std::filesystem::path& path : options.registrations) {
+    checked.push_back(check_registration(path));
+    const std::optional<CouchShift> shift = setup ? shift_of(checked.back(), *setup) : std::nullopt;
+    const Described described = describe(path, checked.back(), shift);
+    text += described.text;
+    json["registrations"].push_back(described.json);
+    has_errors = has_errors || checked.back().has_errors();
+  }
+  if (checked.size() == 2) {
+    bool is_inverted = false;
+    const Described described = compare(checked[0], checked[1], is_inverted);
+    text += described.text;
+    json["difference"] = described.json;
+    has_errors = has_errors || is_inverted;
+  }
+  console.out << (options.as_json ? json.dump(2) + "\n" : text);
+  return has_errors ? kExitFailed : kExitAccepted;
+}
+
+}  // namespace
+
+void add_check_command(CLI::App& app, Console& console, int& exit_status) {
+  auto options = std::make_shared<CheckOptions>();
+  CLI::App* command = app.add_subcommand("check", "Check a Spatial Registration object, or compare two");
+  command->footer(
+      "\nExample:\n  isoshift check result/spatial_registration.dcm --plan exported/RTPLAN.dcm\n"
+      "  isoshift check result/spatial_registration.dcm clinic.dcm\n\n"
+      "Works with objects of any program. The exit status is 0 if all is right and 1 if anything is wrong.");
+  command->add_option("REGISTRATION", options->registrations, "One or two Spatial Registration objects")
+      ->required()
+      ->expected(1, 2)
+      ->type_name("FILE...");
+  command->add_option("--plan", options->plan, "RT Plan: its isocenter and patient position tell the shift")
+      ->type_name("FILE");
+  command->add_option("--isocenter", options->isocenter, "Planned isocenter in patient coordinates of the CT, mm")
+      ->expected(3)
+      ->delimiter(',')
+      ->type_name("X,Y,Z");
+  command->add_option("--patient-position", options->patient_position, "How the patient lies")->type_name("HFS|...");
+  command->add_option("--couch-angle", options->couch_angle_deg, "Patient support angle at imaging, IEC 61217")
+      ->type_name("DEG")
+      ->capture_default_str();
+  command->add_flag("--json", options->as_json, "Print JSON");
+  command->callback([options, &console, &exit_status] { exit_status = run_check(*options, console); });
+}
+
+}  // namespace isoshift

@@ -1,0 +1,78 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+
+#include "tests/support/small_study.h"
+
+namespace isoshift {
+namespace {
+
+using testing::HasSubstr;
+
+class CheckCommandTest : public testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    study_ = new SmallStudy;
+    ASSERT_EQ(register_study(*study_).exit_status, 0);
+  }
+  static void TearDownTestSuite() { delete study_; }
+
+  std::string ours() const { return (study_->output() / "spatial_registration.dcm").string(); }
+
+  // A copy of ours with the inverse of its matrix.
+  std::string inverted() const {
+    const std::filesystem::path copy = folder_ / "inverted.dcm";
+    std::filesystem::copy_file(ours(), copy, std::filesystem::copy_options::overwrite_existing);
+    edit(copy, [](DicomItem d) {
+      DicomItem item =
+          d.items(DCM_RegistrationSequence)[1].items(DCM_MatrixRegistrationSequence)[0].items(DCM_MatrixSequence)[0];
+      const std::vector<double> values = item.required_numbers(DCM_FrameOfReferenceTransformationMatrix, 16);
+      const Eigen::Matrix<double, 4, 4, Eigen::RowMajor> inverse =
+          Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(values.data()).inverse();
+      item.put(DCM_FrameOfReferenceTransformationMatrix, std::span(inverse.data(), 16));
+    });
+    return copy.string();
+  }
+
+  static SmallStudy* study_;
+  TemporaryFolder folder_;
+};
+SmallStudy* CheckCommandTest::study_ = nullptr;
+
+TEST_F(CheckCommandTest, OursPassesAndMeansTheShiftOfTheReport) {
+  const CommandOutcome outcome = run_command({"check", ours(), "--plan", study_->plan().string(), "--json"});
+  ASSERT_EQ(outcome.exit_status, 0) << outcome.err;
+  const auto checked = nlohmann::json::parse(outcome.out)["registrations"][0];
+  EXPECT_TRUE(checked["passes"].get<bool>());
+  std::ifstream file(study_->output() / "result.json");
+  const auto reported = nlohmann::json::parse(file)["couch_shift"];
+  for (const char* axis : {"lateral_mm", "longitudinal_mm", "vertical_mm", "yaw_deg", "pitch_deg", "roll_deg"})
+    EXPECT_NEAR(checked["couch_shift"][axis].get<double>(), reported[axis].get<double>(), 1e-6) << axis;
+  EXPECT_THAT(run_command({"check", ours()}).out, HasSubstr("spatial_registration.dcm: passes"));
+}
+
+TEST_F(CheckCommandTest, AnInvertedOneIsFoundByThePlanAndByItsPair) {
+  const CommandOutcome by_plan = run_command({"check", inverted(), "--plan", study_->plan().string()});
+  EXPECT_EQ(by_plan.exit_status, 1);
+  EXPECT_THAT(by_plan.out, HasSubstr("the matrix looks inverted"));
+  const CommandOutcome by_pair = run_command({"check", ours(), inverted()});
+  EXPECT_EQ(by_pair.exit_status, 1);
+  EXPECT_THAT(by_pair.out, HasSubstr("the second one looks inverted"));
+}
+
+TEST_F(CheckCommandTest, TheSameTwiceDoesNotDiffer) {
+  const CommandOutcome outcome = run_command({"check", ours(), ours()});
+  EXPECT_EQ(outcome.exit_status, 0) << outcome.err;
+  EXPECT_THAT(outcome.out, HasSubstr("difference: 0.000 mm at the isocenter, 0.000 deg"));
+}
+
+TEST_F(CheckCommandTest, TheShiftNeedsIsocenterAndPosition) {
+  const CommandOutcome outcome = run_command({"check", ours(), "--isocenter", "1,2,3"});
+  EXPECT_EQ(outcome.exit_status, 2);
+  EXPECT_THAT(outcome.err, HasSubstr("--patient-position"));
+  EXPECT_EQ(run_command({"check", study_->plan().string()}).exit_status, 1);
+}
+
+}  // namespace
+}  // namespace isoshift
