@@ -57,27 +57,40 @@ Json rows_of(const Eigen::Isometry3d& transform) {
 }
 
 // All that the runs depend on: an evaluation is continued only where it is the same.
-Json configuration_of(const RegistrationFlags& flags, const Study& study, const Renderer& renderer,
-                      const Eigen::Isometry3d& truth, const StartProtocol& protocol) {
+Json configuration_of(const RegistrationFlags& flags, const std::string& intensity, const Study& study,
+                      const Renderer& renderer, const Eigen::Isometry3d& truth, const StartProtocol& protocol) {
   Json images = Json::array(), settings = Json::object();
   for (const RtImage& image : study.rt_images) images.push_back(image.sop_instance_uid);
   for (const auto& [name, value] : flags.rendering.settings()) settings[name] = value;
   std::vector<XrayView> views;
-  for (const XrayImage& xray : study.xrays) views.push_back(xray.view);
+  Json cameras = Json::array();
+  for (const XrayImage& xray : study.xrays) {
+    views.push_back(xray.view);
+    const auto& matrix = xray.view.pixel_from_room;
+    cameras.push_back({{"pixel_from_room", std::vector<double>(matrix.data(), matrix.data() + matrix.size())},
+                       {"megavoltage", xray.view.beam == Beam::kMegavoltage}});
+  }
+  const AttenuationModel model = flags.rendering.model();
   return {{"program", fmt::format("isoshift {} ({})", kVersion, kCommit)},
           {"ct_series", study.ct.series_instance_uid},
           {"images", images},
           {"truth", rows_of(truth)},
           {"planned_room_from_patient", rows_of(study.planned_room_from_patient)},
+          {"cameras", cameras},  // columns of each matrix
+          {"intensity", intensity},
+          {"structure_set", study.structures ? study.structures->sop_instance_uid : ""},
           {"renderer", to_string(renderer.kind())},
+          {"device", renderer.device()},
           {"renderer_settings", settings},
           {"attenuation", flags.rendering.attenuation_name()},
           {"threshold_hu", flags.rendering.threshold_hu},
+          {"window_hu", {model.window_low_hu, model.window_high_hu}},
           {"preset", flags.search.preset},
           {"similarity", flags.search.similarity.value_or("")},
           {"optimizer", flags.search.optimizer.value_or("")},
           {"pixel_fraction", flags.search.pixel_fraction.value_or(0.0)},
           {"dof", flags.search.dof},
+          {"check_vertebrae", flags.search.check_vertebrae},
           {"structures", flags.region.structures},
           {"excluded", flags.region.excluded},
           {"around_isocenter_mm", flags.region.around_isocenter_mm.value_or(0.0)},
@@ -208,8 +221,8 @@ int run_evaluate(EvaluateOptions options, Console& console) {
   Notes notes;
   const Study study = load(options.study, notes, console);
   const RegistrationSetup setup(options.flags, study);
-  EvaluationFolder folder(options.output,
-                          configuration_of(options.flags, study, setup.renderers().finest(), truth, protocol));
+  EvaluationFolder folder(options.output, configuration_of(options.flags, options.study.intensity, study,
+                                                           setup.renderers().finest(), truth, protocol));
   {
     ProgressBar bar(console, "Evaluating");
     run_missing(folder, study, setup, truth, start_poses(truth, protocol), jobs, bar);

@@ -30,6 +30,8 @@ std::string line_of(const EvaluatedRun& run) {
   line += run.sigma ? fmt::format("{},", fmt::join(*run.sigma, ",")) : std::string(",,,,,,");
   std::string reasons = run.reasons;
   std::ranges::replace(reasons, '"', '\'');
+  std::ranges::replace_if(
+      reasons, [](unsigned char c) { return c < 0x20; }, ' ');
   line += fmt::format("{},{},{},{},{},\"{}\"\n", run.evaluations, run.seconds, run.seconds_rendering,
                       run.seconds_similarity, to_string(run.verdict), reasons);
   return line;
@@ -87,20 +89,21 @@ Json json_of(const EvaluationSummary& summary) {
 }
 
 // What was left after registration, in 40 bins up to the worst success; failures are counted in the title.
-BarChart error_histogram(const std::vector<EvaluatedRun>& runs, const EvaluationSummary& summary) {
+BarChart error_histogram(const std::vector<EvaluatedRun>& runs, bool by_mrpd, const EvaluationSummary& summary) {
   constexpr int kBins = 40;
+  const auto left_mm = [by_mrpd](const EvaluatedRun& run) { return by_mrpd ? run.mrpd_mm : run.mtre_mm; };
   double largest_mm = 0.05;
   for (const EvaluatedRun& run : runs)
-    if (run.mtre_mm < kSuccessMm) largest_mm = std::max(largest_mm, run.mtre_mm);
+    if (left_mm(run) < kSuccessMm) largest_mm = std::max(largest_mm, left_mm(run));
   const double width_mm = largest_mm / kBins;
-  BarChart chart{.title = fmt::format("mTRE after registration: {} of {} below {} mm", summary.successes, summary.runs,
-                                      kSuccessMm),
-                 .x_label = "mTRE [mm]",
+  BarChart chart{.title = fmt::format("{} after registration: {} of {} below {} mm", by_mrpd ? "mRPD" : "mTRE",
+                                      summary.successes, summary.runs, kSuccessMm),
+                 .x_label = by_mrpd ? "mRPD [mm]" : "mTRE [mm]",
                  .y_label = "registrations"};
   for (int bin = 0; bin < kBins; ++bin) chart.bars.push_back({.from = bin * width_mm, .to = (bin + 1) * width_mm});
   for (const EvaluatedRun& run : runs)
-    if (run.mtre_mm < kSuccessMm)
-      chart.bars[std::min<std::size_t>(kBins - 1, static_cast<std::size_t>(run.mtre_mm / width_mm))].height += 1.0;
+    if (left_mm(run) < kSuccessMm)
+      chart.bars[std::min<std::size_t>(kBins - 1, static_cast<std::size_t>(left_mm(run) / width_mm))].height += 1.0;
   return chart;
 }
 
@@ -199,7 +202,7 @@ void EvaluationFolder::write_summary() const {
   const EvaluationSummary summary = summarized(runs_, judged_by_mrpd());
   replace_text(path_ / "summary.json", json_of(summary).dump(2) + "\n");
   replace_text(path_ / "success.svg", bar_chart_svg(success_chart(runs_, judged_by_mrpd(), summary)));
-  replace_text(path_ / "errors.svg", bar_chart_svg(error_histogram(runs_, summary)));
+  replace_text(path_ / "errors.svg", bar_chart_svg(error_histogram(runs_, judged_by_mrpd(), summary)));
 }
 
 std::string evaluation_table(const std::vector<std::pair<std::string, EvaluationSummary>>& rows) {

@@ -20,7 +20,6 @@ class EvaluationFolder {
   // Opens one to read. Throws Error if there is none.
   explicit EvaluationFolder(std::filesystem::path path);
 
-  const nlohmann::ordered_json& configuration() const { return configuration_; }
   const std::vector<EvaluatedRun>& runs() const { return runs_; }  // ended so far, in the order they ended
   bool has(int number) const;
 

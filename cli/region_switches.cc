@@ -65,6 +65,16 @@ std::map<std::string, PixelRectangle> RegionSwitches::rectangles_of(const Study&
   return by_label;
 }
 
+std::vector<std::string> RegionSwitches::in_words() const {
+  std::vector<std::string> words;
+  for (const std::string& name : structures)
+    words.push_back(fmt::format("structure {}, margin {} mm", name, margin_mm));
+  if (around_isocenter_mm) words.push_back(fmt::format("within {} mm of the isocenter", *around_isocenter_mm));
+  for (const std::string& name : excluded) words.push_back(fmt::format("without {}, margin {} mm", name, margin_mm));
+  for (const std::string& rectangle : rectangles) words.push_back(fmt::format("rectangle {}", rectangle));
+  return words;
+}
+
 RegionOfStudy region_of(const RegionSwitches& switches, const Study& study, double threshold_hu) {
   if (switches.around_isocenter_mm && !(*switches.around_isocenter_mm > 0.0))
     throw UsageError(fmt::format("--around-isocenter {}: expected more than 0 mm", *switches.around_isocenter_mm));

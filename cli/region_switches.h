@@ -20,6 +20,9 @@ struct RegionSwitches {
 
   // The rectangles by label. Throws UsageError for one that cannot be read or whose label no X-ray has.
   std::map<std::string, PixelRectangle> rectangles_of(const Study& study) const;
+
+  // What was chosen, in words; empty where everything is compared.
+  std::vector<std::string> in_words() const;
 };
 void add_region_switches(CLI::App& command, RegionSwitches& switches);
 
@@ -28,7 +31,7 @@ struct RegionOfStudy {
   Volume<float> rendered_ct;  // without what lies outside the volume of interest and without excluded structures
   ProjectedRegion projected;
 };
-// Throws UsageError for switches that contradict each other or the study, and Error for a structure it lacks.
+// Throws UsageError for a radius that is not positive, and Error for a structure the study lacks.
 RegionOfStudy region_of(const RegionSwitches& switches, const Study& study, double threshold_hu);
 
 }  // namespace isoshift

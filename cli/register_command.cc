@@ -111,6 +111,7 @@ SetupReport make_report(const RegisterOptions& options, const Study& study, cons
     report.alternatives.push_back(
         {.description = alternative.description, .similarity = alternative.similarity, .as_is = alternative.as_is});
   report.preset = registration.preset;
+  report.region = options.flags.region.in_words();
   report.seed = registration.seed;
   report.attenuation = options.flags.rendering.attenuation_name();
   const AttenuationModel model = options.flags.rendering.model();

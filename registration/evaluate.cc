@@ -182,7 +182,7 @@ EvaluationSummary summarized(std::span<const EvaluatedRun> runs, bool by_mrpd) {
   summary.mean_mpd_mm = mean_of(values_of(std::span<const EvaluatedRun>(found), &EvaluatedRun::mpd_mm));
   summary.mean_mrpd_mm = mean_of(values_of(std::span<const EvaluatedRun>(found), &EvaluatedRun::mrpd_mm));
   for (const SuccessBin& bin : success_bins(runs, by_mrpd)) {
-    if (bin.successes < 0.95 * bin.runs) break;
+    if (bin.start_mm != summary.capture_range_mm || bin.successes < 0.95 * bin.runs) break;
     summary.capture_range_mm = bin.start_mm + 1;
   }
   summary.rotation_share_of_failures = mean_of(failed_rotation_share);

@@ -94,7 +94,9 @@ OptimizerResult maximize_one(const std::function<std::vector<double>(const Point
       &call);
   result.best = options.start;
   try {
-    result.termination = reason(search.optimize(result.best, result.value));
+    const nlopt::result how = search.optimize(result.best, result.value);
+    result.termination = reason(how);
+    result.reached_limit = how == nlopt::MAXEVAL_REACHED;
   } catch (const nlopt::forced_stop&) {
     std::rethrow_exception(call.failure);
   } catch (const nlopt::roundoff_limited&) {
@@ -191,17 +193,22 @@ std::optional<OptimizerKind> optimizer_kind_from(std::string_view name) {
 std::vector<OptimizerResult> maximize(const BatchObjective& objective, std::span<const OptimizerOptions> searches) {
   if (searches.size() == 1) return {maximize_one(objective, searches.front())};
   std::vector<OptimizerResult> results(searches.size());
+  std::vector<std::exception_ptr> failures(searches.size());
   LockStep lock_step(searches.size());
   std::vector<std::jthread> threads;  // joined before what they refer to ends
   for (std::size_t n = 0; n < searches.size(); ++n)
     threads.emplace_back([&, n] {
       try {
         results[n] = maximize_one([&](const Points& points) { return lock_step.ask(n, points); }, searches[n]);
-      } catch (...) {  // the objective has failed: serve() throws it
+      } catch (...) {
+        failures[n] = std::current_exception();
       }
       lock_step.leave();
     });
-  lock_step.serve(objective);
+  lock_step.serve(objective);  // throws what the objective throws
+  threads.clear();
+  for (const std::exception_ptr& failure : failures)
+    if (failure) std::rethrow_exception(failure);
   return results;
 }
 

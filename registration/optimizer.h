@@ -37,6 +37,7 @@ struct OptimizerResult {
   double value = 0.0;
   int evaluations = 0;
   std::string termination = "not run";
+  bool reached_limit = false;  // of the evaluations, before it converged
 };
 
 // One value per point.

@@ -9,8 +9,7 @@
 namespace isoshift {
 namespace {
 
-// Stochastic rank correlation captures from far and needs the fewest evaluations; gradient correlation ends precisely
-// (docs/evaluation.md).
+// Stochastic rank correlation captures from far; gradient correlation ends precisely (docs/evaluation.md).
 std::vector<Stage> setup_stages() {
   return {{.name = "coarse",
            .similarity = SimilarityKind::kStochasticRankCorrelation,

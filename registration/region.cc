@@ -98,7 +98,7 @@ ProjectedRegion::ProjectedRegion(const RegionOfInterest& region) {
   for (const CutEnds& ends : region.cut_ends) ends_.push_back({renderer_of(ends.columns), ends.along_patient});
 }
 
-void ProjectedRegion::restrict(FixedImage& image, const Eigen::Isometry3d& room_from_patient, double slack_mm) const {
+bool ProjectedRegion::restrict(FixedImage& image, const Eigen::Isometry3d& room_from_patient, double slack_mm) const {
   const int slack_px = static_cast<int>(std::lround(slack_mm * pixels_per_mm(image.view)));
   const auto only_where = [&](Renderer& of_mask, std::uint8_t value) {
     const Image<std::uint8_t> mask = shadow(of_mask, image.view, room_from_patient, slack_px);
@@ -113,15 +113,19 @@ void ProjectedRegion::restrict(FixedImage& image, const Eigen::Isometry3d& room_
   if (inside_) image.field = only_where(*inside_, 1);
   const auto leave_out = [&](Renderer& outside, double min_left) {
     Image<std::uint8_t> field = only_where(outside, 0);
-    if (count(field) >= min_left * count(image.field)) image.field = std::move(field);
+    if (count(field) < min_left * count(image.field)) return false;
+    image.field = std::move(field);
+    return true;
   };
   constexpr double kMinLeft = 0.1, kMinLeftAlong = 0.5;
-  for (const auto& outside : outside_) leave_out(*outside, kMinLeft);
+  bool all_left_out = true;
+  for (const auto& outside : outside_) all_left_out = leave_out(*outside, kMinLeft) && all_left_out;
   const Eigen::Vector3d looking = room_from_patient.linear().transpose() * image.view.central_direction_room();
   for (const Ends& ends : ends_) {
     const bool is_along = std::abs(looking.dot(ends.along_patient)) > 0.5 * std::numbers::sqrt2;
     leave_out(*ends.renderer, is_along ? kMinLeftAlong : kMinLeft);
   }
+  return all_left_out;
 }
 
 }  // namespace isoshift

@@ -45,11 +45,15 @@ void report_views(const RendererPyramid& renderers, const FixedViews& views, con
   const std::array poses = {start, found};
   const auto similarity = gradient_correlation.per_view(poses);
   std::vector<ViewConsistency> consistency = regional_consistency(renderers, views, found);
-  for (std::size_t view = 0; view < consistency.size(); ++view)
-    result.views.push_back({.label = views.images[view].label,
+  for (std::size_t view = 0; view < consistency.size(); ++view) {
+    FixedImage image =
+        reduced(views.images[view], std::max(1, static_cast<int>(pixels_per_mm(views.images[view].view))));
+    result.views.push_back({.label = image.label,
                             .similarity_start = similarity[0][view],
                             .similarity_final = similarity[1][view],
+                            .has_all_left_out = views.region.restrict(image, found, 0.0),
                             .consistency = std::move(consistency[view])});
+  }
 }
 
 }  // namespace

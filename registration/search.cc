@@ -15,13 +15,17 @@ namespace {
 
 using Parameters = std::vector<double>;
 
+constexpr double kMinFieldPixels = 900.0;  // of a view, if it has them
+
+double field_pixels(const FixedImage& image) {
+  return static_cast<double>(std::ranges::count_if(image.field.pixels, std::identity()));
+}
+
 // The largest reduction that keeps pixels at the isocenter within the stage's size, and enough of them in a small
 // field.
 int reduction(const FixedImage& image, double pixel_mm) {
-  constexpr double kMinFieldPixels = 900.0;
-  const auto field_pixels = static_cast<double>(std::ranges::count_if(image.field.pixels, std::identity()));
-  return std::max(
-      1, static_cast<int>(std::min(pixel_mm * pixels_per_mm(image.view), std::sqrt(field_pixels / kMinFieldPixels))));
+  return std::max(1, static_cast<int>(std::min(pixel_mm * pixels_per_mm(image.view),
+                                               std::sqrt(field_pixels(image) / kMinFieldPixels))));
 }
 
 double bound_of(std::size_t axis, const SearchOptions& options) {
@@ -93,8 +97,18 @@ std::vector<FixedImage> FixedViews::reduced_to(double pixel_mm, const Eigen::Iso
                                                double slack_mm) const {
   std::vector<FixedImage> level;
   for (const FixedImage& image : images) {
-    level.push_back(reduced(image, reduction(image, pixel_mm)));
-    region.restrict(level.back(), room_from_patient, slack_mm);
+    int factor = reduction(image, pixel_mm);
+    for (;;) {
+      FixedImage candidate = reduced(image, factor);
+      region.restrict(candidate, room_from_patient, slack_mm);
+      const double left = field_pixels(candidate);
+      if (left >= kMinFieldPixels || factor == 1 || field_pixels(image) < kMinFieldPixels) {
+        level.push_back(std::move(candidate));
+        break;
+      }
+      // The region left few: as many times finer as makes up for that.
+      factor = std::clamp(static_cast<int>(factor * std::sqrt(left / kMinFieldPixels)), 1, factor - 1);
+    }
   }
   return level;
 }
@@ -138,7 +152,7 @@ SearchResult search(const RendererPyramid& renderers, const FixedViews& views,
     }
     report.value = found.front().value;
     report.termination = found.front().termination;
-    report.reached_limit = found.front().evaluations >= stage.max_evaluations;
+    report.reached_limit = found.front().reached_limit;
     if (stage.keep == 1) report_spread(found, report);  // several that are kept may differ
     report.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
     result.stages.push_back(report);

@@ -25,7 +25,7 @@ struct Stage {
   std::string name;
   SimilarityKind similarity = SimilarityKind::kNcc;
   OptimizerKind optimizer = OptimizerKind::kBobyqa;
-  double pixel_mm = 4.0;        // the stage's pixels, at the isocenter: the image is reduced to at least this size
+  double pixel_mm = 4.0;        // the stage's pixels, at the isocenter: the image is reduced to at most this size
   double voxel_mm = 0.0;        // the CT is reduced to voxels up to this edge; 0: not at all
   double pixel_fraction = 1.0;  // share of the field's pixels compared
   int min_pixels = 1000;        // of every view, if the field has them

@@ -158,6 +158,7 @@ std::string json_report(const SetupReport& report) {
                         {"plan", or_null(report.plan_uid)},
                         {"images", images},
                         {"spatial_registration", or_null(report.spatial_registration_uid)}};
+  json["region"] = report.region;
   json["overrides"] = report.overrides;
   json["warnings"] = report.warnings;
   json["left_aside"] = report.left_aside;

@@ -72,6 +72,7 @@ struct SetupReport {
   std::vector<Stage> stages;
   std::vector<Alternative> alternatives;
   std::string preset = "setup";
+  std::vector<std::string> region;  // what was chosen to be compared, in words; empty: everything
   std::uint64_t seed = 1;
   std::string attenuation;
   double threshold_hu = 0.0;

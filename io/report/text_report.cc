@@ -120,8 +120,10 @@ std::string text_report(const SetupReport& report) {
       "  imaging; angles are changes of the table's read-outs. Shown to 0.1; result.json has full precision.\n\n"
       "Renderer     {} on {}{}; attenuation {}, threshold {:.0f} HU; seed {}\n"
       "Search       preset {}\n"
+      "Region       {}\n"
       "Time         {:.1f} s, of which registration {:.1f} s\n",
       report.renderer, report.device, settings, report.attenuation, report.threshold_hu, report.seed, report.preset,
+      report.region.empty() ? "everything" : plain(fmt::format("{}", fmt::join(report.region, "; "))),
       report.seconds_total, report.seconds_register);
   return text;
 }

@@ -180,7 +180,8 @@ FixedImage reduced(const FixedImage& image, int factor) {
   FixedImage result{.view = image.view.downscaled(factor),
                     .line_integral = Image<float>(image.view.columns / factor, image.view.rows / factor),
                     .field = Image<std::uint8_t>(image.view.columns / factor, image.view.rows / factor),
-                    .label = image.label};
+                    .label = image.label,
+                    .reduced_by = image.reduced_by * factor};
   for (int row = 0; row < result.field.rows; ++row)
     for (int column = 0; column < result.field.columns; ++column) {
       double sum = 0.0;

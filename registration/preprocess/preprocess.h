@@ -28,7 +28,8 @@ struct FixedImage {
   XrayView view;
   Image<float> line_integral;
   Image<std::uint8_t> field;
-  std::string label;  // of the X-ray; may be empty
+  std::string label;   // of the X-ray; may be empty
+  int reduced_by = 1;  // pixels of the X-ray along the edge of a pixel
 };
 
 // How view number `index` is called in what a person reads: by its label, else "view 1" and so on.

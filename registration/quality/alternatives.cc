@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 
+#include "geometry/error.h"
 #include "geometry/rotation.h"
 #include "registration/pose_parameters.h"
 
@@ -125,7 +126,12 @@ std::vector<Alternative> compare_alternatives(const RendererPyramid& renderers, 
       SearchOptions from_there = of_level;
       if (level > 0)
         from_there.parameters = level == 1 && attempt == &as_is ? found.parameters : attempt->found.back().parameters;
-      attempt->found.push_back(search(renderers, attempt->views, start_room_from_patient, from_there));
+      // Mirrored or turned, the field may miss the region: that is no alternative.
+      try {
+        attempt->found.push_back(search(renderers, attempt->views, start_room_from_patient, from_there));
+      } catch (const Error&) {
+        if (attempt == &as_is) throw;
+      }
     });
     searched.clear();
     for (Attempt& attempt : attempts)
@@ -135,6 +141,7 @@ std::vector<Alternative> compare_alternatives(const RendererPyramid& renderers, 
 
   std::vector<Alternative> alternatives;
   for (const Attempt& attempt : std::span(attempts).subspan(1)) {
+    if (attempt.found.empty()) continue;
     const SearchResult& as_other = attempt.found.back();
     const SearchResult& as_they_are = as_is.found[attempt.found.size() - 1];
     const PoseDistance distance = distance_between(as_they_are.parameters, as_other.parameters);

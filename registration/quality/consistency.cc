@@ -30,7 +30,7 @@ std::vector<ViewConsistency> regional_consistency(const RendererPyramid& rendere
   const std::vector<FixedImage> levels = fixed.reduced_to(kPixelMm, room_from_patient, 0.0);
   for (std::size_t n = 0; n < levels.size(); ++n) {
     const FixedImage& level = levels[n];
-    const double factor = static_cast<double>(fixed.images[n].view.columns) / level.view.columns;
+    const double factor = level.reduced_by;
     const double px_per_mm = pixels_per_mm(level.view);
     const RenderResult rendered = renderers.with_voxels_up_to(kPixelMm).render(
         std::span(&level.view, 1), std::span(&room_from_patient, 1), PixelSet::all());
@@ -45,7 +45,7 @@ std::vector<ViewConsistency> regional_consistency(const RendererPyramid& rendere
         const PixelSquare square{.column = column, .row = row, .edge = edge};
         if (share_inside(level.field, square) < kMinField) continue;
         const SquareMatch match = best_match(xray, square, drr, reach);
-        Tile tile{.center_px = factor * Eigen::Vector2d(column + 0.5 * edge, row + 0.5 * edge),
+        Tile tile{.center_px = (factor * Eigen::Vector2d(column + 0.5 * edge, row + 0.5 * edge)).array() - 0.5,
                   .width_px = factor * edge,
                   .displacement_mm = match.displacement_px / px_per_mm,
                   .correlation = match.correlation_here,

@@ -3,8 +3,9 @@
 //
 // Maximizing gradient correlation is least squares on gradients of unit norm: 2 (1 - GC) = |x - d(p)|^2. At the
 // optimum, with J the derivatives of d by the pose and r = x - d, the covariance is the sandwich H^-1 M H^-1 of
-// curvature H = J'J and scatter M = sum over tiles of s s', s = J'r of a tile (White 1980; Liang and Zeger 1986):
-// residuals may have any size and be alike within a tile, as those of anatomy, noise and scatter are.
+// curvature H = sum rho J'J (rho the correlation) and scatter M = sum over tiles of s s', s = J'r of a tile (White
+// 1980; Liang and Zeger 1986): residuals may have any size and be alike within a tile, as those of anatomy, noise and
+// scatter are.
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
