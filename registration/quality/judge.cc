@@ -77,8 +77,6 @@ void judge(std::span<const double> parameters, const RegistrationOptions& option
     if (view.left_out && (view.left_out->distance_mm > kMaxSpreadMm || view.left_out->angle_rad > kMaxSpreadRad))
       review(fmt::format("without {} the pose lies {:.1f} mm and {:.1f} degrees away", name, view.left_out->distance_mm,
                          deg_from_rad(view.left_out->angle_rad)));
-    if (view.similarity_final < kMinViewSimilarity)
-      review(fmt::format("{} hardly matches (gradient correlation {:.3f})", name, view.similarity_final));
     if (!view.has_all_left_out)
       review(fmt::format("what is excluded covers nearly all that {} shows, and was compared nevertheless", name));
     const int with_signal = view.consistency.with_signal(), disagreeing = view.consistency.disagreeing();
@@ -88,9 +86,15 @@ void judge(std::span<const double> parameters, const RegistrationOptions& option
     if (with_signal < 2)
       review(fmt::format("too little of {} is compared to tell whether anatomy moved against the rest", name));
   }
-  if (!(mean >= kMinSimilarity))
+  if (!(mean >= kMinSimilarity)) {
     demote(mean >= kRejectedSimilarity ? Verdict::kReview : Verdict::kRejected,
            fmt::format("the final gradient correlation {:.3f} is below {:.2f}", mean, kMinSimilarity));
+  } else {
+    for (std::size_t n = 0; n < result.views.size(); ++n)
+      if (const ViewReport& view = result.views[n]; !(view.similarity_final >= kMinViewSimilarity))
+        review(fmt::format("{} hardly matches (gradient correlation {:.3f})", name_of_view(view.label, n),
+                           view.similarity_final));
+  }
 
   if (!result.uncertainty) {
     review("the images do not determine the pose");

@@ -67,6 +67,22 @@ TEST(Quality, AcceptsWhatImprovedAndMatches) {
   expect_accepted([](RegistrationResult&) {});
 }
 
+TEST(Quality, EveryViewMustMatch) {
+  expect_review([](RegistrationResult& r) { r.views[1].similarity_start = 0.1, r.views[1].similarity_final = 0.39; },
+                "view 2 hardly matches (gradient correlation 0.390)");
+}
+
+TEST(Quality, TooLittleToCheckForMovedAnatomyNeedsReview) {
+  for (const ViewConsistency& few : {parts(0, 0), parts(1, 0, 12), parts(0, 1, 3)})
+    expect_review([&](RegistrationResult& r) { r.views[0].consistency = few; }, "too little of view 1 is compared");
+  expect_accepted([](RegistrationResult& r) { r.views[0].consistency = parts(2, 0); });
+}
+
+TEST(Quality, AnExclusionThatCannotBeKeptNeedsReview) {
+  expect_review([](RegistrationResult& r) { r.views[0].has_all_left_out = false; },
+                "what is excluded covers nearly all that view 1 shows");
+}
+
 TEST(Quality, AParameterAtItsBoundNeedsReview) {
   constexpr std::array kNames = {"x translation",    "y translation",    "z translation",
                                  "rotation about x", "rotation about y", "rotation about z"};
@@ -175,7 +191,7 @@ TEST(Quality, PartsThatDisagreeNeedReview) {
                   fmt::format("10 of 20 parts of view {} match elsewhere", view + 1));
   // One alone may be anything, and parts without a signal say nothing.
   expect_accepted([](RegistrationResult& result) { result.views[0].consistency = parts(1, 1); });
-  expect_accepted([](RegistrationResult& result) { result.views[0].consistency = parts(0, 0, 30); });
+  expect_accepted([](RegistrationResult& result) { result.views[0].consistency = parts(2, 0, 30); });
 }
 
 TEST(Quality, AnAlternativeThatIsBetterNeedsReviewWhereverItLies) {

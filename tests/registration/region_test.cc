@@ -265,6 +265,23 @@ TEST(Region, ASpineOfWhichTheCtHoldsAPartIsRegistered) {
               testing::Not(PoseNear(scene.truth, 0.7, 0.5)));
 }
 
+// A sphere of 18 mm: pixels are kept small enough that something is left to compare.
+TEST(Region, ASmallVolumeIsRegistered) {
+  SceneOptions options{.shapes = asymmetric_body(), .pixels = 256};
+  options.placement.translation_mm = Vector3d(2.0, -1.5, 1.0);
+  options.placement.rotation_deg = Vector3d(0.5, -0.5, 0.4);
+  const RegistrationScene scene = make_scene(options);
+  const ProjectedRegion region(
+      {.volume = mask_of({.center_mm = Vector3d(10.0, 20.0, -20.0), .radius_mm = 18.0}, Vector3d::Ones()),
+       .left_out = {},
+       .cut_ends = {}});
+  RegistrationOptions registration = preset("setup");
+  registration.region = &region;
+  const auto result = register_views(*scene.renderers, scene.xrays, scene.planned, registration);
+  EXPECT_THAT(setup_error_from_poses(scene.planned, result.actual_room_from_patient), PoseNear(scene.truth, 1.0, 2.0));
+  EXPECT_NE(result.verdict, Verdict::kAccepted);  // too little to tell whether anatomy moved
+}
+
 // In front of a belly that the CT cuts, what lies beyond covers the whole anterior view and cannot be left out there;
 // what lies above and below the CT is left out nevertheless.
 TEST(Region, APatientThickerThanTheCtIsRegistered) {
