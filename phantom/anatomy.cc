@@ -110,26 +110,28 @@ std::vector<Shape> spine_phantom(const Vector3d& center_patient_mm, std::uint64_
   body.add(Kind::kEllipsoid, {body.vary(60, 0.2), -60, 10}, {40, 22, 30}, {.water = -0.95, .bone = 0});  // bowel gas
   body.add(Kind::kEllipsoid, {body.vary(-45, 0.2), -75, -35}, {25, 14, 40}, {.water = -0.9, .bone = 0});
   constexpr int kVertebrae = 5, kMiddle = 2;
+  const double pitch = body.vary(36, 0.1), lordosis = body.vary(6, 0.8), scoliosis = body.vary(3, 2.0);
+  const double process = body.vary(36, 0.12), pedicle = body.vary(14, 0.12), facet = body.vary(17, 0.12);
   for (int n = 0; n < kVertebrae; ++n) {
-    const double z = 36.0 * (n - kMiddle);
-    const double bend = 5.0 * std::cos(0.6 * n);  // lordosis
-    const Vector3d at(body.vary(1.0, 1.0), bend, z);
+    const double z = pitch * (n - kMiddle);
+    const Vector3d at(body.vary(1.0, 1.0) + scoliosis * std::sin(0.7 * n), lordosis * std::cos(0.6 * n), z);
     const Vector3d half(body.vary(23, 0.06), body.vary(17, 0.06), body.vary(13, 0.06));
     body.add(Kind::kCylinder, at, half, bone_in_tissue(0.25));
     body.add(Kind::kCylinder, at + Vector3d(0, 0, half.z()), {half.x(), half.y(), 1.2}, bone_in_tissue(0.5));
     body.add(Kind::kCylinder, at - Vector3d(0, 0, half.z()), {half.x(), half.y(), 1.2}, bone_in_tissue(0.5));
     body.add_grains(14, at, 0.85 * half, false);
     for (const double side : {-1.0, 1.0}) {
-      body.add(Kind::kBox, at + Vector3d(side * 14, 22, 3), {4, 10, 7}, bone_in_tissue(0.6));         // pedicle
-      body.add(Kind::kEllipsoid, at + Vector3d(side * 17, 33, -8), {8, 7, 12}, bone_in_tissue(0.5));  // facet
-      body.add(Kind::kBox, at + Vector3d(side * 36, 28, 2), {16, 4, 5}, bone_in_tissue(0.4), tilt(0, side * 12));
+      body.add(Kind::kBox, at + Vector3d(side * pedicle, 22, 3), {4, 10, 7}, bone_in_tissue(0.6));       // pedicle
+      body.add(Kind::kEllipsoid, at + Vector3d(side * facet, 33, -8), {8, 7, 12}, bone_in_tissue(0.5));  // facet
+      body.add(Kind::kBox, at + Vector3d(side * process, 28, 2), {16, 4, 5}, bone_in_tissue(0.4), tilt(0, side * 12));
     }
     body.add(Kind::kBox, at + Vector3d(0, 50, -6), {3.5, 15, 10}, bone_in_tissue(0.5), tilt(20));  // spinous
   }
   for (const double side : {-1.0, 1.0}) {  // lowest ribs
     body.add(Kind::kCylinder, {side * body.vary(85, 0.1), 22, 62}, {4, 6, 52}, bone_in_tissue(0.5),
              tilt(0) * Eigen::AngleAxisd(side * 1.2, Vector3d::UnitY()).toRotationMatrix());
-    body.add(Kind::kEllipsoid, {side * 95, 10, -92}, {48, 14, 34}, bone_in_tissue(0.3));  // iliac wing
+    body.add(Kind::kEllipsoid, {side * body.vary(95, 0.06), 10, body.vary(-92, 0.06)}, {48, 14, 34},
+             bone_in_tissue(0.3));  // iliac wing
   }
   return body.take();
 }

@@ -115,11 +115,15 @@ std::vector<Alternative> compare_alternatives(const RendererPyramid& renderers, 
   const std::array<std::vector<Stage>, kClose.size() + 1> levels = {short_stages(), std::vector{closer},
                                                                     std::vector{options.stages.back()}};
 
+  // Where the images as they are hardly match, the verdict does not depend on a closer look.
+  constexpr double kHardlyMatches = 0.5;
+  const std::size_t levels_searched = found.stages.back().value < kHardlyMatches ? 1 : levels.size();
+
   std::vector<Attempt> attempts = attempts_with(views);
   const Attempt& as_is = attempts.front();
   std::vector<Attempt*> searched;
   for (Attempt& attempt : attempts) searched.push_back(&attempt);
-  for (std::size_t level = 0; level < levels.size() && !searched.empty(); ++level) {
+  for (std::size_t level = 0; level < levels_searched && !searched.empty(); ++level) {
     SearchOptions of_level = options;
     of_level.stages = levels[level];
     for_each_on(renderers, searched, [&](Attempt* attempt) {
