@@ -262,9 +262,12 @@ CarmGeometry carm_geometry(const RtImage& image, Notes& notes) {
   geometry.receptor_angle_rad = rad_from_deg(image.receptor_angle_deg.value_or(0.0));
 
   geometry.normal_plane = image.plane == "NORMAL";
-  if (!geometry.normal_plane)
-    throw Error(fmt::format("{}: {} is {}; only NORMAL is read by this version", where, described(DCM_RTImagePlane),
-                            *image.plane));
+  if (!geometry.normal_plane && image.plane != "NON_NORMAL")
+    throw Error(
+        fmt::format("{}: {} is {}, expected NORMAL or NON_NORMAL", where, described(DCM_RTImagePlane), *image.plane));
+  if (!geometry.normal_plane && !image.orientation)
+    throw Error(fmt::format("{}: {} is missing, which {} NON_NORMAL needs", where, described(DCM_RTImageOrientation),
+                            described(DCM_RTImagePlane)));
   if (image.orientation) {
     geometry.row_direction = Eigen::Vector3d(image.orientation->data());
     geometry.column_direction = Eigen::Vector3d(image.orientation->data() + 3);
@@ -272,11 +275,11 @@ CarmGeometry carm_geometry(const RtImage& image, Notes& notes) {
                                 std::abs(geometry.column_direction.norm() - 1.0) < 1e-4 &&
                                 std::abs(geometry.row_direction.dot(geometry.column_direction)) < 1e-4;
     const bool is_flat = std::abs(geometry.row_direction.z()) < 1e-4 && std::abs(geometry.column_direction.z()) < 1e-4;
-    if (!is_orthonormal || !is_flat)
-      throw Error(
-          fmt::format("{}: {} is not a pair of perpendicular unit vectors in the receptor's plane, as {} NORMAL "
-                      "needs",
-                      where, described(DCM_RTImageOrientation), described(DCM_RTImagePlane)));
+    if (!is_orthonormal || (geometry.normal_plane && !is_flat))
+      throw Error(fmt::format("{}: {} is not a pair of perpendicular unit vectors{}, as {} {} needs", where,
+                              described(DCM_RTImageOrientation),
+                              geometry.normal_plane ? " in the receptor's plane" : "", described(DCM_RTImagePlane),
+                              *image.plane));
   }
   geometry.row_spacing_mm = image.pixel_spacing_mm->x();
   geometry.column_spacing_mm = image.pixel_spacing_mm->y();

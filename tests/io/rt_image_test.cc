@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "geometry/error.h"
+#include "geometry/rotation.h"
 #include "tests/support/pose_near.h"
 #include "tests/support/small_study.h"
 
@@ -189,6 +190,28 @@ TEST_F(RtImageTest, AReceptorTranslationMovesTheCentralPixel) {
   // The panel moved by (+20, -30) mm: the isocenter's shadow moves the other way on it, rows counting downward.
   EXPECT_THAT(view.project(Eigen::Vector3d::Zero()).value(),
               VectorNear(Eigen::Vector2d(47.5 - 20 / pixel_mm, 47.5 - 30 / pixel_mm), 1e-6));
+}
+
+// What a tilted plane means: XrayView.HandlesTheNonNormalPlaneOfDicomMd24.
+TEST_F(RtImageTest, ATiltedPlaneIsReadWithItsOrientation) {
+  const std::vector<double> tilted = {std::cos(rad_from_deg(5)), 0, std::sin(rad_from_deg(5)), 0, -1, 0};
+  const RtImage image = changed([&](DicomItem d) {
+    d.put(DCM_RTImagePlane, "NON_NORMAL");
+    d.put(DCM_RTImageOrientation, tilted);
+  });
+  const CarmGeometry geometry = carm_geometry(image, notes_);
+  EXPECT_FALSE(geometry.normal_plane);
+  EXPECT_THAT(geometry.row_direction, VectorNear(Eigen::Vector3d(tilted.data()), 1e-12));
+  // The plane is turned about the receptor's origin, which the isocenter's ray meets.
+  EXPECT_THAT(make_xray_view(geometry, Beam::kKilovoltage).project(Eigen::Vector3d::Zero()).value(),
+              VectorNear(Eigen::Vector2d(47.5, 47.5), 1e-6));
+  RtImage without = image;
+  without.orientation.reset();
+  EXPECT_THAT(error_of_geometry(without), HasSubstr("RTImageOrientation (3002,0010) is missing"));
+  RtImage normal = image;
+  normal.plane = "NORMAL";
+  EXPECT_THAT(error_of_geometry(normal),
+              HasSubstr("in the receptor's plane, as RTImagePlane (3002,000C) NORMAL needs"));
 }
 
 }  // namespace
