@@ -96,50 +96,41 @@ std::optional<CouchShift> shift_of(CheckedRegistration& checked, const PlannedSe
   return std::nullopt;
 }
 
-// As text, and the same for machines.
-struct Described {
-  std::string text;
-  Json json;
-};
-
-Described describe(const std::filesystem::path& path, const CheckedRegistration& checked,
-                   const std::optional<CouchShift>& shift) {
+// For machines; the same for people is added to `text`.
+Json describe(const std::filesystem::path& path, const CheckedRegistration& checked,
+              const std::optional<CouchShift>& shift, std::string& text) {
   const char* outcome = checked.has_errors() ? "ERRORS" : "passes";
-  Described described{
-      .text = fmt::format("{}: {}\n", path.string(), outcome),
-      .json = {{"file", path.string()}, {"passes", !checked.has_errors()}, {"findings", Json::array()}}};
+  text += fmt::format("{}: {}\n", path.string(), outcome);
+  Json json = {{"file", path.string()}, {"passes", !checked.has_errors()}, {"findings", Json::array()}};
   for (const RegistrationFinding& finding : checked.findings) {
     const char* kind = finding.is_error ? "error" : "note";
-    described.text += fmt::format("  {:<6} {}\n", kind, finding.text);
-    described.json["findings"].push_back({{"kind", kind}, {"text", finding.text}});
+    text += fmt::format("  {:<6} {}\n", kind, finding.text);
+    json["findings"].push_back({{"kind", kind}, {"text", finding.text}});
   }
   if (const auto matrix = rigid_of(checked)) {
     const Eigen::Vector3d origin = matrix->translation();
     const double angle_deg = deg_from_rad(Eigen::AngleAxisd(matrix->linear()).angle());
-    described.text +=
-        fmt::format("  takes  {}\n  to     {}\n  with   the origin at ({:.3f}) mm, turned by {:.3f} deg\n",
-                    checked.source_frame_uid, checked.registered_frame_uid, fmt::join(origin, ", "), angle_deg);
-    described.json["origin_mm"] = {origin.x(), origin.y(), origin.z()};
-    described.json["rotation_deg"] = angle_deg;
+    text += fmt::format("  takes  {}\n  to     {}\n  with   the origin at ({:.3f}) mm, turned by {:.3f} deg\n",
+                        checked.source_frame_uid, checked.registered_frame_uid, fmt::join(origin, ", "), angle_deg);
+    json["origin_mm"] = {origin.x(), origin.y(), origin.z()};
+    json["rotation_deg"] = angle_deg;
   }
   if (shift) {
-    described.text += fmt::format(
+    text += fmt::format(
         "  means  a couch shift of lateral {:+.2f}, longitudinal {:+.2f}, vertical {:+.2f} mm, yaw {:+.2f}, pitch "
         "{:+.2f}, roll {:+.2f} deg\n",
         shift->translation_mm.x(), shift->translation_mm.y(), shift->translation_mm.z(),
         deg_from_rad(shift->change.z_rad), deg_from_rad(shift->change.x_rad), deg_from_rad(shift->change.y_rad));
-    described.json["couch_shift"] = json_of(*shift);
+    json["couch_shift"] = json_of(*shift);
   }
-  return described;
+  return json;
 }
 
-// Whether the two can be compared is said, too.
-Described compare(const CheckedRegistration& first, const CheckedRegistration& other, bool& is_inverted) {
-  Described described;
+// The same for their difference, or why there is none.
+Json compare(const CheckedRegistration& first, const CheckedRegistration& other, bool& is_inverted, std::string& text) {
   const auto cannot = [&](const char* why) {
-    described.text = fmt::format("difference: none, {}\n", why);
-    described.json = {{"reason", why}};
-    return described;
+    text += fmt::format("difference: none, {}\n", why);
+    return Json{{"reason", why}};
   };
   const auto a = rigid_of(first), b = rigid_of(other);
   if (!a || !b) return cannot("as not both hold one rigid matrix");
@@ -147,15 +138,14 @@ Described compare(const CheckedRegistration& first, const CheckedRegistration& o
     return cannot("as they register different frames (CTs)");
   const RegistrationDifference difference = difference_between(*a, *b);
   is_inverted = difference.other_is_inverted;
-  described.text = fmt::format("difference: {:.3f} mm at the isocenter, {:.3f} deg\n", difference.translation_mm,
-                               deg_from_rad(difference.angle_rad));
+  text += fmt::format("difference: {:.3f} mm at the isocenter, {:.3f} deg\n", difference.translation_mm,
+                      deg_from_rad(difference.angle_rad));
   if (first.source_frame_uid != other.source_frame_uid)
-    described.text += "  their treatment frames differ; both are taken to begin at the machine's isocenter\n";
-  if (is_inverted) described.text += "  error  the second one looks inverted: its inverse lies near the first\n";
-  described.json = {{"translation_mm", difference.translation_mm},
-                    {"rotation_deg", deg_from_rad(difference.angle_rad)},
-                    {"looks_inverted", is_inverted}};
-  return described;
+    text += "  their treatment frames differ; both are taken to begin at the machine's isocenter\n";
+  if (is_inverted) text += "  error  the second one looks inverted: its inverse lies near the first\n";
+  return {{"translation_mm", difference.translation_mm},
+          {"rotation_deg", deg_from_rad(difference.angle_rad)},
+          {"looks_inverted", is_inverted}};
 }
 
 int run_check(const CheckOptions& options, Console& console) {
@@ -167,16 +157,12 @@ int run_check(const CheckOptions& options, Console& console) {
   for (const std::filesystem::path& path : options.registrations) {
     checked.push_back(check_registration(path));
     const std::optional<CouchShift> shift = setup ? shift_of(checked.back(), *setup) : std::nullopt;
-    const Described described = describe(path, checked.back(), shift);
-    text += described.text;
-    json["registrations"].push_back(described.json);
+    json["registrations"].push_back(describe(path, checked.back(), shift, text));
     has_errors = has_errors || checked.back().has_errors();
   }
   if (checked.size() == 2) {
     bool is_inverted = false;
-    const Described described = compare(checked[0], checked[1], is_inverted);
-    text += described.text;
-    json["difference"] = described.json;
+    json["difference"] = compare(checked[0], checked[1], is_inverted, text);
     has_errors = has_errors || is_inverted;
   }
   console.out << (options.as_json ? json.dump(2) + "\n" : text);

@@ -51,7 +51,7 @@ class Checker {
 
   // The value of a UI attribute; a finding where it is missing or malformed.
   std::string uid_of(const DicomItem& item, const DcmTagKey& tag, const std::string& name) {
-    const std::string uid = item.text(tag).value_or("");
+    std::string uid = item.text(tag).value_or("");
     if (uid.empty())
       error(fmt::format("{}: {} is missing", name, described(tag)));
     else if (!is_uid(uid))

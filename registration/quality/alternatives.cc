@@ -122,6 +122,7 @@ std::vector<Alternative> compare_alternatives(const RendererPyramid& renderers, 
   std::vector<Attempt> attempts = attempts_with(views);
   const Attempt& as_is = attempts.front();
   std::vector<Attempt*> searched;
+  searched.reserve(attempts.size());
   for (Attempt& attempt : attempts) searched.push_back(&attempt);
   for (std::size_t level = 0; level < levels_searched && !searched.empty(); ++level) {
     SearchOptions of_level = options;
