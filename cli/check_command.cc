@@ -10,8 +10,8 @@
 #include "geometry/couch_shift.h"
 #include "geometry/error.h"
 #include "io/registration_check.h"
-#include "io/report/setup_report.h"
 #include "io/rt_plan.h"
+#include "io/spatial_registration.h"
 
 namespace isoshift {
 namespace {
@@ -58,13 +58,11 @@ std::optional<PlannedSetup> planned_setup(const CheckOptions& options) {
                       .isocenter_patient_mm = *isocenter};
 }
 
-// The setup error that a matrix from a treatment frame to the planning CT means: the inverse of ct_from_treatment().
+// The setup error that a matrix from the treatment frame to the planning CT means.
 Eigen::Isometry3d setup_error_of(const Eigen::Isometry3d& ct_from_treatment, const PlannedSetup& setup) {
   const Eigen::Isometry3d planned =
       planned_room_from_patient(setup.patient_position, setup.table, setup.isocenter_patient_mm);
-  Eigen::Isometry3d room_from_treatment = Eigen::Isometry3d::Identity();
-  room_from_treatment.linear() = planned.linear();
-  return setup_error_from_poses(planned, room_from_treatment * ct_from_treatment.inverse());
+  return setup_error_from_poses(planned, actual_room_from_patient(planned, ct_from_treatment));
 }
 
 std::optional<Eigen::Isometry3d> rigid_of(const CheckedRegistration& checked) {

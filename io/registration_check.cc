@@ -1,6 +1,5 @@
 #include "io/registration_check.h"
 
-#include <dcmtk/dcmdata/dcuid.h>
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -8,12 +7,11 @@
 #include <set>
 
 #include "geometry/error.h"
-#include "io/dicom_dataset.h"
+#include "io/spatial_registration.h"
 
 namespace isoshift {
 namespace {
 
-constexpr double kRigid = 1e-4;     // entries of R'R - I that a reader may take for rounding
 constexpr double kItkRigid = 1e-5;  // ITK refuses above this
 
 // A UID as PS3.5, 9.1 allows: components of digits without leading zeros, 64 characters at most.
@@ -179,7 +177,7 @@ class Checker {
   void check_rotation(const Eigen::Matrix3d& r, const std::string& name) {
     const double off = (r.transpose() * r - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
     const Eigen::RowVector3d lengths = r.colwise().norm();
-    if (!(off < kRigid))
+    if (!(off < kRigidTolerance))
       error(
           fmt::format("{}: the matrix is not rigid: its columns have the lengths {:.6g}, {:.6g}, {:.6g}, and R'R is "
                       "off the identity by {:.2g}",
@@ -235,16 +233,7 @@ class Checker {
 bool CheckedRegistration::has_errors() const { return std::ranges::any_of(findings, &RegistrationFinding::is_error); }
 
 CheckedRegistration check_registration(const std::filesystem::path& path) {
-  const DicomFile file = DicomFile::read(path, DicomFile::Extent::kHeader);
-  const std::string sop_class = file.dataset().required_text(DCM_SOPClassUID);
-  if (sop_class == UID_DeformableSpatialRegistrationStorage)
-    throw Error(
-        fmt::format("{}: is a Deformable Spatial Registration, which maps the other way (PS3.3 C.20.3). Expected "
-                    "a Spatial Registration",
-                    path.string()));
-  if (sop_class != UID_SpatialRegistrationStorage)
-    throw Error(fmt::format("{}: {} is {}, expected Spatial Registration Storage", path.string(),
-                            described(DCM_SOPClassUID), sop_class));
+  const DicomFile file = open_spatial_registration(path);
   return Checker(file.dataset()).check();
 }
 
@@ -260,14 +249,6 @@ RegistrationDifference difference_between(const Eigen::Isometry3d& registered_fr
       .translation_mm = translation_mm,
       .angle_rad = angle_rad,
       .other_is_inverted = translation_mm > kFarMm && between(other.inverse()).first < kMuchNearer * translation_mm};
-}
-
-std::optional<Eigen::Isometry3d> as_rigid(const Eigen::Affine3d& matrix) {
-  const Eigen::Matrix3d r = matrix.linear();
-  if (!((r.transpose() * r - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff() < kRigid) || r.determinant() < 0.0 ||
-      matrix.matrix().row(3) != Eigen::RowVector4d(0, 0, 0, 1))
-    return std::nullopt;
-  return Eigen::Isometry3d(matrix.matrix());
 }
 
 }  // namespace isoshift

@@ -38,7 +38,4 @@ struct RegistrationDifference {
 RegistrationDifference difference_between(const Eigen::Isometry3d& registered_from_source,
                                           const Eigen::Isometry3d& other);
 
-// The rotation and translation of a matrix that is rigid within 1e-4; nothing for any other.
-std::optional<Eigen::Isometry3d> as_rigid(const Eigen::Affine3d& matrix);
-
 }  // namespace isoshift

@@ -157,15 +157,12 @@ Eigen::Isometry3d composed_matrix(const DicomItem& item) {
     for (const DicomItem& matrix_item : registration.items(DCM_MatrixSequence)) {
       const std::vector<double> values = matrix_item.required_numbers(DCM_FrameOfReferenceTransformationMatrix, 16);
       const std::string type = matrix_item.required_text(DCM_FrameOfReferenceTransformationMatrixType);
-      Eigen::Isometry3d matrix;
-      matrix.matrix() = Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(values.data());
-      const Eigen::Matrix3d r = matrix.linear();
-      const bool is_rigid = (r.transpose() * r - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff() < 1e-4 &&
-                            r.determinant() > 0.0 && matrix.matrix().row(3) == Eigen::RowVector4d(0, 0, 0, 1);
-      if (type != "RIGID" || !is_rigid)
+      const Eigen::Matrix4d written = Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(values.data());
+      const std::optional<Eigen::Isometry3d> matrix = as_rigid(Eigen::Affine3d(written));
+      if (type != "RIGID" || !matrix)
         throw Error(fmt::format("{}: {} is not a rigid motion", matrix_item.where(),
                                 described(DCM_FrameOfReferenceTransformationMatrix)));
-      composed = matrix * composed;
+      composed = *matrix * composed;
     }
   return composed;
 }
@@ -180,13 +177,23 @@ void check_read_back(const std::filesystem::path& path, const Eigen::Isometry3d&
     throw Error(fmt::format("{}: reads back differently from what was written", path.string()));
 }
 
+// The treatment frame: at the machine's isocenter, along the axes of the patient as planned.
+Eigen::Isometry3d room_from_treatment(const Eigen::Isometry3d& planned_room_from_patient) {
+  Eigen::Isometry3d result = Eigen::Isometry3d::Identity();
+  result.linear() = planned_room_from_patient.linear();
+  return result;
+}
+
 }  // namespace
 
 Eigen::Isometry3d ct_from_treatment(const Eigen::Isometry3d& planned_room_from_patient,
                                     const Eigen::Isometry3d& actual_room_from_patient) {
-  Eigen::Isometry3d room_from_treatment = Eigen::Isometry3d::Identity();
-  room_from_treatment.linear() = planned_room_from_patient.linear();
-  return actual_room_from_patient.inverse() * room_from_treatment;
+  return actual_room_from_patient.inverse() * room_from_treatment(planned_room_from_patient);
+}
+
+Eigen::Isometry3d actual_room_from_patient(const Eigen::Isometry3d& planned_room_from_patient,
+                                           const Eigen::Isometry3d& ct_from_treatment) {
+  return room_from_treatment(planned_room_from_patient) * ct_from_treatment.inverse();
 }
 
 std::string write_spatial_registration(const Study& study, const Eigen::Isometry3d& actual_room_from_patient,
@@ -202,12 +209,31 @@ std::string write_spatial_registration(const Study& study, const Eigen::Isometry
   return sop_instance_uid;
 }
 
-SpatialRegistration read_spatial_registration(const std::filesystem::path& path) {
-  const DicomFile file = DicomFile::read(path, DicomFile::Extent::kWhole);
-  const DicomItem dataset = file.dataset();
-  if (const std::string sop_class = dataset.required_text(DCM_SOPClassUID); sop_class != UID_SpatialRegistrationStorage)
+DicomFile open_spatial_registration(const std::filesystem::path& path) {
+  DicomFile file = DicomFile::read(path, DicomFile::Extent::kWhole);
+  const std::string sop_class = file.dataset().required_text(DCM_SOPClassUID);
+  if (sop_class == UID_DeformableSpatialRegistrationStorage)
+    throw Error(
+        fmt::format("{}: is a Deformable Spatial Registration, which maps the other way (PS3.3 C.20.3). Expected "
+                    "a Spatial Registration",
+                    path.string()));
+  if (sop_class != UID_SpatialRegistrationStorage)
     throw Error(fmt::format("{}: {} is {}, expected Spatial Registration Storage", path.string(),
                             described(DCM_SOPClassUID), sop_class));
+  return file;
+}
+
+std::optional<Eigen::Isometry3d> as_rigid(const Eigen::Affine3d& matrix) {
+  const Eigen::Matrix3d r = matrix.linear();
+  if (!((r.transpose() * r - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff() < kRigidTolerance) ||
+      r.determinant() < 0.0 || matrix.matrix().row(3) != Eigen::RowVector4d(0, 0, 0, 1))
+    return std::nullopt;
+  return Eigen::Isometry3d(matrix.matrix());
+}
+
+SpatialRegistration read_spatial_registration(const std::filesystem::path& path) {
+  const DicomFile file = open_spatial_registration(path);
+  const DicomItem dataset = file.dataset();
   SpatialRegistration registration;
   registration.sop_instance_uid = dataset.required_text(DCM_SOPInstanceUID);
   registration.frame_of_reference_uid = dataset.required_text(DCM_FrameOfReferenceUID);

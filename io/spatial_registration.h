@@ -4,9 +4,11 @@
 
 #include <Eigen/Geometry>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "io/dicom_dataset.h"
 #include "io/study.h"
 
 namespace isoshift {
@@ -16,6 +18,10 @@ namespace isoshift {
 // translation column is the point of the CT that now lies at the machine's isocenter.
 Eigen::Isometry3d ct_from_treatment(const Eigen::Isometry3d& planned_room_from_patient,
                                     const Eigen::Isometry3d& actual_room_from_patient);
+
+// The inverse: where the patient lies, from that matrix.
+Eigen::Isometry3d actual_room_from_patient(const Eigen::Isometry3d& planned_room_from_patient,
+                                           const Eigen::Isometry3d& ct_from_treatment);
 
 struct SpatialRegistrationLabel {
   std::string content_label = "SETUP_2D3D";  // CS
@@ -27,6 +33,15 @@ struct SpatialRegistrationLabel {
 std::string write_spatial_registration(const Study& study, const Eigen::Isometry3d& actual_room_from_patient,
                                        const SpatialRegistrationLabel& label, const std::filesystem::path& path,
                                        Notes& notes);
+
+// A Spatial Registration object of any program. Throws Error for anything else.
+DicomFile open_spatial_registration(const std::filesystem::path& path);
+
+// What R'R of a rotation may be off the identity per entry, as that of rounded numbers is.
+inline constexpr double kRigidTolerance = 1e-4;
+
+// A matrix as a rigid motion; nothing if it is none.
+std::optional<Eigen::Isometry3d> as_rigid(const Eigen::Affine3d& matrix);
 
 // The part of a Spatial Registration that positions patients: per item the source frame and the composed matrix.
 struct SpatialRegistration {

@@ -98,7 +98,7 @@ ProjectedRegion::ProjectedRegion(const RegionOfInterest& region) {
   for (const CutEnds& ends : region.cut_ends) ends_.push_back({renderer_of(ends.columns), ends.along_patient});
 }
 
-bool ProjectedRegion::restrict(FixedImage& image, const Eigen::Isometry3d& room_from_patient, double slack_mm) const {
+void ProjectedRegion::restrict(FixedImage& image, const Eigen::Isometry3d& room_from_patient, double slack_mm) const {
   const int slack_px = static_cast<int>(std::lround(slack_mm * pixels_per_mm(image.view)));
   const auto only_where = [&](Renderer& of_mask, std::uint8_t value) {
     const Image<std::uint8_t> mask = shadow(of_mask, image.view, room_from_patient, slack_px);
@@ -118,14 +118,13 @@ bool ProjectedRegion::restrict(FixedImage& image, const Eigen::Isometry3d& room_
     return true;
   };
   constexpr double kMinLeft = 0.1, kMinLeftAlong = 0.5;
-  bool all_left_out = true;
-  for (const auto& outside : outside_) all_left_out = leave_out(*outside, kMinLeft) && all_left_out;
+  for (const auto& outside : outside_)
+    if (!leave_out(*outside, kMinLeft)) image.has_all_left_out = false;
   const Eigen::Vector3d looking = room_from_patient.linear().transpose() * image.view.central_direction_room();
   for (const Ends& ends : ends_) {
     const bool is_along = std::abs(looking.dot(ends.along_patient)) > 0.5 * std::numbers::sqrt2;
     leave_out(*ends.renderer, is_along ? kMinLeftAlong : kMinLeft);
   }
-  return all_left_out;
 }
 
 }  // namespace isoshift

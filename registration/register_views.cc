@@ -39,19 +39,17 @@ void require_visible(const RendererPyramid& renderers, std::span<const XrayImage
 void report_views(const RendererPyramid& renderers, const FixedViews& views, const Eigen::Isometry3d& start,
                   const Stage& last_stage, RegistrationResult& result) {
   const Eigen::Isometry3d& found = result.actual_room_from_patient;
-  Objective gradient_correlation(renderers.with_voxels_up_to(2.0 * last_stage.voxel_mm),
-                                 views.reduced_to(2.0 * last_stage.pixel_mm, found, 0.0), found,
+  const std::vector<FixedImage> level = views.reduced_to(2.0 * last_stage.pixel_mm, found, 0.0);
+  Objective gradient_correlation(renderers.with_voxels_up_to(2.0 * last_stage.voxel_mm), level, found,
                                  {.similarity = SimilarityKind::kGradientCorrelation});
   const std::array poses = {start, found};
   const auto similarity = gradient_correlation.per_view(poses);
   std::vector<ViewConsistency> consistency = regional_consistency(renderers, views, found);
   for (std::size_t view = 0; view < consistency.size(); ++view) {
-    FixedImage image =
-        reduced(views.images[view], std::max(1, static_cast<int>(pixels_per_mm(views.images[view].view))));
-    result.views.push_back({.label = image.label,
+    result.views.push_back({.label = level[view].label,
                             .similarity_start = similarity[0][view],
                             .similarity_final = similarity[1][view],
-                            .has_all_left_out = views.region.restrict(image, found, 0.0),
+                            .has_all_left_out = level[view].has_all_left_out,
                             .consistency = std::move(consistency[view])});
   }
 }

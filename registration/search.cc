@@ -7,6 +7,7 @@
 #include <numeric>
 #include <random>
 
+#include "geometry/error.h"
 #include "registration/objective.h"
 #include "registration/pose_parameters.h"
 
@@ -26,6 +27,20 @@ double field_pixels(const FixedImage& image) {
 int reduction(const FixedImage& image, double pixel_mm) {
   return std::max(1, static_cast<int>(std::min(pixel_mm * pixels_per_mm(image.view),
                                                std::sqrt(field_pixels(image) / kMinFieldPixels))));
+}
+
+// An image reduced and restricted. Where the region leaves few pixels, they are as many times finer as makes up for
+// that.
+FixedImage compared_part(const FixedImage& image, const ProjectedRegion& region, double pixel_mm,
+                         const Eigen::Isometry3d& room_from_patient, double slack_mm) {
+  int factor = reduction(image, pixel_mm);
+  for (;;) {
+    FixedImage part = reduced(image, factor);
+    region.restrict(part, room_from_patient, slack_mm);
+    const double left = field_pixels(part);
+    if (left >= kMinFieldPixels || factor == 1 || field_pixels(image) < kMinFieldPixels) return part;
+    factor = std::clamp(static_cast<int>(factor * std::sqrt(left / kMinFieldPixels)), 1, factor - 1);
+  }
 }
 
 double bound_of(std::size_t axis, const SearchOptions& options) {
@@ -96,20 +111,8 @@ void report_spread(const std::vector<OptimizerResult>& found, StageReport& repor
 std::vector<FixedImage> FixedViews::reduced_to(double pixel_mm, const Eigen::Isometry3d& room_from_patient,
                                                double slack_mm) const {
   std::vector<FixedImage> level;
-  for (const FixedImage& image : images) {
-    int factor = reduction(image, pixel_mm);
-    for (;;) {
-      FixedImage candidate = reduced(image, factor);
-      region.restrict(candidate, room_from_patient, slack_mm);
-      const double left = field_pixels(candidate);
-      if (left >= kMinFieldPixels || factor == 1 || field_pixels(image) < kMinFieldPixels) {
-        level.push_back(std::move(candidate));
-        break;
-      }
-      // The region left few: as many times finer as makes up for that.
-      factor = std::clamp(static_cast<int>(factor * std::sqrt(left / kMinFieldPixels)), 1, factor - 1);
-    }
-  }
+  for (const FixedImage& image : images)
+    level.push_back(compared_part(image, region, pixel_mm, room_from_patient, slack_mm));
   return level;
 }
 
@@ -162,6 +165,16 @@ SearchResult search(const RendererPyramid& renderers, const FixedViews& views,
   }
   result.parameters = kept.front();
   return result;
+}
+
+std::optional<SearchResult> search_if_possible(const RendererPyramid& renderers, const FixedViews& views,
+                                               const Eigen::Isometry3d& start_room_from_patient,
+                                               const SearchOptions& options) {
+  try {
+    return search(renderers, views, start_room_from_patient, options);
+  } catch (const Error&) {
+    return std::nullopt;
+  }
 }
 
 }  // namespace isoshift

@@ -86,4 +86,9 @@ SearchResult search(const RendererPyramid& renderers, const FixedViews& views,
                     const Eigen::Isometry3d& start_room_from_patient, const SearchOptions& options,
                     const SearchProgress& progress = {});
 
+// The same for a pose or images that may be nonsense; nothing where they leave too little to compare.
+std::optional<SearchResult> search_if_possible(const RendererPyramid& renderers, const FixedViews& views,
+                                               const Eigen::Isometry3d& start_room_from_patient,
+                                               const SearchOptions& options);
+
 }  // namespace isoshift

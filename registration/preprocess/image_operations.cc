@@ -3,16 +3,10 @@
 #include <algorithm>
 #include <opencv2/imgproc.hpp>
 
+#include "registration/preprocess/mat.h"
+
 namespace isoshift {
 namespace {
-
-// OpenCV's view of an image; what it is given to is not changed.
-cv::Mat mat_of(const Image<float>& image) {
-  return {image.rows, image.columns, CV_32F, const_cast<float*>(image.pixels.data())};
-}
-cv::Mat mat_of(const Image<std::uint8_t>& image) {
-  return {image.rows, image.columns, CV_8U, const_cast<std::uint8_t*>(image.pixels.data())};
-}
 
 cv::Rect rectangle(const PixelSquare& square) { return {square.column, square.row, square.edge, square.edge}; }
 

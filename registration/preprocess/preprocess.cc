@@ -9,6 +9,7 @@
 
 #include "geometry/error.h"
 #include "geometry/rotation.h"
+#include "registration/preprocess/mat.h"
 
 namespace isoshift {
 namespace {
@@ -18,10 +19,6 @@ constexpr double kPenumbraMm = 1.7;         // half the distance over which an e
 constexpr double kMinEdgeMm = 12.0;         // the shortest edge that counts, at the isocenter
 constexpr float kMinEdgeContrast = 0.916F;  // ln 2.5, of an intensity image
 constexpr float kMinEdgeShare = 0.15F;      // of the image's range, where line integrals come without a scale
-
-cv::Mat as_mat(const Image<float>& image) {
-  return {image.rows, image.columns, CV_32F, const_cast<float*>(image.pixels.data())};
-}
 
 // A straight run of rows along a column, across which the image brightens from left to right.
 struct Edge {
@@ -114,6 +111,22 @@ cv::Rect innermost_field(const cv::Mat& line_integral, const cv::Point2d& isocen
   }
 }
 
+// Takes out of the field what lies at the least or the largest value, where many pixels do: a receptor that saturated,
+// or a display window, has cut them off, and their true values are not known.
+void leave_out_clipped(FixedImage& image) {
+  constexpr double kMany = 0.0005;
+  std::vector<float> values;
+  for (std::size_t n = 0; n < image.field.pixels.size(); ++n)
+    if (image.field.pixels[n] != 0) values.push_back(image.line_integral.pixels[n]);
+  if (values.empty()) return;
+  const auto [least, largest] = std::ranges::minmax(values);
+  for (const float extreme : {least, largest}) {
+    if (static_cast<double>(std::ranges::count(values, extreme)) < kMany * static_cast<double>(values.size())) continue;
+    for (std::size_t n = 0; n < image.field.pixels.size(); ++n)
+      if (image.line_integral.pixels[n] == extreme) image.field.pixels[n] = 0;
+  }
+}
+
 }  // namespace
 
 double pixels_per_mm(const XrayView& view) {
@@ -136,7 +149,7 @@ Image<float> line_integrals(const XrayImage& xray) {
 Image<std::uint8_t> irradiated_field(const XrayImage& xray, const Image<float>& line_integral) {
   const double scale = pixels_per_mm(xray.view);
   cv::Mat smooth;
-  cv::medianBlur(as_mat(line_integral), smooth, 5);
+  cv::medianBlur(mat_of(line_integral), smooth, 5);
   const auto [darkest, brightest] = std::ranges::minmax(line_integral.pixels);
   const EdgeSearch search{.reach = std::max(1, static_cast<int>(std::lround(kPenumbraMm * scale))),
                           .min_rows = std::max(3, static_cast<int>(std::lround(kMinEdgeMm * scale))),
@@ -207,22 +220,6 @@ void restrict_to(const PixelRectangle& rectangle, FixedImage& image) {
       if (column < rectangle.first_column || column > rectangle.last_column || row < rectangle.first_row ||
           row > rectangle.last_row)
         image.field.at(column, row) = 0;
-}
-
-// Takes out of the field what lies at the least or the largest value, where many pixels do: a receptor that saturated,
-// or a display window, has cut them off, and their true values are not known.
-void leave_out_clipped(FixedImage& image) {
-  constexpr double kMany = 0.0005;
-  std::vector<float> values;
-  for (std::size_t n = 0; n < image.field.pixels.size(); ++n)
-    if (image.field.pixels[n] != 0) values.push_back(image.line_integral.pixels[n]);
-  if (values.empty()) return;
-  const auto [least, largest] = std::ranges::minmax(values);
-  for (const float extreme : {least, largest}) {
-    if (static_cast<double>(std::ranges::count(values, extreme)) < kMany * static_cast<double>(values.size())) continue;
-    for (std::size_t n = 0; n < image.field.pixels.size(); ++n)
-      if (image.line_integral.pixels[n] == extreme) image.field.pixels[n] = 0;
-  }
 }
 
 FixedImage prepare(const XrayImage& xray) {

@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <array>
 
-#include "geometry/error.h"
 #include "geometry/rotation.h"
 #include "registration/pose_parameters.h"
 
@@ -132,11 +131,10 @@ std::vector<Alternative> compare_alternatives(const RendererPyramid& renderers, 
       if (level > 0)
         from_there.parameters = level == 1 && attempt == &as_is ? found.parameters : attempt->found.back().parameters;
       // Mirrored or turned, the field may miss the region: that is no alternative.
-      try {
+      if (attempt == &as_is)
         attempt->found.push_back(search(renderers, attempt->views, start_room_from_patient, from_there));
-      } catch (const Error&) {
-        if (attempt == &as_is) throw;
-      }
+      else if (auto there = search_if_possible(renderers, attempt->views, start_room_from_patient, from_there))
+        attempt->found.push_back(std::move(*there));
     });
     searched.clear();
     for (Attempt& attempt : attempts)

@@ -5,7 +5,6 @@
 #include <cmath>
 #include <optional>
 
-#include "geometry/error.h"
 #include "geometry/rotation.h"
 #include "registration/pose_parameters.h"
 
@@ -54,26 +53,26 @@ std::vector<Alternative> compare_vertebrae(const RendererPyramid& renderers, con
   std::vector<Alternative> alternatives;
   for (const double direction : {-1.0, 1.0}) {
     std::optional<Alternative> best;
-    for (const double distance_mm : {20.0, 26.0, 32.0, 38.0}) try {
-        SearchOptions displaced = options;
-        displaced.stages = stages;
-        displaced.parameters = found.parameters;
-        for (int axis = 0; axis < 3; ++axis)
-          displaced.parameters[static_cast<std::size_t>(axis)] += direction * distance_mm * headward_room[axis];
-        for (std::size_t axis = 0; axis < 3; ++axis)
-          displaced.bound_mm = std::max(displaced.bound_mm, std::abs(displaced.parameters[axis]) + 10.0);
-        const SearchResult there = search(renderers, views, start_room_from_patient, displaced);
-        const double moved_mm =
-            headward_room.dot(Eigen::Vector3d(there.parameters.data()) - Eigen::Vector3d(found.parameters.data()));
-        const double similarity = there.stages.back().value;
-        if (std::abs(moved_mm) < kMinDisplacementMm || (best && best->similarity >= similarity)) continue;
-        best = Alternative{.description = fmt::format("the patient {:.0f} mm further to the {}", std::abs(moved_mm),
-                                                      moved_mm > 0.0 ? "head" : "feet"),
-                           .similarity = similarity,
-                           .as_is = found.stages.back().value,
-                           .distance_mm = std::abs(moved_mm)};
-      } catch (const Error&) {  // moved so far, the region may leave the field
-      }
+    for (const double distance_mm : {20.0, 26.0, 32.0, 38.0}) {
+      SearchOptions displaced = options;
+      displaced.stages = stages;
+      displaced.parameters = found.parameters;
+      for (int axis = 0; axis < 3; ++axis)
+        displaced.parameters[static_cast<std::size_t>(axis)] += direction * distance_mm * headward_room[axis];
+      for (std::size_t axis = 0; axis < 3; ++axis)
+        displaced.bound_mm = std::max(displaced.bound_mm, std::abs(displaced.parameters[axis]) + 10.0);
+      const auto there = search_if_possible(renderers, views, start_room_from_patient, displaced);
+      if (!there) continue;  // moved so far, the region may leave the field
+      const double moved_mm =
+          headward_room.dot(Eigen::Vector3d(there->parameters.data()) - Eigen::Vector3d(found.parameters.data()));
+      const double similarity = there->stages.back().value;
+      if (std::abs(moved_mm) < kMinDisplacementMm || (best && best->similarity >= similarity)) continue;
+      best = Alternative{.description = fmt::format("the patient {:.0f} mm further to the {}", std::abs(moved_mm),
+                                                    moved_mm > 0.0 ? "head" : "feet"),
+                         .similarity = similarity,
+                         .as_is = found.stages.back().value,
+                         .distance_mm = std::abs(moved_mm)};
+    }
     if (best) alternatives.push_back(*best);
   }
   return alternatives;

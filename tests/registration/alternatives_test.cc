@@ -20,13 +20,7 @@ RegistrationScene asymmetric_scene() {
 }
 
 std::map<std::string, Alternative> alternatives_of(const RegistrationScene& scene) {
-  const Stage fine{.name = "fine",
-                   .similarity = SimilarityKind::kGradientCorrelation,
-                   .pixel_mm = 2.2,
-                   .voxel_mm = 2.5,
-                   .initial_step_mm = 0.5,
-                   .initial_step_rad = rad_from_deg(0.4),
-                   .relative_tolerance = 0.05};
+  const Stage fine = fine_stage();
   std::map<std::string, Alternative> named;
   const SearchOptions options{.stages = std::span(&fine, 1)};
   const SearchResult found = search(*scene.renderers, scene.views(), scene.planned, options);

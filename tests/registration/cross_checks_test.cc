@@ -13,16 +13,6 @@ namespace {
 
 using Eigen::Vector3d;
 
-Stage fine_stage() {
-  return {.name = "fine",
-          .similarity = SimilarityKind::kGradientCorrelation,
-          .pixel_mm = 2.2,
-          .voxel_mm = 2.5,
-          .initial_step_mm = 0.5,
-          .initial_step_rad = rad_from_deg(0.4),
-          .relative_tolerance = 0.05};
-}
-
 SceneOptions three_views(const Vector3d& translation_mm) {
   SceneOptions options{.shapes = asymmetric_body(), .gantry_angles_deg = {0.0, 60.0, 120.0}};
   options.placement.translation_mm = translation_mm;

@@ -1,6 +1,7 @@
 #include "tests/support/registration_scene.h"
 
 #include "geometry/patient_setup.h"
+#include "geometry/rotation.h"
 #include "tests/drr/test_views.h"
 
 namespace isoshift {
@@ -30,6 +31,16 @@ RegistrationScene make_scene(const SceneOptions& options) {
   scene.ct = ct_of_shapes(options.shapes, lattice.size, lattice.patient_from_voxel);
   scene.renderers = std::make_unique<RendererPyramid>(RendererKind::kCpu, scene.ct, AttenuationModel{}, kBothBeams);
   return scene;
+}
+
+Stage fine_stage() {
+  return {.name = "fine",
+          .similarity = SimilarityKind::kGradientCorrelation,
+          .pixel_mm = 2.2,
+          .voxel_mm = 2.5,
+          .initial_step_mm = 0.5,
+          .initial_step_rad = rad_from_deg(0.4),
+          .relative_tolerance = 0.05};
 }
 
 std::vector<Shape> asymmetric_body() {

@@ -38,6 +38,9 @@ struct SceneOptions {
 };
 RegistrationScene make_scene(const SceneOptions& options);
 
+// A last stage for such a scene.
+Stage fine_stage();
+
 // X-rays as a SceneOptions says, without the rest.
 std::vector<XrayImage> xrays_of(const SceneOptions& options);
 
