@@ -111,7 +111,7 @@ int check(int patient_count) {
   std::map<std::string, Count> counts;
   bool wrong_accepted = false;
   fmt::print(
-      "ct,xrays,case,verdict,mtre_mm,least_gradient_correlation,as_is,best_alternative,disagreeing,with_signal,seconds,"
+      "ct,xrays,case,verdict,mtre_mm,least_gradient_correlation,as_is,best_alternative,disagreeing,seconds,"
       "err_sigma,reasons\n");
   RegistrationOptions options = preset("setup");
   const auto one = [&](const RendererPyramid& renderers, int ct, int of, const std::string& what,
@@ -126,11 +126,11 @@ int check(int patient_count) {
       return;
     }
     const Eigen::Isometry3d found = result.actual_room_from_patient * planned.inverse();
-    double least = 1.0, disagreeing = 0.0, with_signal = 1e-9, best = 0.0;
+    double least = 1.0, disagreeing = 0.0, best = 0.0;  // of the worst view
     for (const ViewReport& view : result.views) {
       least = std::min(least, view.similarity_final);
-      disagreeing += view.consistency.disagreeing();
-      with_signal += view.consistency.with_signal();
+      disagreeing = std::max(disagreeing, static_cast<double>(view.consistency.disagreeing()) /
+                                              std::max(1, view.consistency.with_signal()));
     }
     double as_is = 0.0;
     for (const Alternative& alternative : result.alternatives)
@@ -149,9 +149,8 @@ int check(int patient_count) {
       errors += fmt::format("{:.3f}/{:.3f} ", deg_from_rad(turn.angle() * turn.axis()[axis]),
                             deg_from_rad(result.uncertainty->rotation_rad[axis]));
     for (const std::string& reason : result.reasons) reasons += reason + "; ";
-    fmt::print("{},{},{},{},{:.2f},{:.3f},{:.3f},{:.3f},{:.0f},{:.0f},{:.2f},{},\"{}\"\n", ct, of, what,
-               to_string(result.verdict), mtre_mm, least, as_is, best, disagreeing, with_signal, result.seconds, errors,
-               reasons);
+    fmt::print("{},{},{},{},{:.2f},{:.3f},{:.3f},{:.3f},{:.3f},{:.2f},{},\"{}\"\n", ct, of, what,
+               to_string(result.verdict), mtre_mm, least, as_is, best, disagreeing, result.seconds, errors, reasons);
     std::fflush(stdout);
     count.accepted += result.verdict == Verdict::kAccepted ? 1 : 0;
     wrong_accepted = wrong_accepted || (result.verdict == Verdict::kAccepted && (what != "right" || mtre_mm > 2.0));

@@ -54,6 +54,12 @@ class Body {
     }
   }
 
+  // A place within `mm` of one along every axis.
+  Vector3d near(const Vector3d& at, double mm) {
+    return at +
+           mm * Vector3d(2.0 * uniform_(random_) - 1.0, 2.0 * uniform_(random_) - 1.0, 2.0 * uniform_(random_) - 1.0);
+  }
+
   double vary(double value, double share) { return value * (1.0 + share * (2.0 * uniform_(random_) - 1.0)); }
 
   std::vector<Shape> take() { return std::move(shapes_); }
@@ -68,38 +74,49 @@ class Body {
 
 }  // namespace
 
-// x is left, y posterior, z superior.
+// x is left, y posterior, z superior. Seeds differ as people do: by millimeters everywhere.
 std::vector<Shape> head_phantom(const Vector3d& center_patient_mm, std::uint64_t seed) {
   Body body(center_patient_mm, seed);
+  constexpr double kPlacesMm = 4.0, kSidesMm = 1.5;  // how places differ between people, and between the sides of one
   const Vector3d skull_at(0, 4, 20);
   const Vector3d skull(body.vary(66, 0.06), body.vary(84, 0.06), body.vary(72, 0.06));
   body.add(Kind::kEllipsoid, skull_at, skull.array() + 7.0, kTissue);
-  body.add(Kind::kEllipsoid, {0, -22, -45}, {52, 62, 52},
+  body.add(Kind::kEllipsoid, body.near({0, -22, -45}, kSidesMm), {52, 62, 52},
            {.water = 0.55, .bone = 0.0});                                              // face, over the head's tissue
   body.add(Kind::kCylinder, {0, 22, -70}, {46, 50, 34}, {.water = 0.5, .bone = 0.0});  // neck
   body.add_shell(skull_at, skull, body.vary(6.0, 0.2), 0.8);
   body.add_grains(110, skull_at, skull.array() - 3.0, true);
 
+  const Vector3d orbit = body.near({31, -65, -14}, kPlacesMm), sinus = body.near({26, -52, -40}, kPlacesMm),
+                 petrous = body.near({46, 18, -18}, kPlacesMm), jaw = body.near({44, -32, -66}, kPlacesMm),
+                 mastoid = body.near({55, 28, -30}, kPlacesMm);
   for (const double side : {-1.0, 1.0}) {
-    body.add(Kind::kEllipsoid, {side * body.vary(31, 0.05), -66, -14}, {17, 17, 15}, {.water = 0.1, .bone = -0.1});
-    body.add_shell({side * 31, -64, -14}, {20, 20, 18}, 2.5, 0.7);                                   // orbit
-    body.add(Kind::kEllipsoid, {side * body.vary(26, 0.08), -52, -40}, {13, 14, 15}, kAirInTissue);  // maxillary sinus
-    body.add(Kind::kBox, {side * 46, 18, -18}, {14, 9, 8}, bone_in_tissue(0.75), tilt(0, side * 35));  // petrous bone
-    body.add(Kind::kBox, {side * body.vary(44, 0.05), -32, -66}, {4, 20, 22}, bone_in_tissue(0.7), tilt(20));  // jaw
-    body.add(Kind::kEllipsoid, {side * 55, 28, -30}, {9, 12, 14}, bone_in_tissue(0.4));  // mastoid
-    body.add(Kind::kEllipsoid, {side * 55, 28, -30}, {4, 6, 7}, {.water = -0.3, .bone = 0});
+    const auto there = [&](const Vector3d& at) { return body.near(Vector3d(side * at.x(), at.y(), at.z()), kSidesMm); };
+    const Vector3d orbit_at = there(orbit), mastoid_at = there(mastoid);
+    body.add(Kind::kEllipsoid, orbit_at, {17, 17, 15}, {.water = 0.1, .bone = -0.1});
+    body.add_shell(orbit_at, {20, 20, 18}, 2.5, 0.7);
+    body.add(Kind::kEllipsoid, there(sinus), {13, 14, body.vary(15, 0.2)}, kAirInTissue);  // maxillary sinus
+    body.add(Kind::kBox, there(petrous), {14, 9, 8}, bone_in_tissue(0.75), tilt(0, side * body.vary(35, 0.2)));
+    body.add(Kind::kBox, there(jaw), {4, 20, 22}, bone_in_tissue(0.7), tilt(body.vary(20, 0.3)));
+    body.add(Kind::kEllipsoid, mastoid_at, {9, 12, 14}, bone_in_tissue(0.4));
+    body.add(Kind::kEllipsoid, mastoid_at, {4, 6, 7}, {.water = -0.3, .bone = 0});
   }
   body.add(Kind::kEllipsoid, {body.vary(6, 1.0), -74, 10}, {body.vary(20, 0.3), 6, 9}, kAirInTissue);  // frontal sinus
-  body.add(Kind::kEllipsoid, {0, -30, -22}, {11, 12, 9}, kAirInTissue);                                // sphenoid sinus
-  body.add(Kind::kBox, {0, -6, -24}, {20, 24, 4}, bone_in_tissue(0.55), tilt(-12));                    // skull base
-  body.add(Kind::kCylinder, {0, -62, -62}, {22, 20, 5}, bone_in_tissue(0.6));                          // upper teeth
-  body.add(Kind::kCylinder, {0, -60, -76}, {24, 22, 5}, bone_in_tissue(0.65));                         // lower teeth
-  body.add(Kind::kCylinder, {body.vary(15, 0.4), -70, -68}, {3, 3, 6}, bone_in_tissue(0.9));           // a crown
-  body.add(Kind::kCylinder, {0, -22, -78}, {9, 8, 22}, kAirInTissue);                                  // airway
-  for (int n = 0; n < 3; ++n) {                                                                        // cervical spine
-    body.add(Kind::kCylinder, {0, 24, -56.0 - 17 * n}, {11, 9, 7}, bone_in_tissue(0.55));
-    body.add(Kind::kBox, {0, 50, -58.0 - 17 * n}, {4, 14, 4}, bone_in_tissue(0.5), tilt(15));
-    body.add_grains(6, {0, 24, -56.0 - 17 * n}, {9, 7, 5}, false);
+  body.add(Kind::kEllipsoid, body.near({0, -30, -22}, kPlacesMm), {11, 12, 9}, kAirInTissue);          // sphenoid sinus
+  body.add(Kind::kBox, body.near({0, -6, -24}, kPlacesMm), {20, 24, 4}, bone_in_tissue(0.55),
+           tilt(body.vary(-12, 0.5)));  // skull base
+  const Vector3d teeth = body.near({0, -61, -69}, kPlacesMm);
+  body.add(Kind::kCylinder, teeth + Vector3d(0, -1, 7), {22, 20, 5}, bone_in_tissue(0.6));              // upper
+  body.add(Kind::kCylinder, teeth + Vector3d(0, 1, -7), {24, 22, 5}, bone_in_tissue(0.65));             // lower
+  body.add(Kind::kCylinder, {body.vary(15, 0.4), -70, teeth.z() + 1}, {3, 3, 6}, bone_in_tissue(0.9));  // a crown
+  body.add(Kind::kCylinder, body.near({0, -22, -78}, kPlacesMm), {9, 8, 22}, kAirInTissue);             // airway
+  const Vector3d cervical = body.near({0, 24, -56}, kPlacesMm);
+  const double pitch = body.vary(17, 0.1);
+  for (int n = 0; n < 3; ++n) {
+    const Vector3d at = cervical - Vector3d(0, 0, pitch * n);
+    body.add(Kind::kCylinder, at, {11, 9, 7}, bone_in_tissue(0.55));
+    body.add(Kind::kBox, at + Vector3d(0, 26, -2), {4, 14, 4}, bone_in_tissue(0.5), tilt(15));
+    body.add_grains(6, at, {9, 7, 5}, false);
   }
   return body.take();
 }

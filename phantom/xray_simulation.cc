@@ -30,7 +30,6 @@ constexpr std::array<EnergyBin, 6> kSpectrum = {{
 }};
 
 constexpr double kFocalSpotMm = 0.6;
-constexpr double kScatterShare = 0.12;
 constexpr double kScatterSigmaMm = 60.0;  // on the panel
 
 double cos_deg(double deg) { return std::cos(deg * std::numbers::pi / 180.0); }
@@ -84,7 +83,7 @@ double primary_intensity(const std::vector<Shape>& shapes, const Eigen::Vector3d
   return intensity;
 }
 
-// Wide blur on a grid 16 times coarser, sampled back by nearest neighbor along smooth values.
+// The primary beam, blurred widely, on a grid 16 times coarser, sampled back by nearest neighbor along smooth values.
 Image<float> scatter(const Image<float>& primary, double pixel_mm) {
   constexpr int kBlock = 16;
   const int edge = (primary.columns + kBlock - 1) / kBlock;
@@ -105,7 +104,7 @@ Image<float> scatter(const Image<float>& primary, double pixel_mm) {
           sum += weight * coarse.at(c, r);
           weights += weight;
         }
-      blurred.at(column, row) = static_cast<float>(kScatterShare * sum / weights);
+      blurred.at(column, row) = static_cast<float>(sum / weights);
     }
   Image<float> result(primary.columns, primary.rows);
   for (int row = 0; row < result.rows; ++row)
@@ -188,7 +187,8 @@ Image<float> simulate_xray(const std::vector<Shape>& shapes, const Placement& pl
   std::mt19937_64 random(seed);
   std::normal_distribution<double> gauss;
   for (std::size_t n = 0; n < intensity.pixels.size(); ++n) {
-    const double expected = (intensity.pixels[n] + scattered.pixels[n]) / (1.0 + kScatterShare);
+    const double expected =
+        (intensity.pixels[n] + imager.scatter_share * scattered.pixels[n]) / (1.0 + imager.scatter_share);
     const double noise = photons > 0.0 ? std::sqrt(expected / photons) * gauss(random) : 0.0;
     intensity.pixels[n] = static_cast<float>(std::max(0.0, expected + noise));
   }

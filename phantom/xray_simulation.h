@@ -33,8 +33,9 @@ struct Imager {
   double gantry_angle_deg = 0.0;  // clockwise seen facing the gantry: 90 puts the source at the viewer's right
   double sad_mm = 1000.0;
   double sid_mm = 1500.0;
-  int pixels = 512;       // along each edge
-  double pixel_mm = 0.8;  // on the panel
+  int pixels = 512;             // along each edge
+  double pixel_mm = 0.8;        // on the panel
+  double scatter_share = 0.12;  // of the primary beam, reaching the panel blurred
 
   Eigen::Vector3d source_fixed_mm() const;
   // Center of a pixel; column 0 at the left and row 0 at the top, seen from the source with the gantry at the top.
@@ -42,7 +43,7 @@ struct Imager {
 };
 
 // Intensity at the panel, 1 without a patient: a 120 kVp spectrum through water and bone, a focal spot of 0.6 mm,
-// scatter of 12 % and the noise of `photons` per open pixel (0: none).
+// scatter and the noise of `photons` per open pixel (0: none).
 Image<float> simulate_xray(const std::vector<Shape>& shapes, const Placement& placement, const Imager& imager,
                            double photons, std::uint64_t seed);
 

@@ -52,7 +52,7 @@ std::vector<Stage> setup_stages() {
            .similarity = SimilarityKind::kGradientCorrelation,
            .pixel_mm = 1.2,
            .voxel_mm = 1.0,
-           .pixel_fraction = 0.2,
+           .pixel_fraction = 0.3,
            .min_pixels = 8000,
            .initial_step_mm = 0.4,
            .initial_step_rad = rad_from_deg(0.25),

@@ -117,7 +117,7 @@ void ProjectedRegion::restrict(FixedImage& image, const Eigen::Isometry3d& room_
     image.field = std::move(field);
     return true;
   };
-  constexpr double kMinLeft = 0.1, kMinLeftAlong = 0.5;
+  constexpr double kMinLeft = 0.1, kMinLeftAlong = 0.75;
   for (const auto& outside : outside_)
     if (!leave_out(*outside, kMinLeft)) image.has_all_left_out = false;
   const Eigen::Vector3d looking = room_from_patient.linear().transpose() * image.view.central_direction_room();

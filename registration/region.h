@@ -41,8 +41,8 @@ class ProjectedRegion {
 
   // Takes out of the field of an image what is not compared with the patient at a pose known to within `slack_mm`.
   // None of what is left out takes more than nine tenths of the field: that stays, and the image says so. Ends of the
-  // CT stay without a word, and where the view looks along them also if they would take more than half: all of a body
-  // too thick for the CT lies between them.
+  // CT stay without a word, and where the view looks along them also if they would take more than a quarter: all of a
+  // body too thick for the CT lies between them.
   void restrict(FixedImage& image, const Eigen::Isometry3d& room_from_patient, double slack_mm) const;
 
   // Whether a volume was chosen: X-rays then show what lies before and behind it, and DRRs do not.

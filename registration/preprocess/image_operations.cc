@@ -39,18 +39,24 @@ double share_inside(const Image<std::uint8_t>& mask, const PixelSquare& square) 
   return static_cast<double>(cv::countNonZero(mat_of(mask)(rectangle(square)))) / rectangle(square).area();
 }
 
-SquareMatch best_match(const Image<float>& image, const PixelSquare& square, const Image<float>& in, int reach_px) {
+SquareMatch best_match(const Image<float>& image, const Image<std::uint8_t>& mask, const PixelSquare& square,
+                       const Image<float>& in, int reach_px) {
   const cv::Rect here = rectangle(square);
   const cv::Rect around =
       cv::Rect(here.x - reach_px, here.y - reach_px, here.width + 2 * reach_px, here.height + 2 * reach_px) &
       cv::Rect(0, 0, in.columns, in.rows);
+  const cv::Mat compared = mat_of(mask)(here) != 0;
   cv::Scalar mean, deviation;
-  cv::meanStdDev(mat_of(image)(here), mean, deviation);
+  cv::meanStdDev(mat_of(image)(here), mean, deviation, compared);
   if (deviation[0] == 0.0) return {};  // OpenCV would find it everywhere
+  // With a mask, OpenCV squares the levels, and divides by no contrast, too.
+  const cv::Mat levels = mat_of(in)(around) - cv::mean(mat_of(in)(around));
   cv::Mat correlation;
-  cv::matchTemplate(mat_of(in)(around), mat_of(image)(here), correlation, cv::TM_CCOEFF_NORMED);
+  cv::matchTemplate(levels, mat_of(image)(here), correlation, cv::TM_CCOEFF_NORMED, compared);
+  correlation.setTo(0.0, ~(cv::abs(correlation) <= 1.001));
+  SquareMatch match;
   const cv::Point middle(here.x - around.x, here.y - around.y);
-  SquareMatch match{.correlation_here = correlation.at<float>(middle)};
+  match.correlation_here = correlation.at<float>(middle);
   cv::Point best;
   cv::minMaxLoc(correlation, nullptr, &match.correlation_there, nullptr, &best);
   match.displacement_px = {best.x - middle.x, best.y - middle.y};

@@ -23,11 +23,13 @@ Image<std::uint8_t> grown(const Image<std::uint8_t>& mask, int radius_px);
 double share_inside(const Image<std::uint8_t>& mask, const PixelSquare& square);
 
 // Where a square of one image matches another of the same size best, within a search distance: by normalized cross
-// correlation, to fractions of a pixel. A square without contrast matches nowhere: correlations of 0.
+// correlation of its pixels inside a mask, to fractions of a pixel. A square without contrast matches nowhere:
+// correlations of 0.
 struct SquareMatch {
   Eigen::Vector2d displacement_px = Eigen::Vector2d::Zero();  // columns and rows, from the square to its match
   double correlation_here = 0.0, correlation_there = 0.0;
 };
-SquareMatch best_match(const Image<float>& image, const PixelSquare& square, const Image<float>& in, int reach_px);
+SquareMatch best_match(const Image<float>& image, const Image<std::uint8_t>& mask, const PixelSquare& square,
+                       const Image<float>& in, int reach_px);
 
 }  // namespace isoshift

@@ -8,7 +8,7 @@
 
 namespace isoshift {
 
-// Shares the pixels; what it is given to does not change them.
+// Shares the pixels. Those of a const image are not to be changed.
 inline cv::Mat mat_of(const Image<float>& image) {
   return {image.rows, image.columns, CV_32F, const_cast<float*>(image.pixels.data())};
 }

@@ -111,19 +111,17 @@ cv::Rect innermost_field(const cv::Mat& line_integral, const cv::Point2d& isocen
   }
 }
 
-// Takes out of the field what lies at the least or the largest value, where many pixels do: a receptor that saturated,
-// or a display window, has cut them off, and their true values are not known.
+// Takes out of the field where most pixels lie at the least or the largest value: a receptor that saturated, or a
+// display window, has cut them off, and their true values are not known. Single ones are noise, and stay.
 void leave_out_clipped(FixedImage& image) {
-  constexpr double kMany = 0.0005;
-  std::vector<float> values;
-  for (std::size_t n = 0; n < image.field.pixels.size(); ++n)
-    if (image.field.pixels[n] != 0) values.push_back(image.line_integral.pixels[n]);
-  if (values.empty()) return;
-  const auto [least, largest] = std::ranges::minmax(values);
-  for (const float extreme : {least, largest}) {
-    if (static_cast<double>(std::ranges::count(values, extreme)) < kMany * static_cast<double>(values.size())) continue;
-    for (std::size_t n = 0; n < image.field.pixels.size(); ++n)
-      if (image.line_integral.pixels[n] == extreme) image.field.pixels[n] = 0;
+  const cv::Mat line_integral = mat_of(image.line_integral);
+  cv::Mat field = mat_of(image.field);
+  double least = 0.0, largest = 0.0;
+  cv::minMaxLoc(line_integral, &least, &largest, nullptr, nullptr, field);
+  for (const double extreme : {least, largest}) {
+    cv::Mat clipped = line_integral == extreme;
+    cv::medianBlur(clipped, clipped, 5);
+    field.setTo(0, clipped);
   }
 }
 

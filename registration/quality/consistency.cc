@@ -13,7 +13,7 @@ constexpr double kPixelMm = 1.5;
 constexpr double kTileMm = 40.0;
 constexpr double kSearchMm = 12.0;
 constexpr double kSmoothMm = 15.0;  // slower changes are scatter and hardening, not anatomy
-constexpr double kMinField = 0.9;   // share of a tile that must lie in the field
+constexpr double kMinField = 0.6;   // share of a tile that must lie in the field
 constexpr double kMinCorrelation = 0.7;
 constexpr double kMaxDisplacementMm = 2.0;
 constexpr double kMinGain = 0.1;  // of correlation, by moving the tile
@@ -44,7 +44,7 @@ std::vector<ViewConsistency> regional_consistency(const RendererPyramid& rendere
       for (int column = 0; column + edge <= xray.columns; column += edge / 2) {
         const PixelSquare square{.column = column, .row = row, .edge = edge};
         if (share_inside(level.field, square) < kMinField) continue;
-        const SquareMatch match = best_match(xray, square, drr, reach);
+        const SquareMatch match = best_match(xray, level.field, square, drr, reach);
         Tile tile{.center_px = (factor * Eigen::Vector2d(column + 0.5 * edge, row + 0.5 * edge)).array() - 0.5,
                   .width_px = factor * edge,
                   .displacement_mm = match.displacement_px / px_per_mm,

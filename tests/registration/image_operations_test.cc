@@ -29,12 +29,14 @@ Image<float> pattern_moved_by(double columns, double rows, int size = 64) {
   return image;
 }
 
+Image<std::uint8_t> whole() { return {64, 64, 1}; }
+
 TEST(ImageOperations, BestMatchFindsAShiftToAFractionOfAPixel) {
   const PixelSquare square{.column = 20, .row = 24, .edge = 16};
   for (const Eigen::Vector2d& moved :
        std::array<Eigen::Vector2d, 5>{{{0, 0}, {3, -2}, {2.3, -1.6}, {-5.5, 4.25}, {-0.2, 0.4}}}) {
     const SquareMatch match =
-        best_match(pattern_moved_by(0, 0), square, pattern_moved_by(moved.x(), moved.y()), /*reach_px=*/8);
+        best_match(pattern_moved_by(0, 0), whole(), square, pattern_moved_by(moved.x(), moved.y()), /*reach_px=*/8);
     // The parabola through three values is not quite the top of a correlation.
     EXPECT_THAT(match.displacement_px, VectorNear(moved, 0.1)) << moved.transpose();
     EXPECT_GT(match.correlation_there, 0.98);
@@ -51,22 +53,44 @@ TEST(ImageOperations, BestMatchFindsAShiftToAFractionOfAPixel) {
 TEST(ImageOperations, BestMatchIsBlindToBrightnessAndContrast) {
   Image<float> other = pattern_moved_by(2, 1);
   for (float& pixel : other.pixels) pixel = 100.0F + 7.0F * pixel;
-  const SquareMatch match = best_match(pattern_moved_by(0, 0), {.column = 20, .row = 24, .edge = 16}, other, 6);
+  const SquareMatch match =
+      best_match(pattern_moved_by(0, 0), whole(), {.column = 20, .row = 24, .edge = 16}, other, 6);
   EXPECT_THAT(match.displacement_px, VectorNear(Eigen::Vector2d(2, 1), 0.1));
   EXPECT_NEAR(match.correlation_there, 1.0, 1e-4);
 }
 
 TEST(ImageOperations, BestMatchSearchesNoFurtherThanItsReachAndTheImage) {
   const Image<float> image = pattern_moved_by(0, 0);
-  const SquareMatch within = best_match(image, {.column = 20, .row = 24, .edge = 16}, pattern_moved_by(9, 0), 4);
+  const SquareMatch within =
+      best_match(image, whole(), {.column = 20, .row = 24, .edge = 16}, pattern_moved_by(9, 0), 4);
   EXPECT_LE(within.displacement_px.cwiseAbs().maxCoeff(), 4.0);
   // In the corners, half of the search lies outside.
   for (const auto& [column, row] : {std::pair(0, 0), {48, 0}, {0, 48}, {48, 48}}) {
     const double toward_x = column == 0 ? 2.0 : -2.0, toward_y = row == 0 ? 3.0 : -3.0;
     const SquareMatch match =
-        best_match(image, {.column = column, .row = row, .edge = 16}, pattern_moved_by(toward_x, toward_y), 6);
+        best_match(image, whole(), {.column = column, .row = row, .edge = 16}, pattern_moved_by(toward_x, toward_y), 6);
     EXPECT_THAT(match.displacement_px, VectorNear(Eigen::Vector2d(toward_x, toward_y), 0.1)) << column << ", " << row;
   }
+}
+
+TEST(ImageOperations, BestMatchLooksOnlyInsideTheMask) {
+  const PixelSquare square{.column = 20, .row = 24, .edge = 16};
+  Image<float> disturbed = pattern_moved_by(0, 0);
+  Image<std::uint8_t> mask = whole();
+  for (int row = 24; row < 40; ++row)
+    for (int column = 20; column < 24; ++column) {
+      disturbed.at(column, row) += static_cast<float>(10 * ((column + row) % 2));
+      mask.at(column, row) = 0;
+    }
+  const Image<float> moved = pattern_moved_by(3, -2);
+  EXPECT_LT(best_match(disturbed, whole(), square, moved, 6).correlation_there, 0.5);
+  const SquareMatch match = best_match(disturbed, mask, square, moved, 6);
+  EXPECT_THAT(match.displacement_px, VectorNear(Eigen::Vector2d(3, -2), 0.15));  // less to see, a broader top
+  EXPECT_NEAR(match.correlation_there, 1.0, 1e-4);
+  // Where the other image is constant, nothing matches.
+  const SquareMatch none = best_match(disturbed, mask, square, Image<float>(64, 64, 0.3F), 6);
+  EXPECT_LT(none.correlation_there, 0.5);
+  EXPECT_LT(none.correlation_here, 0.5);
 }
 
 TEST(ImageOperations, AMaskGrowsByADisc) {
@@ -112,7 +136,8 @@ TEST(ImageOperations, ShareInsideCountsTheSquaresPixels) {
 // A square of open field, where the receptor is saturated, says nothing.
 TEST(ImageOperations, AConstantSquareMatchesNowhere) {
   const Image<float> constant(64, 64, 0.0F);
-  const SquareMatch match = best_match(constant, {.column = 20, .row = 24, .edge = 16}, pattern_moved_by(0, 0), 6);
+  const SquareMatch match =
+      best_match(constant, whole(), {.column = 20, .row = 24, .edge = 16}, pattern_moved_by(0, 0), 6);
   EXPECT_LT(match.correlation_there, 0.5);
   EXPECT_LT(match.correlation_here, 0.5);
 }

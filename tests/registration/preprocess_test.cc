@@ -91,8 +91,15 @@ TEST(Preprocess, WhatIsCutOffIsLeftOutOfTheField) {
   EXPECT_EQ(prepare(saturated).field.at(100, 100), 1);
   EXPECT_EQ(prepare(windowed).field.at(150, 100), 1);
   EXPECT_EQ(prepare(windowed).field.at(100, 100), 0);
-  for (int column = 145; column < 155; ++column) xray.values.at(column, 100) = 2000.0F;
-  EXPECT_EQ(prepare(xray).field.at(150, 100), 1);
+}
+
+TEST(Preprocess, SinglePixelsAtTheEndOfTheRangeAreNoise) {
+  XrayImage xray = collimated([](int, int) { return true; });
+  for (int row = 40; row < 160; row += 3)
+    for (int column = 40; column < 160; column += 2) xray.values.at(column, row) = 2000.0F;
+  const FixedImage image = prepare(xray);
+  for (int row = 40; row < 160; ++row)
+    for (int column = 40; column < 160; ++column) ASSERT_EQ(image.field.at(column, row), 1) << column << " " << row;
 }
 
 TEST(Preprocess, ReducedImagesAverageAndKeepTheField) {

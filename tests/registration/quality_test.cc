@@ -194,6 +194,18 @@ TEST(Quality, PartsThatDisagreeNeedReview) {
   expect_accepted([](RegistrationResult& result) { result.views[0].consistency = parts(2, 0, 30); });
 }
 
+TEST(Quality, MorePartsMayDisagreeWhereAVolumeIsChosen) {
+  RegionOfInterest region{.volume = Volume<std::uint8_t>({4, 4, 4}, Eigen::Affine3d::Identity())};
+  region.volume->at(1, 1, 1) = 1;
+  const ProjectedRegion chosen(region);
+  RegistrationResult result = good_result();
+  result.views[0].consistency = parts(45, 5);
+  judge(kInside, {.region = &chosen}, result);
+  EXPECT_EQ(result.verdict, Verdict::kAccepted);
+  judge(kInside, {}, result);
+  EXPECT_EQ(result.verdict, Verdict::kReview);
+}
+
 TEST(Quality, AnAlternativeThatIsBetterNeedsReviewWhereverItLies) {
   const auto mirrored = [](double similarity, double distance_mm) {
     return [=](RegistrationResult& result) {
