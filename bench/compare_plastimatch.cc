@@ -35,6 +35,7 @@
 #include "geometry/error.h"
 #include "geometry/patient_setup.h"
 #include "io/ct_series.h"
+#include "io/decoder_process.h"
 #include "io/output_folder.h"
 #include "io/study_files.h"
 
@@ -276,6 +277,7 @@ void run(const Options& options) {
 }  // namespace isoshift
 
 int main(int argc, char** argv) try {
+  isoshift::use_decoder(ISOSHIFT_PROGRAM);
   isoshift::Options options;
   std::vector<std::string> renderers(isoshift::kRendererKinds.size());
   std::ranges::transform(isoshift::kRendererKinds, renderers.begin(), [](auto kind) { return to_string(kind); });

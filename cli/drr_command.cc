@@ -8,6 +8,7 @@
 #include "cli/study_options.h"
 #include "cli/truth.h"
 #include "geometry/error.h"
+#include "io/drr_image.h"
 #include "io/image_files.h"
 #include "io/output_folder.h"
 #include "io/report/pictures.h"
@@ -20,8 +21,15 @@ struct DrrOptions {
   RenderingOptions rendering;
   std::filesystem::path output;
   std::filesystem::path setup_error;  // empty: the planned pose
+  bool dicom = false;
   bool overwrite = false;
 };
+
+// Distances on the receptor between neighboring columns and rows.
+std::array<double, 2> pixel_size_mm(const XrayView& view) {
+  const Eigen::Vector3d first = view.ray(0, 0).pixel_room_mm;
+  return {(view.ray(1, 0).pixel_room_mm - first).norm(), (view.ray(0, 1).pixel_room_mm - first).norm()};
+}
 
 void run_drr(const DrrOptions& options, Console& console) {
   OutputFolder output(options.output, options.overwrite);
@@ -39,17 +47,20 @@ void run_drr(const DrrOptions& options, Console& console) {
   for (const auto& [name, value] : options.rendering.settings()) listing += fmt::format(", {} {}", name, value);
   listing += fmt::format("; attenuation {}, threshold {:.0f} HU\n", options.rendering.attenuation_name(),
                          options.rendering.threshold_hu);
+  const std::string series_instance_uid = new_uid();
   for (std::size_t n = 0; n < study.xrays.size(); ++n) {
     const XrayView& view = study.xrays[n].view;
     const RenderResult drrs = renderer->render(std::span(&view, 1), pose, PixelSet::all());
     const Image<float> image = image_of(view, drrs.line_integrals(0, 0));
     require_not_empty(image.pixels, study.xrays[n].label);
     const std::string name = fmt::format("drr{}", n + 1);
-    const Eigen::Vector2d spacing_mm = study.rt_images[n].pixel_spacing_mm.value();
     write_line_integral_png(output.path() / (name + ".png"), image);
-    write_mha(output.path() / (name + ".mha"), image, {spacing_mm.y(), spacing_mm.x()});
-    listing += fmt::format("{}.png {}.mha  {}: {} x {} pixels, line integrals up to {:.3f}\n", name, name,
-                           study.xrays[n].label, view.columns, view.rows, *std::ranges::max_element(image.pixels));
+    write_mha(output.path() / (name + ".mha"), image, pixel_size_mm(view));
+    if (options.dicom)
+      write_drr_image(study, n, image, setup_error, series_instance_uid, output.path() / (name + ".dcm"));
+    listing += fmt::format("{}.png {}.mha {} {}: {} x {} pixels, line integrals up to {:.3f}\n", name, name,
+                           options.dicom ? name + ".dcm " : "", study.xrays[n].label, view.columns, view.rows,
+                           *std::ranges::max_element(image.pixels));
   }
   output.commit();
   console.out << listing;
@@ -63,11 +74,13 @@ void add_drr_command(CLI::App& app, Console& console, int&) {
   command->footer(
       "\nExample:\n  isoshift drr exported/ -o drr                               # patient as planned\n"
       "  isoshift drr exported/ -o drr --setup-error out/result.json  # patient as found\n\n"
-      "Writes a picture (PNG) and the line integrals (MetaImage) per X-ray of the study.");
+      "Writes a picture (PNG) and the line integrals (MetaImage) per X-ray of the study, with --dicom an RT Image, "
+      "too.");
   add_study_options(*command, options->study);
   command->add_option("-o,--output", options->output, "Folder for the images")->required()->type_name("FOLDER");
   command->add_option("--setup-error", options->setup_error, "result.json or truth.json: how the patient lies")
       ->type_name("FILE");
+  command->add_flag("--dicom", options->dicom, "Write DICOM RT Images (image type DRR), too");
   command->add_flag("--overwrite", options->overwrite, "Replace an earlier output in that folder");
   add_rendering_options(*command, options->rendering);
   command->callback([options, &console] { run_drr(*options, console); });

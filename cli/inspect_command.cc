@@ -39,10 +39,10 @@ std::string geometry_as_understood(const RtImage& image) {
   return text;
 }
 
-std::string describe_rt_image(const std::filesystem::path& path, const std::optional<std::string>& planned_position) {
-  RtImage image = read_rt_image_header(path);
+std::string describe_rt_image(RtImage image, const std::optional<std::string>& planned_position) {
   if (!image.patient_position) image.patient_position = planned_position;
-  std::string text = fmt::format("RT Image \"{}\", {}\n", image.label, path.string());
+  std::string text =
+      fmt::format("{} \"{}\", {}\n", image.is_rt_image() ? "RT Image" : "X-ray", image.label, image.path.string());
   text += line("image type", image.image_type) + line("pixels", fmt::format("{} x {}", image.columns, image.rows)) +
           line("values origin", or_missing(image.reported_values_origin)) +
           line("SAD, SID", or_missing(image.sad_mm, "mm") + ", " + or_missing(image.sid_mm, "mm")) +
@@ -142,13 +142,20 @@ void run_inspect(const std::vector<std::filesystem::path>& paths, Console& conso
     planned_position = common_patient_position(plan, plan.beams);
   }
   for (const StudyFiles::Ct& ct : files.cts) console.out << describe_ct(ct.series_instance_uid, ct.files, console);
-  for (const StudyFiles::Image& image : files.images) console.out << describe_rt_image(image.file, planned_position);
+  for (const auto& images : {files.images, files.other_xrays})
+    for (const StudyFiles::Image& file : images) {
+      Notes notes;
+      for (const RtImage& image : read_rt_images(file.file, notes))
+        console.out << describe_rt_image(image, planned_position);
+      for (const std::string& warning : notes.warnings) console.out << "note: " << warning << "\n";
+    }
   for (const auto& structures : files.structures) console.out << describe_structures(structures.file);
   for (const std::string& file : files.left_aside) console.out << "left aside: " << file << "\n";
   for (const std::string& reason : files.unreadable) console.out << "unreadable: " << reason << "\n";
   if (!files.unreadable.empty())
     throw Error(fmt::format("{} of the files cannot be read; see above", files.unreadable.size()));
-  if (files.cts.empty() && files.images.empty() && files.plans.empty() && files.structures.empty())
+  if (files.cts.empty() && files.images.empty() && files.other_xrays.empty() && files.plans.empty() &&
+      files.structures.empty())
     throw Error(fmt::format("{}: nothing that isoshift reads", paths.front().string()));
 }
 

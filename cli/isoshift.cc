@@ -1,4 +1,5 @@
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <exception>
@@ -44,10 +45,11 @@ int run_isoshift(int argc, const char* const* argv, Console& console) {
   try {
     // CLI11 would say only that a command is missing.
     const auto commands = app.get_subcommands({});
+    std::vector<std::string> names;
+    std::ranges::transform(commands, std::back_inserter(names), &CLI::App::get_name);
     const auto is_chosen = [&](const CLI::App* command) { return command->get_name() == argv[1]; };
     if (argc > 1 && argv[1][0] != '-' && std::ranges::none_of(commands, is_chosen))
-      throw UsageError(fmt::format(
-          "there is no command {}; the commands are inspect, register, drr, phantom, evaluate and bench", argv[1]));
+      throw UsageError(fmt::format("there is no command {}; the commands are {}", argv[1], fmt::join(names, ", ")));
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() == 0) return app.exit(error, console.out, console.err);

@@ -2,9 +2,11 @@
 #include <unistd.h>
 
 #include <iostream>
+#include <string_view>
 #include <thread>
 
 #include "cli/commands.h"
+#include "io/decoder_process.h"
 #include "io/output_folder.h"
 
 namespace {
@@ -28,6 +30,9 @@ void end_cleanly_on_signals() {
 }  // namespace
 
 int main(int argc, char** argv) {
+  // Not a command for people: the child that decodes compressed pixels.
+  if (argc == 2 && std::string_view(argv[1]) == "__decode") return isoshift::run_decoder();
+  isoshift::use_decoder("/proc/self/exe");
   end_cleanly_on_signals();
   isoshift::Console console{.out = std::cout, .err = std::cerr, .err_is_terminal = ::isatty(STDERR_FILENO) == 1};
   return isoshift::run_isoshift(argc, argv, console);

@@ -95,7 +95,8 @@ SetupReport make_report(const RegisterOptions& options, const Study& study, cons
     const std::optional<LeftOutView>& left_out = result.views[n].left_out;
     report.views.push_back({.label = study.rt_images[n].label,
                             .sop_instance_uid = study.rt_images[n].sop_instance_uid,
-                            .gantry_deg = study.rt_images[n].gantry_angle_deg.value(),
+                            .frame = study.rt_images[n].frame + 1,
+                            .gantry_deg = study.rt_images[n].gantry_angle_deg,
                             .similarity_start = result.views[n].similarity_start,
                             .similarity_final = result.views[n].similarity_final,
                             .left_out_mm = left_out ? std::optional(left_out->distance_mm) : std::nullopt,
@@ -123,6 +124,7 @@ SetupReport make_report(const RegisterOptions& options, const Study& study, cons
   report.seconds_register = result.seconds;
   report.seconds_rendering = result.seconds_rendering;
   report.seconds_similarity = result.seconds_similarity;
+  if (study.machine) report.machine = {study.machine->name, study.machine->sha256};
   report.ct_series_uid = study.ct.series_instance_uid;
   report.plan_uid = study.plan ? study.plan->sop_instance_uid : "";
   return report;

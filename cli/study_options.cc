@@ -69,6 +69,7 @@ StudyRequest StudyOptions::request() const {
   if (!intensity.empty()) request.switches.intensity = pixel_intensity_from(intensity);
   if (!beam.empty()) request.switches.beam = beam == "kv" ? Beam::kKilovoltage : Beam::kMegavoltage;
   if (!patient_position.empty()) request.switches.patient_position = patient_position_from(patient_position);
+  if (!machine.empty()) request.machine = read_machine_profile(machine);
   for (const std::string& text : allow) {
     const auto [key, reason] = key_and_value(text, "--allow");
     if (std::ranges::find(kAllowKeys, key, &AllowKey::key) == std::end(kAllowKeys))
@@ -83,7 +84,9 @@ void add_study_options(CLI::App& command, StudyOptions& options) {
       ->type_name("FOLDER");
   const char* parts = "Parts of the study";
   command.add_option("--ct", options.ct, "Folder or files of the planning CT")->type_name("PATH")->group(parts);
-  command.add_option("--image", options.images, "RT Images (X-rays), files or folders")
+  command
+      .add_option("--image", options.images,
+                  "RT Images (X-rays), files or folders; with --machine X-rays of other classes, too")
       ->type_name("PATH")
       ->group(parts);
   command.add_option("--plan", options.plan, "RT Plan")->type_name("FILE")->group(parts);
@@ -124,6 +127,11 @@ void add_study_options(CLI::App& command, StudyOptions& options) {
       ->group(lacking);
   command.add_option("--beam", options.beam, "Beam quality of all images")
       ->check(CLI::IsMember({"kv", "mv"}))
+      ->group(lacking);
+  command
+      .add_option("--machine", options.machine,
+                  "Machine profile: what a machine's files lack or say wrongly (docs/machine-profile.md)")
+      ->type_name("FILE")
       ->group(lacking);
   command.add_option("--allow", options.allow, allow_keys_help())->type_name("KEY=REASON")->group(lacking);
 }

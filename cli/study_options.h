@@ -13,7 +13,7 @@
 namespace isoshift {
 
 struct StudyOptions {
-  std::filesystem::path study, plan, structures;
+  std::filesystem::path study, plan, structures, machine;
   std::vector<std::filesystem::path> ct, images;
   std::vector<double> isocenter, rt_image_position;
   std::vector<std::string> gantry_angles, allow;

@@ -1,5 +1,10 @@
 #include "geometry/xray_view.h"
 
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "geometry/error.h"
 #include "geometry/rotation.h"
 
 namespace isoshift {
@@ -55,6 +60,24 @@ XrayView make_xray_view(const CarmGeometry& geometry, Beam beam) {
   view.columns = geometry.columns;
   view.rows = geometry.rows;
   view.beam = beam;
+  return view;
+}
+
+XrayView xray_view_from_matrix(const Eigen::Matrix<double, 3, 4>& pixel_from_room, double sid_mm, int columns, int rows,
+                               Beam beam) {
+  const Eigen::Matrix3d turned = pixel_from_room.leftCols<3>();
+  if (!pixel_from_room.allFinite() || !(std::abs(turned.determinant()) > 1e-12 * std::pow(turned.norm(), 3)))
+    throw Error("the projection matrix has no source: its first three columns are not independent");
+  // The third coordinate counts from 0 in the source to 1 on the receptor, along the receptor's normal.
+  XrayView view{.pixel_from_room = pixel_from_room / (turned.row(2).norm() * sid_mm),
+                .columns = columns,
+                .rows = rows,
+                .beam = beam};
+  if (view.pixel_from_room(2, 3) < 0.0) view.pixel_from_room = -view.pixel_from_room;
+  view.source_room_mm = -turned.inverse() * pixel_from_room.col(3);
+  if (!(view.pixel_from_room(2, 3) > 0.0 && view.pixel_from_room(2, 3) < 1.0))
+    throw Error(fmt::format(
+        "the projection matrix and the SID of {} mm put the isocenter not between source and receptor", sid_mm));
   return view;
 }
 

@@ -1,11 +1,14 @@
 #include "io/ct_series.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <cmath>
 #include <mutex>
+#include <optional>
+#include <set>
 
 #include "geometry/error.h"
 #include "io/decode.h"
@@ -31,13 +34,20 @@ struct Slice {
   std::vector<float> hu;
 };
 
+void check_size(const std::string& where, const PixelFormat& format, int slices) {
+  if (static_cast<double>(format.pixels_per_frame()) * slices > kMaxVoxels)
+    throw Error(fmt::format("{}: {} x {} x {} voxels are more than this program takes", where, format.columns,
+                            format.rows, slices));
+}
+
 // Stored values outside the padding range become HU; padding and anything below air becomes air.
-std::vector<float> hu_from_stored(const DicomItem& dataset, const std::vector<std::int32_t>& stored_values) {
-  const double slope = dataset.required_number(DCM_RescaleSlope);
-  const double intercept = dataset.required_number(DCM_RescaleIntercept);
-  if (slope == 0.0) throw Error(fmt::format("{}: {} is 0", dataset.where(), described(DCM_RescaleSlope)));
-  if (const auto type = dataset.text(DCM_RescaleType); type && *type != "HU")
-    throw Error(fmt::format("{}: {} is {}, expected HU", dataset.where(), described(DCM_RescaleType), *type));
+std::vector<float> hu_from_stored(const DicomItem& dataset, const DicomItem& rescale,
+                                  const std::vector<std::int32_t>& stored_values) {
+  const double slope = rescale.required_number(DCM_RescaleSlope);
+  const double intercept = rescale.required_number(DCM_RescaleIntercept);
+  if (slope == 0.0) throw Error(fmt::format("{}: {} is 0", rescale.where(), described(DCM_RescaleSlope)));
+  if (const auto type = rescale.text(DCM_RescaleType); type && *type != "HU")
+    throw Error(fmt::format("{}: {} is {}, expected HU", rescale.where(), described(DCM_RescaleType), *type));
 
   // The padding attributes are US or SS like the pixels (PS3.3 C.7.5.1.1.2); implicit VR files say US for both.
   const bool is_signed = dataset.required_number(DCM_PixelRepresentation) != 0;
@@ -58,37 +68,116 @@ std::vector<float> hu_from_stored(const DicomItem& dataset, const std::vector<st
   return hu;
 }
 
-Slice read_slice(const std::filesystem::path& path) {
-  DicomFile file = DicomFile::read(path, DicomFile::Extent::kWhole);
-  const DicomItem dataset = file.dataset();
+// Where a frame lies: attributes of a CT Image itself, of an Enhanced CT's frames those of three macros.
+struct FrameGeometry {
+  DicomItem position, orientation, spacing, rescale;
+};
+
+// The functional groups of an Enhanced CT (PS3.3 C.7.6.16): a macro is a frame's own, else the one that all share.
+class FunctionalGroups {
+ public:
+  explicit FunctionalGroups(const DicomItem& dataset)
+      : where_(dataset.where()),
+        frames_(dataset.items(DCM_PerFrameFunctionalGroupsSequence)),
+        shared_(dataset.items(DCM_SharedFunctionalGroupsSequence)) {}
+
+  std::size_t frames() const { return frames_.size(); }
+
+  std::optional<DicomItem> find(std::size_t frame, const DcmTagKey& macro) const {
+    if (const auto own = frames_[frame].items(macro); !own.empty()) return own.front();
+    for (const DicomItem& group : shared_)
+      if (const auto items = group.items(macro); !items.empty()) return items.front();
+    return std::nullopt;
+  }
+  DicomItem required(std::size_t frame, const DcmTagKey& macro) const {
+    auto item = find(frame, macro);
+    if (!item) throw Error(fmt::format("{} frame {}: {} is missing", where_, frame + 1, described(macro)));
+    return *item;
+  }
+
+ private:
+  std::string where_;
+  std::vector<DicomItem> frames_, shared_;
+};
+
+Slice slice_at(const FrameGeometry& geometry, const DicomItem& dataset, const std::string& where) {
   Slice slice;
-  slice.where = dataset.where();
+  slice.where = where;
   slice.sop_instance_uid = dataset.required_text(DCM_SOPInstanceUID);
   slice.frame_of_reference_uid = dataset.required_text(DCM_FrameOfReferenceUID);
-  slice.position_mm = Eigen::Vector3d(dataset.required_numbers(DCM_ImagePositionPatient, 3).data());
-  const std::vector<double> orientation = dataset.required_numbers(DCM_ImageOrientationPatient, 6);
+  slice.position_mm = Eigen::Vector3d(geometry.position.required_numbers(DCM_ImagePositionPatient, 3).data());
+  const std::vector<double> orientation = geometry.orientation.required_numbers(DCM_ImageOrientationPatient, 6);
   slice.row_direction = Eigen::Vector3d(orientation.data());
   slice.column_direction = Eigen::Vector3d(orientation.data() + 3);
-  const std::vector<double> spacing = dataset.required_numbers(DCM_PixelSpacing, 2);
+  const std::vector<double> spacing = geometry.spacing.required_numbers(DCM_PixelSpacing, 2);
   slice.row_spacing_mm = spacing[0];
   slice.column_spacing_mm = spacing[1];
   if (spacing[0] <= 0.0 || spacing[1] <= 0.0)
-    throw Error(fmt::format("{}: {} is {}\\{}, expected positive", slice.where, described(DCM_PixelSpacing), spacing[0],
-                            spacing[1]));
-  slice.format = pixel_format(dataset);
-  slice.hu = hu_from_stored(dataset, decode_pixels(file, slice.format));
+    throw Error(
+        fmt::format("{}: {} is {}\\{}, expected positive", where, described(DCM_PixelSpacing), spacing[0], spacing[1]));
   return slice;
 }
 
+// One volume of one time: which of several is meant must not be guessed.
+void check_one_volume(const DicomItem& dataset, const FunctionalGroups& groups, const PixelFormat& format) {
+  if (groups.frames() != static_cast<std::size_t>(format.frames))
+    throw Error(fmt::format("{}: {} has {} items, expected one for each of {} frames", dataset.where(),
+                            described(DCM_PerFrameFunctionalGroupsSequence), groups.frames(), format.frames));
+  if (dataset.has_value(DCM_ConcatenationUID) && dataset.number(DCM_InConcatenationTotalNumber) != 1)
+    throw Error(fmt::format("{}: is part of a concatenation ({}), which is not read in parts", dataset.where(),
+                            described(DCM_ConcatenationUID)));
+  std::set<std::string> volumes;
+  for (std::size_t frame = 0; frame < groups.frames(); ++frame)
+    if (const auto content = groups.find(frame, DCM_FrameContentSequence))
+      volumes.insert(fmt::format("stack {} at time {}", content->text(DCM_StackID).value_or("1"),
+                                 content->number(DCM_TemporalPositionIndex).value_or(1)));
+  if (volumes.size() > 1)
+    throw Error(fmt::format("{}: holds {} volumes ({}), expected one.\n       Export the one that was planned on",
+                            dataset.where(), volumes.size(), fmt::join(volumes, ", ")));
+}
+
+// The slices of one file: one of a CT Image, all frames of an Enhanced CT (A.38).
+std::vector<Slice> read_slices_of(const std::filesystem::path& path) {
+  const DicomFile file = DicomFile::read(path, DicomFile::Extent::kWhole);
+  const DicomItem dataset = file.dataset();
+  const PixelFormat format = pixel_format(dataset);
+  check_size(dataset.where(), format, format.frames);
+  const FunctionalGroups groups(dataset);
+  const bool is_enhanced = groups.frames() > 0;
+  if (is_enhanced)
+    check_one_volume(dataset, groups, format);
+  else if (format.frames != 1)
+    throw Error(fmt::format("{}: {} is {}, expected 1 for a CT Image", dataset.where(), described(DCM_NumberOfFrames),
+                            format.frames));
+  std::vector<Slice> slices;
+  for (std::size_t frame = 0; frame < static_cast<std::size_t>(format.frames); ++frame) {
+    FrameGeometry geometry{dataset, dataset, dataset, dataset};
+    std::string where = dataset.where();
+    if (is_enhanced) {
+      geometry = {.position = groups.required(frame, DCM_PlanePositionSequence),
+                  .orientation = groups.required(frame, DCM_PlaneOrientationSequence),
+                  .spacing = groups.required(frame, DCM_PixelMeasuresSequence),
+                  .rescale = groups.required(frame, DCM_PixelValueTransformationSequence)};
+      where += fmt::format(" frame {}", frame + 1);
+    }
+    slices.push_back(slice_at(geometry, dataset, where));
+    slices.back().format = format;
+    slices.back().hu = hu_from_stored(dataset, geometry.rescale, decode_frame(file, format, static_cast<int>(frame)));
+  }
+  return slices;
+}
+
 std::vector<Slice> read_slices(std::span<const std::filesystem::path> files, const Progress& progress) {
-  std::vector<Slice> slices(files.size());
+  std::vector<std::vector<Slice>> of_files(files.size());
   std::mutex mutex;
   std::size_t done = 0;
   tbb::parallel_for(std::size_t{0}, files.size(), [&](std::size_t n) {
-    slices[n] = read_slice(files[n]);
+    of_files[n] = read_slices_of(files[n]);
     const std::lock_guard lock(mutex);
     if (progress) progress(++done, files.size());
   });
+  std::vector<Slice> slices;
+  for (std::vector<Slice>& of_file : of_files) std::ranges::move(of_file, std::back_inserter(slices));
   return slices;
 }
 
@@ -211,9 +300,7 @@ Volume<float> assembled(std::vector<Slice>& slices, const Eigen::Matrix3d& axes,
   const int count = findings.empty() ? static_cast<int>(slices.size())
                                      : static_cast<int>(std::floor(length_mm / spacing_mm + 1e-6)) + 1;
 
-  if (static_cast<double>(first.format.columns) * first.format.rows * count > kMaxVoxels)
-    throw Error(fmt::format("CT series {}: {} x {} x {} voxels are more than this program takes", series,
-                            first.format.columns, first.format.rows, count));
+  check_size("CT series " + series, first.format, count);
 
   Eigen::Affine3d patient_from_voxel;
   patient_from_voxel.makeAffine();
@@ -228,7 +315,7 @@ Volume<float> assembled(std::vector<Slice>& slices, const Eigen::Matrix3d& axes,
 
 CtSeries read_ct_series(std::span<const std::filesystem::path> files, const Allowances& allowed, Notes& notes,
                         const Progress& progress) {
-  if (files.size() < 2) throw Error(fmt::format("a CT series needs at least 2 slices, found {}", files.size()));
+  if (files.empty()) throw Error("a CT series needs at least 2 slices, found none");
   const DicomFile file = DicomFile::read(files.front(), DicomFile::Extent::kHeader);
   const DicomItem header = file.dataset();
   CtSeries series;
@@ -248,7 +335,9 @@ CtSeries read_ct_series(std::span<const std::filesystem::path> files, const Allo
   drop_duplicates(slices, axes.col(2), notes);
   if (slices.size() < 2) throw Error(fmt::format("CT series {}: only one slice", series.series_instance_uid));
   series.hu = assembled(slices, axes, series.series_instance_uid, allowed, notes);
-  for (const Slice& slice : slices) series.sop_instance_uids.push_back(slice.sop_instance_uid);
+  for (const Slice& slice : slices)
+    if (std::ranges::find(series.sop_instance_uids, slice.sop_instance_uid) == series.sop_instance_uids.end())
+      series.sop_instance_uids.push_back(slice.sop_instance_uid);
   return series;
 }
 

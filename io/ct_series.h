@@ -1,5 +1,6 @@
 #pragma once
-// A CT series as one volume in HU (PS3.3 C.8.2.1, C.7.6.2; rules CT-1 to CT-14 of docs/dicom.md).
+// A CT series as one volume in HU (PS3.3 C.8.2.1, C.7.6.2; rules CT-1 to CT-14 of docs/dicom.md): CT Images, or one or
+// more Enhanced CT Images (A.38), converted ones too.
 
 #include <filesystem>
 #include <functional>
@@ -21,7 +22,7 @@ struct CtSeries {
   std::string frame_of_reference_uid;
   std::string body_part_examined;
   std::string patient_position;                // of the scan; annotation only (C.7.3.1.1.2)
-  std::vector<std::string> sop_instance_uids;  // in the order of the slices
+  std::vector<std::string> sop_instance_uids;  // each once, in the order of the slices
 };
 
 // Called with (slices done, slices in all), possibly from several threads, never at the same time.

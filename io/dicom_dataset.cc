@@ -203,6 +203,14 @@ DicomItem DicomItem::append_item(const DcmTagKey& sequence) {
   return DicomItem(*item, fmt::format("{}: {}", where_, described(sequence)));
 }
 
+DicomItem DicomItem::append_reference(const DcmTagKey& sequence, std::string_view sop_class_uid,
+                                      std::string_view instance_uid) {
+  DicomItem item = append_item(sequence);
+  item.put(DCM_ReferencedSOPClassUID, sop_class_uid);
+  item.put(DCM_ReferencedSOPInstanceUID, instance_uid);
+  return item;
+}
+
 void DicomItem::put_empty_sequence(const DcmTagKey& sequence) {
   check(item_->insertEmptyElement(sequence), where_, described(sequence));
 }
@@ -242,12 +250,19 @@ void DicomFile::write(const std::filesystem::path& path) {
         where, "cannot be written");
 }
 
-bool has_dicom_magic(const std::filesystem::path& path) {
+bool begins_like_dicom(const std::filesystem::path& path) {
   std::ifstream stream(path, std::ios::binary);
   std::array<char, 132> head{};
   if (!stream) throw Error(fmt::format("{}: cannot be opened: {}", path.string(), std::strerror(errno)));
   stream.read(head.data(), head.size());
-  return stream.gcount() == 132 && std::string_view(head.data() + 128, 4) == "DICM";
+  if (stream.gcount() < 132) return false;
+  const std::string_view begin(head.data(), head.size());
+  if (begin.substr(128) == "DICM") return true;
+  // Little endian: an element of group 0008 up to SOP Instance UID, with its VR or, in implicit VR, a short length.
+  const auto byte = [&](std::size_t n) { return static_cast<unsigned char>(head[n]); };
+  if (byte(0) != 0x08 || byte(1) != 0 || byte(2) > 0x18 || byte(3) != 0) return false;
+  const std::string_view vr = begin.substr(4, 2);
+  return vr == "UL" || vr == "CS" || vr == "UI" || vr == "DA" || vr == "TM" || (byte(6) == 0 && byte(7) == 0);
 }
 
 std::string ds_from(double number) {

@@ -51,6 +51,7 @@ class DicomItem {
   void put(const DcmTagKey& tag, double number) { put(tag, std::span(&number, 1)); }
   void put_pixels(std::span<const std::uint16_t> stored_values);
   DicomItem append_item(const DcmTagKey& sequence);
+  DicomItem append_reference(const DcmTagKey& sequence, std::string_view sop_class_uid, std::string_view instance_uid);
   void put_empty_sequence(const DcmTagKey& sequence);
   void erase(const DcmTagKey& tag);
 
@@ -82,8 +83,9 @@ class DicomFile {
   std::filesystem::path path_;
 };
 
-// Whether the file begins like a DICOM file (PS3.10): 128 bytes, then "DICM". Throws Error if it cannot be read.
-bool has_dicom_magic(const std::filesystem::path& path);
+// Whether the file begins like a DICOM file: 128 bytes, then "DICM" (PS3.10), or, as old exports do, with the first
+// element of a dataset. Throws Error if it cannot be read.
+bool begins_like_dicom(const std::filesystem::path& path);
 
 // A DS value: at most 16 bytes, the nearest decimal that fits, 0 for what is smaller than 1e-12.
 std::string ds_from(double number);

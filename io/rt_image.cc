@@ -1,5 +1,6 @@
 #include "io/rt_image.h"
 
+#include <dcmtk/dcmdata/dcuid.h>
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -13,32 +14,53 @@ namespace {
 
 constexpr double kMaxAngleNoiseDeg = 0.01;  // read-outs such as 359.998 mean 0
 
-// The exposure's value where it has one, else the top level's. Several exposures must agree.
-std::optional<double> exposure_number(const DicomItem& dataset, const DcmTagKey& tag) {
-  const std::vector<DicomItem> exposures = dataset.items(DCM_ExposureSequence);
-  for (const DicomItem& exposure : exposures) {
-    const auto value = exposure.number(tag);
-    if (!value) continue;
-    if (exposures.size() > 1 && value != exposures.front().number(tag))
-      throw Error(fmt::format("{}: {} differs between exposures of one image", dataset.where(), described(tag)));
-    return value;
-  }
-  return dataset.number(tag);
+// The items of the Exposure Sequence that speak of one frame: of several frames those that name it.
+std::vector<DicomItem> exposures_of(const DicomItem& dataset, int frame, int frames) {
+  std::vector<DicomItem> exposures = dataset.items(DCM_ExposureSequence);
+  if (frames > 1)
+    std::erase_if(exposures, [&](const DicomItem& exposure) {
+      const auto number = exposure.number(DCM_ReferencedFrameNumber);
+      return number && *number != frame + 1;
+    });
+  return exposures;
 }
+
+// A dataset as one frame sees it: the exposure's value where it has one, else the top level's. Several exposures must
+// agree.
+class FrameAttributes {
+ public:
+  FrameAttributes(DicomItem dataset, int frame, int frames)
+      : dataset_(std::move(dataset)), exposures_(exposures_of(dataset_, frame, frames)) {}
+
+  std::optional<double> number(const DcmTagKey& tag) const {
+    for (const DicomItem& exposure : exposures_) {
+      const auto value = exposure.number(tag);
+      if (!value) continue;
+      if (exposures_.size() > 1 && value != exposures_.front().number(tag))
+        throw Error(fmt::format("{}: {} differs between exposures of one image", dataset_.where(), described(tag)));
+      return value;
+    }
+    return dataset_.number(tag);
+  }
+
+  // (lateral, longitudinal, vertical) where all three are there.
+  std::optional<Eigen::Vector3d> table_position() const {
+    const auto lateral = number(DCM_TableTopLateralPosition);
+    const auto longitudinal = number(DCM_TableTopLongitudinalPosition);
+    const auto vertical = number(DCM_TableTopVerticalPosition);
+    if (!lateral || !longitudinal || !vertical) return std::nullopt;
+    return Eigen::Vector3d(*lateral, *longitudinal, *vertical);
+  }
+
+ private:
+  DicomItem dataset_;
+  std::vector<DicomItem> exposures_;
+};
 
 template <int N>
 std::optional<Eigen::Matrix<double, N, 1>> vector_of(const DicomItem& dataset, const DcmTagKey& tag) {
   if (!dataset.has_value(tag)) return std::nullopt;
   return Eigen::Matrix<double, N, 1>(dataset.required_numbers(tag, N).data());
-}
-
-// (lateral, longitudinal, vertical) where all three are there.
-std::optional<Eigen::Vector3d> table_position(const DicomItem& dataset) {
-  const auto lateral = exposure_number(dataset, DCM_TableTopLateralPosition);
-  const auto longitudinal = exposure_number(dataset, DCM_TableTopLongitudinalPosition);
-  const auto vertical = exposure_number(dataset, DCM_TableTopVerticalPosition);
-  if (!lateral || !longitudinal || !vertical) return std::nullopt;
-  return Eigen::Vector3d(*lateral, *longitudinal, *vertical);
 }
 
 void expect_range(const RtImage& image, const DcmTagKey& tag, double value, double low, double high) {
@@ -52,6 +74,73 @@ void replace(std::optional<T>& value, const T& by, const std::string& what, cons
              Notes& notes) {
   notes.overrides.push_back(fmt::format("{}: {} by {}", what, value ? "replaced" : "supplied", switch_name));
   value = by;
+}
+
+RtImage read_frame(const std::filesystem::path& path, const DicomItem& d, const PixelFormat& format, int frame) {
+  const FrameAttributes attributes(d, frame, format.frames);
+  RtImage image;
+  image.path = path;
+  image.identity = read_identity(d);
+  image.sop_class_uid = d.required_text(DCM_SOPClassUID);
+  image.sop_instance_uid = d.required_text(DCM_SOPInstanceUID);
+  image.series_instance_uid = d.text(DCM_SeriesInstanceUID).value_or("");
+  image.frame_of_reference_uid = d.text(DCM_FrameOfReferenceUID);
+  image.label = d.text(DCM_RTImageLabel).value_or(path.stem().string());
+  image.frame = frame;
+  image.frames = format.frames;
+  if (format.frames > 1) image.label += fmt::format("#{}", frame + 1);
+  if (const auto type = d.texts(DCM_ImageType); type.size() > 2) image.image_type = type[2];
+  image.reported_values_origin = d.text(DCM_ReportedValuesOrigin);
+  image.patient_position = d.text(DCM_PatientPosition);
+  for (const DicomItem& plan : d.items(DCM_ReferencedRTPlanSequence))
+    image.plan_sop_instance_uid = plan.text(DCM_ReferencedSOPInstanceUID);
+  if (const auto number = d.number(DCM_ReferencedBeamNumber)) image.beam_number = static_cast<int>(*number);
+  image.acquisition_date = d.text(DCM_AcquisitionDate);
+  if (!image.acquisition_date) image.acquisition_date = d.text(DCM_ContentDate);
+  image.acquisition_time = d.text(DCM_AcquisitionTime);
+  if (!image.acquisition_time) image.acquisition_time = d.text(DCM_ContentTime);
+  image.kvp = attributes.number(DCM_KVP);
+
+  image.plane = d.text(DCM_RTImagePlane);
+  image.sad_mm = d.number(DCM_RadiationMachineSAD);
+  image.sid_mm = d.number(DCM_RTImageSID);
+  image.receptor_translation_mm = vector_of<3>(d, DCM_XRayImageReceptorTranslation);
+  image.receptor_angle_deg = d.number(DCM_XRayImageReceptorAngle);
+  if (d.has_value(DCM_RTImageOrientation)) image.orientation = d.required_numbers(DCM_RTImageOrientation, 6);
+  image.pixel_spacing_mm = vector_of<2>(d, DCM_ImagePlanePixelSpacing);
+  image.position_mm = vector_of<2>(d, DCM_RTImagePosition);
+  image.gantry_angle_deg = attributes.number(DCM_GantryAngle);
+  image.gantry_pitch_angle_deg = attributes.number(DCM_GantryPitchAngle);
+  image.collimator_angle_deg = attributes.number(DCM_BeamLimitingDeviceAngle);
+  image.support_angle_deg = attributes.number(DCM_PatientSupportAngle);
+  image.eccentric_angle_deg = attributes.number(DCM_TableTopEccentricAngle);
+  image.table_pitch_deg = attributes.number(DCM_TableTopPitchAngle);
+  image.table_roll_deg = attributes.number(DCM_TableTopRollAngle);
+  image.table_position_mm = attributes.table_position();
+  image.isocenter_mm = vector_of<3>(d, DCM_IsocenterPosition);
+
+  for (const auto& [keyword, tag] : kEquipmentAttributes)
+    if (const auto value = d.text(tag)) image.equipment[keyword] = *value;
+  image.columns = format.columns;
+  image.rows = format.rows;
+  image.intensity_relationship = d.text(DCM_PixelIntensityRelationship);
+  if (const auto sign = d.number(DCM_PixelIntensityRelationshipSign); sign && (*sign == 1 || *sign == -1))
+    image.intensity_sign = static_cast<int>(*sign);
+  image.photometric_interpretation = d.text(DCM_PhotometricInterpretation).value_or("");
+  image.has_modality_lut = !d.items(DCM_ModalityLUTSequence).empty();
+  return image;
+}
+
+// Both angles turn counter-clockwise seen from the source, which is how the image is displayed (PS3.3 C.8.8.2.7). An
+// image that is itself turned or mirrored on the receptor shows them turned back.
+double collimator_angle_on_image_rad(const RtImage& image) {
+  const std::vector<double> orientation = image.orientation.value_or(std::vector{1.0, 0.0, 0.0, 0.0, -1.0, 0.0});
+  const Eigen::Vector3d row_direction(orientation.data()), column_direction(orientation.data() + 3);
+  const double on_receptor_rad =
+      rad_from_deg(image.collimator_angle_deg.value_or(0.0) - image.receptor_angle_deg.value_or(0.0)) -
+      std::atan2(row_direction.y(), row_direction.x());
+  const bool is_mirrored = row_direction.cross(column_direction).z() > 0.0;
+  return is_mirrored ? -on_receptor_rad : on_receptor_rad;
 }
 
 }  // namespace
@@ -70,92 +159,76 @@ std::string to_string(const PixelIntensity& intensity) {
                      intensity.sign > 0 ? '+' : '-');
 }
 
-RtImage read_rt_image_header(const std::filesystem::path& path) {
+const std::map<std::string, DcmTagKey, std::less<>> kEquipmentAttributes = {
+    {"DetectorID", DCM_DetectorID},
+    {"DeviceSerialNumber", DCM_DeviceSerialNumber},
+    {"Manufacturer", DCM_Manufacturer},
+    {"ManufacturerModelName", DCM_ManufacturerModelName},
+    {"Modality", DCM_Modality},
+    {"RTImageLabel", DCM_RTImageLabel},
+    {"RadiationMachineName", DCM_RadiationMachineName},
+    {"SeriesDescription", DCM_SeriesDescription},
+    {"StationName", DCM_StationName},
+};
+
+bool RtImage::is_rt_image() const { return sop_class_uid == UID_RTImageStorage; }
+
+std::vector<RtImage> read_rt_images(const std::filesystem::path& path, Notes& notes) {
   const DicomFile file = DicomFile::read(path, DicomFile::Extent::kHeader);
-  const DicomItem d = file.dataset();
-  RtImage image;
-  image.path = path;
-  image.identity = read_identity(d);
-  image.sop_class_uid = d.required_text(DCM_SOPClassUID);
-  image.sop_instance_uid = d.required_text(DCM_SOPInstanceUID);
-  image.series_instance_uid = d.text(DCM_SeriesInstanceUID).value_or("");
-  image.frame_of_reference_uid = d.text(DCM_FrameOfReferenceUID);
-  image.label = d.text(DCM_RTImageLabel).value_or(path.stem().string());
-  if (const auto type = d.texts(DCM_ImageType); type.size() > 2) image.image_type = type[2];
-  image.reported_values_origin = d.text(DCM_ReportedValuesOrigin);
-  image.patient_position = d.text(DCM_PatientPosition);
-  for (const DicomItem& plan : d.items(DCM_ReferencedRTPlanSequence))
-    image.plan_sop_instance_uid = plan.text(DCM_ReferencedSOPInstanceUID);
-  if (const auto number = d.number(DCM_ReferencedBeamNumber)) image.beam_number = static_cast<int>(*number);
-  image.acquisition_date = d.text(DCM_AcquisitionDate);
-  if (!image.acquisition_date) image.acquisition_date = d.text(DCM_ContentDate);
-  image.acquisition_time = d.text(DCM_AcquisitionTime);
-  if (!image.acquisition_time) image.acquisition_time = d.text(DCM_ContentTime);
-  image.kvp = exposure_number(d, DCM_KVP);
-
-  image.plane = d.text(DCM_RTImagePlane);
-  image.sad_mm = d.number(DCM_RadiationMachineSAD);
-  image.sid_mm = d.number(DCM_RTImageSID);
-  image.receptor_translation_mm = vector_of<3>(d, DCM_XRayImageReceptorTranslation);
-  image.receptor_angle_deg = d.number(DCM_XRayImageReceptorAngle);
-  if (d.has_value(DCM_RTImageOrientation)) image.orientation = d.required_numbers(DCM_RTImageOrientation, 6);
-  image.pixel_spacing_mm = vector_of<2>(d, DCM_ImagePlanePixelSpacing);
-  image.position_mm = vector_of<2>(d, DCM_RTImagePosition);
-  image.gantry_angle_deg = exposure_number(d, DCM_GantryAngle);
-  image.gantry_pitch_angle_deg = exposure_number(d, DCM_GantryPitchAngle);
-  image.collimator_angle_deg = exposure_number(d, DCM_BeamLimitingDeviceAngle);
-  image.support_angle_deg = exposure_number(d, DCM_PatientSupportAngle);
-  image.eccentric_angle_deg = exposure_number(d, DCM_TableTopEccentricAngle);
-  image.table_pitch_deg = exposure_number(d, DCM_TableTopPitchAngle);
-  image.table_roll_deg = exposure_number(d, DCM_TableTopRollAngle);
-  image.table_position_mm = table_position(d);
-  image.isocenter_mm = vector_of<3>(d, DCM_IsocenterPosition);
-
-  const PixelFormat format = pixel_format(d);
-  image.columns = format.columns;
-  image.rows = format.rows;
-  image.intensity_relationship = d.text(DCM_PixelIntensityRelationship);
-  if (const auto sign = d.number(DCM_PixelIntensityRelationshipSign); sign && (*sign == 1 || *sign == -1))
-    image.intensity_sign = static_cast<int>(*sign);
-  image.photometric_interpretation = d.text(DCM_PhotometricInterpretation).value_or("");
-  image.has_modality_lut = !d.items(DCM_ModalityLUTSequence).empty();
-  return image;
+  const DicomItem dataset = file.dataset();
+  const PixelFormat format = pixel_format(dataset);
+  const auto exposures = dataset.items(DCM_ExposureSequence);
+  const bool names_frames = format.frames > 1 && std::ranges::any_of(exposures, [](const DicomItem& exposure) {
+                              return exposure.has_value(DCM_ReferencedFrameNumber);
+                            });
+  std::vector<RtImage> images;
+  for (int frame = 0; frame < format.frames; ++frame) {
+    if (names_frames && exposures_of(dataset, frame, format.frames).empty())
+      notes.warnings.push_back(fmt::format("{}: frame {} was left out: no item of {} tells its geometry", path.string(),
+                                           frame + 1, described(DCM_ExposureSequence)));
+    else
+      images.push_back(read_frame(path, dataset, format, frame));
+  }
+  return images;
 }
 
-RtImage with_switches(RtImage image, const RtImageSwitches& switches, Notes& notes) {
+RtImage with_switches(RtImage image, const RtImageSwitches& switches, Notes& notes, const std::string& origin) {
+  const auto by = [&](const std::string& flag) { return origin.empty() ? flag : origin + ", as by " + flag; };
   const auto named = [&](const DcmTagKey& tag) { return fmt::format("{}: {}", image.label, described(tag)); };
   if (const auto angle = switches.gantry_angle_deg.find(image.label); angle != switches.gantry_angle_deg.end())
     replace(image.gantry_angle_deg, angle->second, named(DCM_GantryAngle),
-            fmt::format("--gantry-angle {}={}", image.label, angle->second), notes);
+            by(fmt::format("--gantry-angle {}={}", image.label, angle->second)), notes);
   if (switches.couch_angle_deg)
     replace(image.support_angle_deg, *switches.couch_angle_deg, named(DCM_PatientSupportAngle),
-            fmt::format("--couch-angle {}", *switches.couch_angle_deg), notes);
+            by(fmt::format("--couch-angle {}", *switches.couch_angle_deg)), notes);
   if (switches.sad_mm)
     replace(image.sad_mm, *switches.sad_mm, named(DCM_RadiationMachineSAD), fmt::format("--sad {}", *switches.sad_mm),
             notes);
   if (switches.sid_mm)
-    replace(image.sid_mm, *switches.sid_mm, named(DCM_RTImageSID), fmt::format("--sid {}", *switches.sid_mm), notes);
+    replace(image.sid_mm, *switches.sid_mm, named(DCM_RTImageSID), by(fmt::format("--sid {}", *switches.sid_mm)),
+            notes);
   if (switches.position_mm)
     replace(image.position_mm, *switches.position_mm, named(DCM_RTImagePosition),
-            fmt::format("--rt-image-position {},{}", switches.position_mm->x(), switches.position_mm->y()), notes);
+            by(fmt::format("--rt-image-position {},{}", switches.position_mm->x(), switches.position_mm->y())), notes);
   if (switches.assume_centered && !image.position_mm && image.pixel_spacing_mm)
     replace(image.position_mm,
             Eigen::Vector2d(-0.5 * (image.columns - 1) * image.pixel_spacing_mm->y(),
                             0.5 * (image.rows - 1) * image.pixel_spacing_mm->x()),
-            named(DCM_RTImagePosition), "--assume-centered", notes);
+            named(DCM_RTImagePosition), by("--assume-centered"), notes);
   if (switches.intensity) {
     const bool is_linear = switches.intensity->relationship == PixelIntensity::Relationship::kLin;
     replace(image.intensity_relationship, std::string(is_linear ? "LIN" : "LOG"), named(DCM_PixelIntensityRelationship),
-            fmt::format("--intensity {}", to_string(*switches.intensity)), notes);
+            by(fmt::format("--intensity {}", to_string(*switches.intensity))), notes);
     image.intensity_sign = switches.intensity->sign;
   }
   if (switches.beam) {
     const bool is_kv = *switches.beam == Beam::kKilovoltage;
-    replace(image.kvp, is_kv ? 100.0 : 6000.0, named(DCM_KVP), fmt::format("--beam {}", is_kv ? "kv" : "mv"), notes);
+    replace(image.kvp, is_kv ? 100.0 : 6000.0, named(DCM_KVP), by(fmt::format("--beam {}", is_kv ? "kv" : "mv")),
+            notes);
   }
   if (switches.patient_position)
     replace(image.patient_position, std::string(to_string(*switches.patient_position)), named(DCM_PatientPosition),
-            fmt::format("--patient-position {}", to_string(*switches.patient_position)), notes);
+            by(fmt::format("--patient-position {}", to_string(*switches.patient_position))), notes);
   return image;
 }
 
@@ -164,12 +237,17 @@ std::vector<MissingAttribute> missing_attributes(const RtImage& image) {
   const auto need = [&](bool there, const DcmTagKey& tag, std::string supplied_by) {
     if (!there) missing.push_back({tag, std::move(supplied_by)});
   };
-  need(image.plane.has_value(), DCM_RTImagePlane, "");
-  need(image.pixel_spacing_mm.has_value(), DCM_ImagePlanePixelSpacing, "");
-  need(image.position_mm.has_value(), DCM_RTImagePosition, "--rt-image-position X,Y or --assume-centered");
-  need(image.sad_mm.has_value(), DCM_RadiationMachineSAD, "--sad MM");
-  need(image.sid_mm.has_value(), DCM_RTImageSID, "--sid MM");
-  need(image.gantry_angle_deg.has_value(), DCM_GantryAngle, fmt::format("--gantry-angle {}=DEG", image.label));
+  if (!image.is_rt_image() && !image.pixel_from_room)
+    need(false, DCM_ImagePlanePixelSpacing, "a projection matrix in a machine profile (--machine FILE)");
+  const bool needs_geometry = image.is_rt_image() && !image.pixel_from_room;
+  need(!needs_geometry || image.plane.has_value(), DCM_RTImagePlane, "");
+  need(!needs_geometry || image.pixel_spacing_mm.has_value(), DCM_ImagePlanePixelSpacing, "");
+  need(!needs_geometry || image.position_mm.has_value(), DCM_RTImagePosition,
+       "--rt-image-position X,Y or --assume-centered");
+  need(!needs_geometry || image.sad_mm.has_value(), DCM_RadiationMachineSAD, "--sad MM");
+  need((!needs_geometry && !image.pixel_from_room) || image.sid_mm.has_value(), DCM_RTImageSID, "--sid MM");
+  need(!needs_geometry || image.gantry_angle_deg.has_value(), DCM_GantryAngle,
+       fmt::format("--gantry-angle {}=DEG", image.label));
   need(image.support_angle_deg.has_value(), DCM_PatientSupportAngle, "--couch-angle DEG");
   need(image.patient_position.has_value(), DCM_PatientPosition, "--patient-position HFS");
   const bool known = image.intensity_relationship == "LIN" || image.intensity_relationship == "LOG";
@@ -184,7 +262,8 @@ std::vector<Finding> rt_image_findings(const RtImage& image) {
   std::vector<Finding> findings;
   if (image.image_type == "DRR")
     findings.push_back({"drr", fmt::format("{}: {} says DRR: this is no X-ray", where, described(DCM_ImageType))});
-  else if (image.image_type != "PORTAL" && image.image_type != "SIMULATOR" && image.image_type != "RADIOGRAPH")
+  else if (image.is_rt_image() && image.image_type != "PORTAL" && image.image_type != "SIMULATOR" &&
+           image.image_type != "RADIOGRAPH")
     throw Error(fmt::format("{}: {} says \"{}\", expected PORTAL, SIMULATOR or RADIOGRAPH as its third value", where,
                             described(DCM_ImageType), image.image_type));
   if (image.reported_values_origin && *image.reported_values_origin != "ACTUAL")
@@ -291,25 +370,28 @@ CarmGeometry carm_geometry(const RtImage& image, Notes& notes) {
   return geometry;
 }
 
-XrayImage read_xray_image(const RtImage& image, Beam beam, const CarmGeometry& geometry) {
-  DicomFile file = DicomFile::read(image.path, DicomFile::Extent::kWhole);
+XrayView xray_view(const RtImage& image, Beam beam, Notes& notes) {
+  if (!image.pixel_from_room) return make_xray_view(carm_geometry(image, notes), beam);
+  try {
+    return xray_view_from_matrix(*image.pixel_from_room, image.sid_mm.value(), image.columns, image.rows, beam);
+  } catch (const Error& error) {
+    throw Error(fmt::format("{}: {}", image.path.string(), error.what()));
+  }
+}
+
+XrayImage read_xray_image(const RtImage& image, const XrayView& view) {
+  const DicomFile file = DicomFile::read(image.path, DicomFile::Extent::kWhole);
   const PixelFormat format = pixel_format(file.dataset());
-  const std::vector<std::int32_t> stored_values = decode_pixels(file, format);
+  const std::vector<std::int32_t> stored_values = decode_frame(file, format, image.frame);
   const double slope = file.dataset().number(DCM_RescaleSlope).value_or(1.0);
   const double intercept = file.dataset().number(DCM_RescaleIntercept).value_or(0.0);
   if (slope == 0.0) throw Error(fmt::format("{}: {} is 0", image.path.string(), described(DCM_RescaleSlope)));
 
   XrayImage xray;
   xray.label = image.label;
-  xray.view = make_xray_view(geometry, beam);
+  xray.view = view;
   xray.values = Image<float>(format.columns, format.rows);
-  // Both angles turn counter-clockwise seen from the source, which is how the image is displayed (PS3.3 C.8.8.2.7).
-  // An image that is itself turned or mirrored on the receptor shows them turned back.
-  const double on_receptor_rad =
-      rad_from_deg(image.collimator_angle_deg.value_or(0.0) - image.receptor_angle_deg.value_or(0.0)) -
-      std::atan2(geometry.row_direction.y(), geometry.row_direction.x());
-  const bool is_mirrored = geometry.row_direction.cross(geometry.column_direction).z() > 0.0;
-  xray.collimator_angle_rad = is_mirrored ? -on_receptor_rad : on_receptor_rad;
+  xray.collimator_angle_rad = collimator_angle_on_image_rad(image);
   const bool is_linear = image.intensity_relationship == "LIN";
   xray.meaning = is_linear ? XrayImage::Meaning::kIntensity : XrayImage::Meaning::kLineIntegral;
 

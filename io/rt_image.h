@@ -1,5 +1,6 @@
 #pragma once
-// RT Images (PS3.3 A.17, C.8.8.2): what the file says, what it lacks, and the X-ray view that follows from it.
+// RT Images (PS3.3 A.17, C.8.8.2): what the file says, what it lacks, and the X-ray view that follows from it. X-rays
+// of other classes (DX, CR, XA) say too little; a machine profile supplies their projection matrix (machine_profile.h).
 
 #include <filesystem>
 #include <map>
@@ -26,16 +27,18 @@ struct PixelIntensity {
 std::optional<PixelIntensity> pixel_intensity_from(std::string_view word);
 std::string to_string(const PixelIntensity& intensity);
 
-// The attributes of one RT Image as written; an optional without value is absent or empty in the file. Where the
-// Exposure Sequence has a value it wins over the top level. Angles in degrees, lengths in mm.
+// The attributes of one X-ray, a frame of an RT Image, as written; an optional without value is absent or empty in the
+// file. Where the frame's item of the Exposure Sequence has a value it wins over the top level. Angles in degrees,
+// lengths in mm.
 struct RtImage {
   std::filesystem::path path;
+  int frame = 0, frames = 1;  // of the file; counted from 0
   Identity identity;
   std::string sop_class_uid;
   std::string sop_instance_uid;
   std::string series_instance_uid;
   std::optional<std::string> frame_of_reference_uid;
-  std::string label;       // RTImageLabel, else the file's name without extension
+  std::string label;       // RTImageLabel, else the file's name without extension; of several frames with "#2"
   std::string image_type;  // ImageType, third value
   std::optional<std::string> reported_values_origin;
   std::optional<std::string> patient_position;
@@ -57,14 +60,24 @@ struct RtImage {
   std::optional<Eigen::Vector3d> table_position_mm;  // lateral, longitudinal, vertical
   std::optional<Eigen::Vector3d> isocenter_mm;       // IsocenterPosition, in this image's own frame of reference
 
+  std::map<std::string, std::string, std::less<>> equipment;   // what machine profiles tell images apart by, by keyword
+  std::optional<Eigen::Matrix<double, 3, 4>> pixel_from_room;  // instead of all that follows from the attributes above
+
   int columns = 0, rows = 0;
   std::optional<std::string> intensity_relationship;
   std::optional<int> intensity_sign;
   std::string photometric_interpretation;
   bool has_modality_lut = false;
+
+  bool is_rt_image() const;  // and not an X-ray of another class
 };
 
-RtImage read_rt_image_header(const std::filesystem::path& path);
+// The attributes that machine profiles may tell images apart by.
+extern const std::map<std::string, DcmTagKey, std::less<>> kEquipmentAttributes;
+
+// The frames of a file. Where items of the Exposure Sequence name frames (PS3.3 C.8.8.2.8), one that none names has no
+// geometry: it is left out, with a warning.
+std::vector<RtImage> read_rt_images(const std::filesystem::path& path, Notes& notes);
 
 // What a person supplies for what the files lack; a value given here replaces a file's too, and that is noted.
 struct RtImageSwitches {
@@ -77,8 +90,9 @@ struct RtImageSwitches {
   std::optional<PatientPosition> patient_position;
 };
 
-// The image with the switches applied, each noted as an override.
-RtImage with_switches(RtImage image, const RtImageSwitches& switches, Notes& notes);
+// The image with the switches applied, each noted as an override; `origin` says where they come from if not from the
+// command line.
+RtImage with_switches(RtImage image, const RtImageSwitches& switches, Notes& notes, const std::string& origin = "");
 
 // A required attribute without value: what it is for, and the switch that supplies it (empty: none does).
 struct MissingAttribute {
@@ -102,7 +116,10 @@ TableAngles table_angles(const RtImage& image, Notes& notes);
 // The imager's geometry in IEC terms. Precondition: nothing missing. Throws Error where values contradict each other.
 CarmGeometry carm_geometry(const RtImage& image, Notes& notes);
 
+// The camera: from carm_geometry(), or from the projection matrix.
+XrayView xray_view(const RtImage& image, Beam beam, Notes& notes);
+
 // Reads the pixels and turns them into intensity or line integrals as the image declares (docs/conventions.md).
-XrayImage read_xray_image(const RtImage& image, Beam beam, const CarmGeometry& geometry);
+XrayImage read_xray_image(const RtImage& image, const XrayView& view);
 
 }  // namespace isoshift

@@ -4,6 +4,8 @@
 #include <fmt/chrono.h>
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include <chrono>
 #include <map>
 #include <optional>
@@ -37,11 +39,6 @@ SourceFrame source_frame(const Study& study, Notes& notes) {
   return {.uid = *first.frame_of_reference_uid, .isocenter_mm = *first.isocenter_mm, .lists_images = true};
 }
 
-void put_reference(DicomItem item, const std::string& sop_class_uid, const std::string& sop_instance_uid) {
-  item.put(DCM_ReferencedSOPClassUID, sop_class_uid);
-  item.put(DCM_ReferencedSOPInstanceUID, sop_instance_uid);
-}
-
 void put_code(DicomItem item, const char* value, const char* meaning) {
   item.put(DCM_CodeValue, value);
   item.put(DCM_CodingSchemeDesignator, "DCM");
@@ -59,9 +56,19 @@ void put_matrix(DicomItem item, const Eigen::Isometry3d& matrix, const char* cod
   matrix_item.put(DCM_FrameOfReferenceTransformationMatrixType, "RIGID");
 }
 
+// The files that the views come from: those of several frames once.
+std::vector<const RtImage*> image_files(const Study& study) {
+  std::vector<const RtImage*> files;
+  for (const RtImage& image : study.rt_images)
+    if (std::ranges::none_of(files,
+                             [&](const RtImage* file) { return file->sop_instance_uid == image.sop_instance_uid; }))
+      files.push_back(&image);
+  return files;
+}
+
 void put_ct_references(DicomItem item, const CtSeries& ct) {
   for (const std::string& uid : ct.sop_instance_uids)
-    put_reference(item.append_item(DCM_ReferencedImageSequence), ct.sop_class_uid, uid);
+    item.append_reference(DCM_ReferencedImageSequence, ct.sop_class_uid, uid);
 }
 
 // Common Instance Reference (C.12.2): every referenced instance, those of the CT's study and those of others.
@@ -69,11 +76,11 @@ void put_common_instance_references(DicomItem dataset, const Study& study) {
   DicomItem ct_series = dataset.append_item(DCM_ReferencedSeriesSequence);
   ct_series.put(DCM_SeriesInstanceUID, study.ct.series_instance_uid);
   for (const std::string& uid : study.ct.sop_instance_uids)
-    put_reference(ct_series.append_item(DCM_ReferencedInstanceSequence), study.ct.sop_class_uid, uid);
+    ct_series.append_reference(DCM_ReferencedInstanceSequence, study.ct.sop_class_uid, uid);
 
   std::map<std::string, std::map<std::string, std::vector<const RtImage*>>> by_study_and_series;
-  for (const RtImage& image : study.rt_images)
-    by_study_and_series[image.identity.study_instance_uid][image.series_instance_uid].push_back(&image);
+  for (const RtImage* image : image_files(study))
+    by_study_and_series[image->identity.study_instance_uid][image->series_instance_uid].push_back(image);
   for (const auto& [study_uid, by_series] : by_study_and_series) {
     std::optional<DicomItem> other_study;
     if (study_uid != study.ct.identity.study_instance_uid) {
@@ -84,8 +91,7 @@ void put_common_instance_references(DicomItem dataset, const Study& study) {
       DicomItem series = (other_study ? *other_study : dataset).append_item(DCM_ReferencedSeriesSequence);
       series.put(DCM_SeriesInstanceUID, series_uid);
       for (const RtImage* image : images)
-        put_reference(series.append_item(DCM_ReferencedInstanceSequence), image->sop_class_uid,
-                      image->sop_instance_uid);
+        series.append_reference(DCM_ReferencedInstanceSequence, image->sop_class_uid, image->sop_instance_uid);
     }
   }
 }
@@ -133,17 +139,16 @@ DicomFile registration_object(const Study& study, const SourceFrame& source, con
   DicomItem treatment_item = dataset.append_item(DCM_RegistrationSequence);
   treatment_item.put(DCM_FrameOfReferenceUID, source.uid);
   if (source.lists_images)
-    for (const RtImage& image : study.rt_images)
-      put_reference(treatment_item.append_item(DCM_ReferencedImageSequence), image.sop_class_uid,
-                    image.sop_instance_uid);
+    for (const RtImage* image : image_files(study))
+      treatment_item.append_reference(DCM_ReferencedImageSequence, image->sop_class_uid, image->sop_instance_uid);
   put_matrix(treatment_item, ct_from_source, "125024", "Image Content-based Alignment",
              "treatment room to planning CT");
 
   // General Reference (C.12.4), where the images cannot stand in item 2.
   if (!source.lists_images)
-    for (const RtImage& image : study.rt_images) {
-      DicomItem reference = dataset.append_item(DCM_ReferencedImageSequence);
-      put_reference(reference, image.sop_class_uid, image.sop_instance_uid);
+    for (const RtImage* image : image_files(study)) {
+      DicomItem reference =
+          dataset.append_reference(DCM_ReferencedImageSequence, image->sop_class_uid, image->sop_instance_uid);
       put_code(reference.append_item(DCM_PurposeOfReferenceCodeSequence), "129203", "Image Acquired during Treatment");
     }
   put_common_instance_references(dataset, study);

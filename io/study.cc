@@ -191,8 +191,9 @@ void check_one_patient_position(const Study& study) {
 // An X-ray that lies there twice is one view (C.12.1: the UID is the instance's own).
 void drop_repeated_images(std::vector<RtImage>& images, Notes& notes) {
   for (auto image = images.begin(); image != images.end();) {
-    const auto first = std::find_if(
-        images.begin(), image, [&](const RtImage& other) { return other.sop_instance_uid == image->sop_instance_uid; });
+    const auto first = std::find_if(images.begin(), image, [&](const RtImage& other) {
+      return other.sop_instance_uid == image->sop_instance_uid && other.frame == image->frame;
+    });
     if (first == image) {
       ++image;
       continue;
@@ -263,15 +264,23 @@ void check_isocenter(const Study& study) {
 }  // namespace
 
 Study load_study(const StudyRequest& request, Notes& notes, const Progress& progress) {
-  const StudyParts parts = find_parts(request.parts);
+  NamedParts named = request.parts;
+  named.takes_other_xrays = request.machine.has_value();
+  const StudyParts parts = find_parts(named);
   Study study;
+  study.machine = request.machine;
   notes.left_aside = parts.left_aside;
   if (parts.plan) study.plan = read_rt_plan(*parts.plan);
   if (parts.structures) study.structures = read_rt_structures(*parts.structures);
-  for (const std::filesystem::path& path : parts.images) study.rt_images.push_back(read_rt_image_header(path));
+  for (const std::filesystem::path& path : parts.images)
+    std::ranges::move(read_rt_images(path, notes), std::back_inserter(study.rt_images));
+  if (study.rt_images.empty()) throw Error("no frame of the X-rays has a geometry");
   drop_repeated_images(study.rt_images, notes);
   check_labels(request.switches, study.rt_images);
-  for (RtImage& image : study.rt_images) image = with_switches(image, request.switches, notes);
+  for (RtImage& image : study.rt_images) {
+    if (request.machine) image = with_machine(image, *request.machine, notes);
+    image = with_switches(image, request.switches, notes);
+  }
   std::ranges::stable_sort(study.rt_images, {}, [](const RtImage& image) { return seconds_of(image); });
 
   // A position or isocenter that only the plan has; a switch wins over both.
@@ -332,7 +341,7 @@ Study load_study(const StudyRequest& request, Notes& notes, const Progress& prog
   study.planned_room_from_patient =
       planned_room_from_patient(study.patient_position, study.table, study.isocenter_patient_mm);
   for (const RtImage& image : study.rt_images)
-    study.xrays.push_back(read_xray_image(image, beam_of(image, notes), carm_geometry(image, notes)));
+    study.xrays.push_back(read_xray_image(image, xray_view(image, beam_of(image, notes), notes)));
   check_isocenter(study);
   return study;
 }

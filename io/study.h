@@ -7,6 +7,7 @@
 #include "geometry/patient_setup.h"
 #include "geometry/xray_image.h"
 #include "io/ct_series.h"
+#include "io/machine_profile.h"
 #include "io/notes.h"
 #include "io/rt_image.h"
 #include "io/rt_plan.h"
@@ -20,6 +21,7 @@ struct StudyRequest {
   NamedParts parts;
   std::optional<Eigen::Vector3d> isocenter_patient_mm;
   RtImageSwitches switches;
+  std::optional<MachineProfile> machine;
   Allowances allowed;
 };
 
@@ -27,8 +29,9 @@ struct Study {
   CtSeries ct;
   std::optional<RtPlan> plan;
   std::optional<RtStructures> structures;
-  std::vector<RtImage> rt_images;  // headers with switches applied, in order of acquisition
+  std::vector<RtImage> rt_images;  // headers with machine profile and switches applied, in order of acquisition
   std::vector<XrayImage> xrays;    // the same images, ready for registration
+  std::optional<MachineProfile> machine;
   PatientPosition patient_position = PatientPosition::kHfs;
   TableAngles table;  // at imaging, the same for all views
   Eigen::Vector3d isocenter_patient_mm = Eigen::Vector3d::Zero();

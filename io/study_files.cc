@@ -70,18 +70,27 @@ void add_ct_slice(const fs::path& path, const DicomItem& dataset, StudyFiles& fi
   ct->files.push_back(path);
 }
 
+bool is_other_xray(const std::string& sop_class) {
+  return sop_class == UID_ComputedRadiographyImageStorage || sop_class == UID_DigitalXRayImageStorageForPresentation ||
+         sop_class == UID_DigitalXRayImageStorageForProcessing || sop_class == UID_XRayAngiographicImageStorage ||
+         sop_class == UID_XRayRadiofluoroscopicImageStorage;
+}
+
 void add(const fs::path& path, StudyFiles& files) {
-  if (!has_dicom_magic(path)) {
+  if (!begins_like_dicom(path)) {
     files.left_aside.push_back(fmt::format("{}: not a DICOM file", path.string()));
     return;
   }
   const DicomFile file = DicomFile::read(path, DicomFile::Extent::kHeader);
   const DicomItem dataset = file.dataset();
   const std::string sop_class = dataset.text(DCM_SOPClassUID).value_or("");
-  if (sop_class == UID_CTImageStorage) {
+  if (sop_class == UID_CTImageStorage || sop_class == UID_EnhancedCTImageStorage ||
+      sop_class == UID_LegacyConvertedEnhancedCTImageStorage) {
     add_ct_slice(path, dataset, files);
   } else if (sop_class == UID_RTImageStorage) {
     files.images.push_back({.file = path, .plan_uid = first_reference(dataset, DCM_ReferencedRTPlanSequence)});
+  } else if (is_other_xray(sop_class)) {
+    files.other_xrays.push_back({.file = path, .plan_uid = ""});
   } else if (sop_class == UID_RTPlanStorage || sop_class == UID_RTIonPlanStorage) {
     files.plans.push_back({.file = path,
                            .sop_instance_uid = dataset.required_text(DCM_SOPInstanceUID),
@@ -221,15 +230,29 @@ StudyParts find_parts(const NamedParts& named) {
   if (!named.study.empty()) files = scan_readable({named.study});
   std::vector<StudyFiles::Plan> other_plans;  // a named plan makes those found in the folder others
   if (!named.ct.empty()) files.cts = scan_readable(named.ct).cts;
-  if (!named.images.empty()) files.images = scan_readable(named.images).images;
+  if (!named.images.empty()) {
+    StudyFiles images = scan_readable(named.images);
+    std::swap(files.images, images.images);
+    std::swap(files.other_xrays, images.other_xrays);
+  }
   if (named.plan) std::swap(other_plans, files.plans), files.plans = scan_readable({*named.plan}).plans;
 
+  for (const StudyFiles::Image& xray : files.other_xrays) {
+    if (named.takes_other_xrays)
+      files.images.push_back(xray);
+    else
+      files.left_aside.push_back(
+          fmt::format("{}: an X-ray that is no RT Image; a machine profile can supply its geometry: --machine FILE",
+                      xray.file.string()));
+  }
   if (files.cts.empty())
     throw Error(
         fmt::format("no CT series found ({}).\n       Name its folder: --ct FOLDER", searched(named.ct, named.study)));
   if (files.images.empty())
-    throw Error(fmt::format("no RT Image found ({}).\n       Name the X-rays: --image FILE",
-                            searched(named.images, named.study)));
+    throw Error(fmt::format("no RT Image found ({}).\n       {}", searched(named.images, named.study),
+                            files.other_xrays.empty() ? "Name the X-rays: --image FILE"
+                                                      : "For X-rays of other classes their geometry is needed: "
+                                                        "--machine FILE"));
   if (named.plan && files.plans.empty()) throw Error(fmt::format("{}: holds no RT Plan", named.plan->string()));
 
   StudyParts parts{.left_aside = files.left_aside};

@@ -36,7 +36,8 @@ struct StudyFiles {
 
   std::vector<Ct> cts;
   std::vector<Plan> plans;
-  std::vector<Image> images;
+  std::vector<Image> images;       // RT Images
+  std::vector<Image> other_xrays;  // DX, CR, XA: their geometry is not in them
   std::vector<Structures> structures;
   std::vector<std::string> left_aside;  // "FILE: reason"
   std::vector<std::string> unreadable;  // why files that begin as DICOM, or cannot be opened, cannot be read
@@ -58,6 +59,7 @@ struct StudyParts {
 // Which parts a person named; the others are searched for in `study`.
 struct NamedParts {
   std::filesystem::path study;
+  bool takes_other_xrays = false;  // a machine profile supplies the geometry of X-rays that are no RT Images
   std::vector<std::filesystem::path> ct;
   std::vector<std::filesystem::path> images;
   std::optional<std::filesystem::path> plan;

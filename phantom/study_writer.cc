@@ -11,6 +11,7 @@
 
 #include "geometry/error.h"
 #include "geometry/patient_setup.h"
+#include "io/decode.h"
 #include "io/output_folder.h"
 
 namespace isoshift {
@@ -72,17 +73,6 @@ void put_common(DicomItem dataset, const Identity& identity, const char* sop_cla
   dataset.put(DCM_OperatorsName, "");
 }
 
-void put_pixel_module(DicomItem dataset, int columns, int rows, int bits_stored, bool is_signed) {
-  dataset.put(DCM_SamplesPerPixel, 1);
-  dataset.put(DCM_PhotometricInterpretation, "MONOCHROME2");
-  dataset.put(DCM_Rows, rows);
-  dataset.put(DCM_Columns, columns);
-  dataset.put(DCM_BitsAllocated, 16);
-  dataset.put(DCM_BitsStored, bits_stored);
-  dataset.put(DCM_HighBit, bits_stored - 1);
-  dataset.put(DCM_PixelRepresentation, is_signed ? 1 : 0);
-}
-
 void write_ct(const PhantomOptions& options, const StudyUids& study, Uids& uids, const std::filesystem::path& folder,
               const Progress& progress) {
   const bool is_head = options.anatomy == PhantomOptions::Anatomy::kHead;
@@ -113,7 +103,7 @@ void write_ct(const PhantomOptions& options, const StudyUids& study, Uids& uids,
     dataset.put(DCM_ImageOrientationPatient, "1\\0\\0\\0\\1\\0");
     dataset.put(DCM_PixelSpacing, std::array{spacing_mm.y(), spacing_mm.x()});
     dataset.put(DCM_SliceThickness, spacing_mm.z());
-    put_pixel_module(dataset, size.x(), size.y(), 16, true);
+    put_pixel_format(dataset, {.columns = size.x(), .rows = size.y(), .is_signed = true});
     dataset.put(DCM_RescaleIntercept, 0.0);
     dataset.put(DCM_RescaleSlope, 1.0);
     dataset.put(DCM_RescaleType, "HU");
@@ -232,11 +222,9 @@ void write_xray(const PhantomOptions& options, const StudyUids& study, const std
   dataset.put(DCM_TableTopRollAngle, 0.0);
   DicomItem exposure = dataset.append_item(DCM_ExposureSequence);
   exposure.put(DCM_KVP, 120.0);
-  DicomItem plan = dataset.append_item(DCM_ReferencedRTPlanSequence);
-  plan.put(DCM_ReferencedSOPClassUID, UID_RTPlanStorage);
-  plan.put(DCM_ReferencedSOPInstanceUID, study.plan);
+  dataset.append_reference(DCM_ReferencedRTPlanSequence, UID_RTPlanStorage, study.plan);
   dataset.put(DCM_ReferencedBeamNumber, fmt::format("{}", number + 1));
-  put_pixel_module(dataset, imager.pixels, imager.pixels, 16, false);
+  put_pixel_format(dataset, {.columns = imager.pixels, .rows = imager.pixels});
   dataset.put(DCM_PixelIntensityRelationship, "LIN");
   dataset.put(DCM_PixelIntensityRelationshipSign, 1);
   dataset.put(DCM_RescaleIntercept, 0.0);

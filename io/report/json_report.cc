@@ -135,7 +135,8 @@ std::string json_report(const SetupReport& report) {
   for (const SetupReport::View& view : report.views) {
     json["views"].push_back({{"label", view.label},
                              {"sop_instance_uid", view.sop_instance_uid},
-                             {"gantry_deg", view.gantry_deg},
+                             {"frame", view.frame},
+                             {"gantry_deg", or_null(view.gantry_deg)},
                              {"similarity_start", view.similarity_start},
                              {"similarity_final", view.similarity_final},
                              {"left_out_mm", or_null(view.left_out_mm)},
@@ -158,6 +159,8 @@ std::string json_report(const SetupReport& report) {
                         {"plan", or_null(report.plan_uid)},
                         {"images", images},
                         {"spatial_registration", or_null(report.spatial_registration_uid)}};
+  json["machine"] =
+      report.machine ? Json{{"name", report.machine->name}, {"sha256", report.machine->sha256}} : Json(nullptr);
   json["region"] = report.region;
   json["overrides"] = report.overrides;
   json["warnings"] = report.warnings;

@@ -27,7 +27,8 @@ struct SetupReport {
   struct View {
     std::string label;
     std::string sop_instance_uid;
-    double gantry_deg = 0.0;
+    int frame = 1;                     // of the instance, counted from 1
+    std::optional<double> gantry_deg;  // absent for a view given by its matrix
     double similarity_start = -1.0;
     double similarity_final = -1.0;
     std::optional<double> left_out_mm, left_out_deg;  // how far the pose moves without this view
@@ -82,6 +83,10 @@ struct SetupReport {
   double seconds_load = 0.0, seconds_register = 0.0, seconds_total = 0.0;
   double seconds_rendering = 0.0, seconds_similarity = 0.0;  // of seconds_register
 
+  struct Machine {
+    std::string name, sha256;
+  };
+  std::optional<Machine> machine;  // the machine profile that was applied
   std::string ct_series_uid;
   std::string plan_uid;                  // empty: there was no plan
   std::string spatial_registration_uid;  // empty: none was written

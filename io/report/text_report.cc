@@ -76,8 +76,12 @@ std::string text_report(const SetupReport& report) {
       report.plan_uid.empty() ? "none; isocenter given by hand" : plain(report.plan_label), report.patient_position,
       deg_from_rad(report.table.support_rad), fmt::join(report.isocenter_patient_mm, ", "));
   for (std::size_t n = 0; n < report.views.size(); ++n)
-    text += fmt::format("{}{} (gantry {:.1f} deg)", n ? ", " : "", plain(report.views[n].label),
-                        report.views[n].gantry_deg);
+    text += fmt::format(
+        "{}{} ({})", n ? ", " : "", plain(report.views[n].label),
+        report.views[n].gantry_deg ? fmt::format("gantry {:.1f} deg", *report.views[n].gantry_deg) : "by its matrix");
+  if (report.machine)
+    text +=
+        fmt::format("\nMachine      profile \"{}\", SHA-256 {}", plain(report.machine->name), report.machine->sha256);
 
   text += fmt::format("\n\nVERDICT      {}\n", upper(to_string(report.verdict)));
   for (const std::string& reason : report.reasons) text += "  - " + reason + "\n";

@@ -184,5 +184,18 @@ TEST_F(RegisterCommandTest, InspectSaysWhyStructuresAreRefused) {
                                      ": ROIContourSequence (3006,0039) item 1: ReferencedROINumber (3006,0084) is 1"));
 }
 
+TEST_F(RegisterCommandTest, FramesOfOneFileAreViewsAsFilesOfTheirOwn) {
+  ASSERT_NE(register_study(study_).exit_status, 1);
+  const nlohmann::json of_files = result();
+  join_images(study_);
+  const CommandOutcome outcome = register_study(study_, {"--overwrite", "--write-reg-for-review"});
+  EXPECT_NE(outcome.exit_status, 1) << outcome.err;
+  const nlohmann::json of_frames = result();
+  EXPECT_EQ(of_frames["setup_error"], of_files["setup_error"]);
+  EXPECT_EQ(of_frames["views"][1]["frame"], 2);
+  const CommandOutcome checked = run_shell("dciodvfy -new " + (study_.output() / "spatial_registration.dcm").string());
+  EXPECT_THAT(checked.out, testing::Not(HasSubstr("Error"))) << checked.out;
+}
+
 }  // namespace
 }  // namespace isoshift

@@ -19,7 +19,7 @@ class SilentFailures : public testing::Test {
  protected:
   XrayView view() {
     Notes notes;
-    return make_xray_view(carm_geometry(read_rt_image_header(study_.image(0)), notes), Beam::kKilovoltage);
+    return xray_view(read_rt_images(study_.image(0), notes).front(), Beam::kKilovoltage, notes);
   }
 
   SmallStudy study_;

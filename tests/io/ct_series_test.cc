@@ -8,6 +8,7 @@
 #include <random>
 
 #include "geometry/error.h"
+#include "io/decode.h"
 #include "tests/support/pose_near.h"
 #include "tests/support/small_study.h"
 
@@ -65,6 +66,43 @@ class CtSeriesTest : public testing::Test {
       return error.what();
     }
     return "no error";
+  }
+
+  // The slices written so far as one Enhanced CT: what differs per frame in its own macros, the rest in shared ones.
+  void convert_to_enhanced(const std::function<void(DicomItem)>& change = {}) {
+    DicomFile file;
+    DicomItem d = file.dataset();
+    std::vector<std::uint16_t> pixels;
+    std::string number = fmt::format("{}", files_.size());
+    for (const std::filesystem::path& path : files_) {
+      const DicomFile slice = DicomFile::read(path, DicomFile::Extent::kWhole);
+      const DicomItem old = slice.dataset();
+      DicomItem frame = d.append_item(DCM_PerFrameFunctionalGroupsSequence);
+      const auto copy = [&](const DcmTagKey& macro, std::initializer_list<DcmTagKey> tags) {
+        DicomItem item = frame.append_item(macro);
+        for (const DcmTagKey& tag : tags) item.put(tag, old.numbers(tag));
+      };
+      copy(DCM_PlanePositionSequence, {DCM_ImagePositionPatient});
+      copy(DCM_PixelValueTransformationSequence, {DCM_RescaleSlope, DCM_RescaleIntercept});
+      DicomItem content = frame.append_item(DCM_FrameContentSequence);
+      content.put(DCM_StackID, "1");
+      for (const std::int32_t value : decode_frame(slice, pixel_format(old), 0))
+        pixels.push_back(static_cast<std::uint16_t>(value));
+    }
+    DicomItem shared = d.append_item(DCM_SharedFunctionalGroupsSequence);
+    shared.append_item(DCM_PlaneOrientationSequence).put(DCM_ImageOrientationPatient, "1\\0\\0\\0\\1\\0");
+    shared.append_item(DCM_PixelMeasuresSequence).put(DCM_PixelSpacing, "0.5\\0.25");
+    d.put(DCM_SOPClassUID, "1.2.840.10008.5.1.4.1.1.2.1");
+    d.put(DCM_SOPInstanceUID, "1.2.3.99");
+    d.put(DCM_SeriesInstanceUID, "1.2.3");
+    d.put(DCM_FrameOfReferenceUID, "1.2.4");
+    d.put(DCM_NumberOfFrames, number);
+    put_pixel_format(d, {.columns = kColumns, .rows = kRows, .bits_stored = 12});
+    d.put_pixels(pixels);
+    if (change) change(d);
+    const std::filesystem::path path = folder_ / "enhanced.dcm";
+    file.write(path);
+    files_ = {path};
   }
 
   TemporaryFolder folder_;
@@ -184,6 +222,50 @@ TEST_F(CtSeriesTest, RefusesPixelDataThatIsTooShort) {
   write_even(6);
   edit(files_[3], [](DicomItem d) { d.put_pixels(std::vector<std::uint16_t>(10)); });
   EXPECT_THAT(error_of_reading(), testing::HasSubstr("PixelData (7FE0,0010) holds 10 pixels, expected 8 x 6"));
+}
+
+TEST_F(CtSeriesTest, AnEnhancedCtIsTheSameVolumeAsItsSlices) {
+  for (int k = 0; k < 6; ++k)
+    write(k, {10, 20, 30 + 5.0 * k}, [&](DicomItem d) { d.put(DCM_RescaleIntercept, -1000.0 - k); });
+  const CtSeries slices = read();
+  convert_to_enhanced();
+  const CtSeries enhanced = read();
+  EXPECT_EQ(enhanced.hu.voxels, slices.hu.voxels);
+  EXPECT_TRUE(enhanced.hu.patient_from_voxel.isApprox(slices.hu.patient_from_voxel, 1e-12));
+  EXPECT_THAT(enhanced.sop_instance_uids, testing::ElementsAre("1.2.3.99"));
+}
+
+TEST_F(CtSeriesTest, OfSeveralStacksNoneIsChosen) {
+  write_even(6);
+  convert_to_enhanced([](DicomItem d) {
+    for (DicomItem& frame : d.items(DCM_PerFrameFunctionalGroupsSequence)) {
+      static int number = 0;
+      frame.items(DCM_FrameContentSequence).front().put(DCM_StackID, ++number > 3 ? "2" : "1");
+    }
+  });
+  EXPECT_THAT(error_of_reading(), testing::HasSubstr("holds 2 volumes (stack 1 at time 1, stack 2 at time 1)"));
+}
+
+TEST_F(CtSeriesTest, PartOfAConcatenationIsRefused) {
+  write_even(6);
+  convert_to_enhanced([](DicomItem d) {
+    d.put(DCM_ConcatenationUID, "1.2.5");
+    d.put(DCM_InConcatenationTotalNumber, 2);
+  });
+  EXPECT_THAT(error_of_reading(), testing::HasSubstr("is part of a concatenation (ConcatenationUID (0020,9161))"));
+}
+
+TEST_F(CtSeriesTest, AFrameWithoutItsMacroIsNamed) {
+  write_even(6);
+  convert_to_enhanced(
+      [](DicomItem d) { d.items(DCM_PerFrameFunctionalGroupsSequence)[2].erase(DCM_PlanePositionSequence); });
+  EXPECT_THAT(error_of_reading(), testing::HasSubstr("frame 3: PlanePositionSequence (0020,9113) is missing"));
+}
+
+TEST_F(CtSeriesTest, MoreFramesThanItemsAreRefused) {
+  write_even(6);
+  convert_to_enhanced([](DicomItem d) { d.put(DCM_NumberOfFrames, "7"); });
+  EXPECT_THAT(error_of_reading(), testing::HasSubstr("has 6 items, expected one for each of 7 frames"));
 }
 
 }  // namespace

@@ -7,19 +7,27 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <fstream>
 
 #include "geometry/error.h"
+#include "io/decoder_process.h"
+#include "io/output_folder.h"
 #include "tests/support/command.h"
 #include "tests/support/small_study.h"
 
 namespace isoshift {
 namespace {
 
+std::string read_text(const std::filesystem::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
 class DecodeTest : public testing::Test {
  protected:
   std::vector<std::int32_t> pixels_of(const std::filesystem::path& path) {
-    DicomFile file = DicomFile::read(path, DicomFile::Extent::kWhole);
-    return decode_pixels(file, pixel_format(file.dataset()));
+    const DicomFile file = DicomFile::read(path, DicomFile::Extent::kWhole);
+    return decode_frame(file, pixel_format(file.dataset()), 0);
   }
 
   // The slice compressed by `command`, to which source and target are appended.
@@ -102,6 +110,55 @@ TEST_F(DecodeTest, FormatsThatAreNoneAreNamed) {
   EXPECT_THAT(error_of(DCM_HighBit, 12), testing::HasSubstr("HighBit (0028,0102) is 12, expected 15"));
   EXPECT_THAT(error_of(DCM_SamplesPerPixel, 3), testing::HasSubstr("SamplesPerPixel (0028,0002) is 3, expected 1"));
   EXPECT_THAT(error_of(DCM_Rows, 9000), testing::HasSubstr("Rows (0028,0010) is 9000, expected 1 to 8192"));
+}
+
+// Other programs in the decoder's place, as a hostile file may make of it.
+class DecoderThatFailsTest : public DecodeTest {
+ protected:
+  ~DecoderThatFailsTest() override { use_decoder(ISOSHIFT_PROGRAM); }
+
+  std::string error_with_decoder(const std::string& script) {
+    const std::filesystem::path program = study_.path() / "decoder";
+    std::filesystem::remove(program);
+    write_text(program, "#!/bin/sh\n" + script + "\n");
+    std::filesystem::permissions(program, std::filesystem::perms::owner_all);
+    use_decoder(program);
+    try {
+      frame_from_decoder(compressed_, 0, 1);
+    } catch (const Error& error) {
+      return error.what();
+    }
+    return "no error";
+  }
+
+  std::filesystem::path compressed_ = compressed_by("dcmcjpls +el");
+};
+
+TEST_F(DecoderThatFailsTest, OneThatDiesIsAnErrorThatNamesTheFile) {
+  EXPECT_THAT(error_with_decoder("kill -SEGV $$"),
+              testing::AllOf(testing::StartsWith(compressed_.string()),
+                             testing::HasSubstr("the decoder ended with signal 11")));
+  EXPECT_THAT(error_with_decoder("exit 3"), testing::HasSubstr("the decoder ended with status 3"));
+}
+
+TEST_F(DecoderThatFailsTest, OneThatStallsIsEnded) {
+  EXPECT_THAT(error_with_decoder("exec sleep 60"), testing::HasSubstr("were not decoded within 10 s"));
+}
+
+TEST_F(DecoderThatFailsTest, AnAnswerOfAnotherLengthIsRefused) {
+  // is_error, padding, and a length of 2^40.
+  EXPECT_THAT(error_with_decoder("printf '\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\1\\0\\0'; exec sleep 5"),
+              testing::HasSubstr("was decoded to 1099511627776 bytes, expected 1"));
+}
+
+TEST_F(DecodeTest, ADamagedFileIsRefusedAndTheNextOneRead) {
+  const std::vector<std::int32_t> expected = pixels_of(study_.ct_slice(18));
+  const std::filesystem::path compressed = compressed_by("dcmcjpls +el");
+  std::string bytes = read_text(compressed);
+  const std::filesystem::path damaged = study_.path() / "damaged.dcm";
+  write_text(damaged, bytes.replace(bytes.size() - 600, 400, 400, '\xFF'));
+  EXPECT_THROW(pixels_of(damaged), Error);
+  EXPECT_EQ(pixels_of(compressed), expected);
 }
 
 }  // namespace

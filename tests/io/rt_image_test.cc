@@ -18,7 +18,7 @@ class RtImageTest : public testing::Test {
  protected:
   RtImage changed(const std::function<void(DicomItem)>& change) {
     edit(study_.image(0), change);
-    return read_rt_image_header(study_.image(0));
+    return read_rt_images(study_.image(0), notes_).front();
   }
 
   std::vector<std::string> missing_tags(const RtImage& image) {
@@ -33,7 +33,7 @@ class RtImageTest : public testing::Test {
       d.put_pixels(std::vector<std::uint16_t>(96 * 96, 1000));
       change(d);
     });
-    return read_xray_image(image, Beam::kKilovoltage, carm_geometry(image, notes_)).values.at(0, 0);
+    return read_xray_image(image, xray_view(image, Beam::kKilovoltage, notes_)).values.at(0, 0);
   }
 
   std::string error_of_geometry(const RtImage& image) {
@@ -51,7 +51,7 @@ class RtImageTest : public testing::Test {
 };
 
 TEST_F(RtImageTest, ReadsTheGeometry) {
-  const RtImage image = read_rt_image_header(study_.image(1));
+  const RtImage image = read_rt_images(study_.image(1), notes_).front();
   EXPECT_EQ(image.label, "KV_G090");
   EXPECT_TRUE(missing_attributes(image).empty());
   EXPECT_TRUE(rt_image_findings(image).empty());
@@ -101,7 +101,7 @@ TEST_F(RtImageTest, SwitchesSupplyWhatIsMissingAndAreNoted) {
 TEST_F(RtImageTest, ASwitchReplacesAValueAndSaysSo) {
   RtImageSwitches switches;
   switches.sid_mm = 1400;
-  const RtImage image = with_switches(read_rt_image_header(study_.image(0)), switches, notes_);
+  const RtImage image = with_switches(read_rt_images(study_.image(0), notes_).front(), switches, notes_);
   EXPECT_EQ(image.sid_mm, 1400);
   EXPECT_THAT(notes_.overrides, ElementsAre("KV_G000: RTImageSID (3002,0026): replaced by --sid 1400"));
 }
@@ -140,7 +140,7 @@ TEST_F(RtImageTest, ANegativeSlopeTurnsTheRescaledValue) {
 }
 
 TEST_F(RtImageTest, BeamQualityComesFromKvpElseFromTheImageType) {
-  RtImage image = read_rt_image_header(study_.image(0));
+  RtImage image = read_rt_images(study_.image(0), notes_).front();
   EXPECT_EQ(beam_of(image, notes_), Beam::kKilovoltage);
   image.kvp = 6000;
   EXPECT_EQ(beam_of(image, notes_), Beam::kMegavoltage);
@@ -152,7 +152,7 @@ TEST_F(RtImageTest, BeamQualityComesFromKvpElseFromTheImageType) {
 }
 
 TEST_F(RtImageTest, PlannedAnglesAndDrrsAreFindings) {
-  RtImage image = read_rt_image_header(study_.image(0));
+  RtImage image = read_rt_images(study_.image(0), notes_).front();
   image.image_type = "DRR";
   image.reported_values_origin = "OPERATOR";
   const auto findings = rt_image_findings(image);
@@ -162,7 +162,7 @@ TEST_F(RtImageTest, PlannedAnglesAndDrrsAreFindings) {
 }
 
 TEST_F(RtImageTest, RefusesWhatItCannotPlace) {
-  const RtImage good = read_rt_image_header(study_.image(0));
+  const RtImage good = read_rt_images(study_.image(0), notes_).front();
   RtImage image = good;
   image.receptor_translation_mm = Eigen::Vector3d(0, 0, -480);
   EXPECT_THAT(error_of_geometry(image), HasSubstr("has z = -480 mm, expected SAD - SID = -500 mm"));
@@ -212,6 +212,44 @@ TEST_F(RtImageTest, ATiltedPlaneIsReadWithItsOrientation) {
   normal.plane = "NORMAL";
   EXPECT_THAT(error_of_geometry(normal),
               HasSubstr("in the receptor's plane, as RTImagePlane (3002,000C) NORMAL needs"));
+}
+
+TEST_F(RtImageTest, EveryFrameHasTheAnglesOfItsExposure) {
+  join_images(study_);
+  const std::vector<RtImage> frames = read_rt_images(study_.image(0), notes_);
+  ASSERT_EQ(frames.size(), 2U);
+  EXPECT_EQ(frames[0].label, "KV_G000#1");
+  EXPECT_EQ(frames[1].label, "KV_G000#2");
+  EXPECT_EQ(frames[0].gantry_angle_deg, 0.0);
+  EXPECT_EQ(frames[1].gantry_angle_deg, 90.0);
+  EXPECT_EQ(frames[1].kvp, 120.0);
+  const SmallStudy single;
+  const RtImage second = read_rt_images(single.image(1), notes_).front();
+  EXPECT_EQ(read_xray_image(frames[1], xray_view(frames[1], Beam::kKilovoltage, notes_)).values.pixels,
+            read_xray_image(second, xray_view(second, Beam::kKilovoltage, notes_)).values.pixels);
+}
+
+TEST_F(RtImageTest, AFrameThatNoExposureNamesIsLeftOut) {
+  join_images(study_);
+  edit(study_.image(0), [](DicomItem d) {
+    for (DicomItem& exposure : d.items(DCM_ExposureSequence)) exposure.put(DCM_ReferencedFrameNumber, "2");
+  });
+  const std::vector<RtImage> frames = read_rt_images(study_.image(0), notes_);
+  ASSERT_EQ(frames.size(), 1U);
+  EXPECT_EQ(frames.front().frame, 1);
+  EXPECT_THAT(notes_.warnings, ElementsAre(HasSubstr("frame 1 was left out: no item of ExposureSequence (3002,0030)")));
+}
+
+TEST_F(RtImageTest, FramesWithoutExposuresShareTheGeometryOfTheFile) {
+  join_images(study_);
+  edit(study_.image(0), [](DicomItem d) {
+    d.erase(DCM_ExposureSequence);
+    d.put(DCM_GantryAngle, 30.0);
+  });
+  const std::vector<RtImage> frames = read_rt_images(study_.image(0), notes_);
+  ASSERT_EQ(frames.size(), 2U);
+  EXPECT_EQ(frames[0].gantry_angle_deg, 30.0);
+  EXPECT_EQ(frames[1].gantry_angle_deg, 30.0);
 }
 
 }  // namespace

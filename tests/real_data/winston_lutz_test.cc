@@ -55,11 +55,11 @@ TEST_F(WinstonLutz, TheReceptorTranslationHasTheSignOfTheImageContent) {
   // Where the field ends at the right, and its middle between top and bottom: edges that both images show whole. Jaws
   // are found where the 90th percentile of a column or row falls below 30 % of the bright pixels.
   const auto field_edge_px = [&](const std::string& name) {
-    RtImage image = read_rt_image_header(folder_ / name);
+    Notes notes;
+    RtImage image = read_rt_images(folder_ / name, notes).front();
     image.intensity_relationship = "LIN";
     image.intensity_sign = 1;
-    Notes notes;
-    const XrayImage xray = read_xray_image(image, Beam::kMegavoltage, carm_geometry(image, notes));
+    const XrayImage xray = read_xray_image(image, xray_view(image, Beam::kMegavoltage, notes));
     const auto percentile = [](std::vector<float> values, double share) {
       const auto nth = values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
       std::ranges::nth_element(values, nth);

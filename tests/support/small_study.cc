@@ -3,6 +3,7 @@
 #include <dcmtk/dcmdata/dcuid.h>
 #include <fmt/format.h>
 
+#include "io/decode.h"
 #include "io/rt_plan.h"
 
 namespace isoshift {
@@ -66,6 +67,28 @@ std::vector<Eigen::Vector3d> rectangle(const Eigen::Vector3d& center_mm, double 
   for (const auto& [x, y] : {std::pair(-0.5, -0.5), {0.5, -0.5}, {0.5, 0.5}, {-0.5, 0.5}})
     corners.push_back(center_mm + Eigen::Vector3d(x * width_mm, y * height_mm, 0));
   return corners;
+}
+
+void join_images(const SmallStudy& study) {
+  std::vector<std::uint16_t> pixels;
+  for (const int n : {0, 1}) {
+    const DicomFile image = DicomFile::read(study.image(n), DicomFile::Extent::kWhole);
+    for (const std::int32_t value : decode_frame(image, pixel_format(image.dataset()), 0))
+      pixels.push_back(static_cast<std::uint16_t>(value));
+  }
+  edit(study.image(0), [&](DicomItem d) {
+    d.erase(DCM_ExposureSequence);
+    d.erase(DCM_GantryAngle);
+    for (const int n : {0, 1}) {
+      DicomItem exposure = d.append_item(DCM_ExposureSequence);
+      exposure.put(DCM_ReferencedFrameNumber, fmt::format("{}", n + 1));
+      exposure.put(DCM_KVP, 120.0);
+      exposure.put(DCM_GantryAngle, 90.0 * n);
+    }
+    d.put(DCM_NumberOfFrames, "2");
+    d.put_pixels(pixels);
+  });
+  std::filesystem::remove(study.image(1));
 }
 
 CommandOutcome register_study(const SmallStudy& study, const std::vector<std::string>& more) {

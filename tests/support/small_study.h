@@ -49,6 +49,9 @@ std::vector<Eigen::Vector3d> rectangle(const Eigen::Vector3d& center_mm, double 
 // isoshift register STUDY -o OUTPUT, with more arguments.
 CommandOutcome register_study(const SmallStudy& study, const std::vector<std::string>& more = {});
 
+// Puts the second image into the first one's file: two frames, each with its item in the Exposure Sequence.
+void join_images(const SmallStudy& study);
+
 // Changes a DICOM file in place.
 void edit(const std::filesystem::path& path, const std::function<void(DicomItem)>& change);
 

@@ -1,0 +1,22 @@
+#pragma once
+// Compressed pixels of unknown origin are decoded in a child process with limits on memory, CPU and wall time: a
+// decoder that crashes or never ends costs one file, not the program (docs/dicom.md, 6.6). A child answers many
+// requests, one after the other; idle ones wait for the next.
+
+#include <cstdint>
+#include <filesystem>
+#include <vector>
+
+namespace isoshift {
+
+// The program that answers `PROGRAM __decode`, isoshift itself. To be set before anything is decoded.
+void use_decoder(std::filesystem::path program);
+
+// One compressed frame as `bytes` bytes. Throws Error naming the file where the child refuses, dies, stalls, or answers
+// with another length.
+std::vector<std::uint8_t> frame_from_decoder(const std::filesystem::path& path, int frame, std::size_t bytes);
+
+// What `isoshift __decode` does: answers requests at standard input until it ends. Returns the exit status.
+int run_decoder();
+
+}  // namespace isoshift

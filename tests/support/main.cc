@@ -1,0 +1,11 @@
+// Runs the tests. Compressed pixels are decoded as in the program: by a child process of it.
+
+#include <gmock/gmock.h>
+
+#include "io/decoder_process.h"
+
+int main(int argc, char** argv) {
+  testing::InitGoogleMock(&argc, argv);
+  isoshift::use_decoder(ISOSHIFT_PROGRAM);
+  return RUN_ALL_TESTS();
+}
