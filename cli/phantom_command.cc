@@ -70,6 +70,14 @@ void add_phantom_command(CLI::App& app, Console& console, int&) {
       ->type_name("DEG,...")
       ->capture_default_str();
   command
+      ->add_option("--receptor-angle", options->phantom.receptor_angle_deg,
+                   "X-Ray Image Receptor Angle: the panel's turn about the central ray, IEC 61217")
+      ->type_name("DEG")
+      ->capture_default_str();
+  command->add_option("--ct-tilt", options->phantom.ct_tilt_deg, "Tilt of the CT's slices about the patient's x axis")
+      ->type_name("DEG")
+      ->capture_default_str();
+  command
       ->add_option("--voxel-mm", options->phantom.voxel_mm, "Pixel size of the CT; its slices are 1.5 times as thick")
       ->type_name("MM")
       ->capture_default_str();

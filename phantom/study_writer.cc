@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <numbers>
 #include <random>
 #include <set>
 
@@ -80,10 +81,14 @@ void write_ct(const PhantomOptions& options, const StudyUids& study, Uids& uids,
   const Eigen::Vector3d spacing_mm(options.voxel_mm, options.voxel_mm, kSliceToPixel * options.voxel_mm);
   const Eigen::Vector3i size = (extent_mm.array() / spacing_mm.array()).round().cast<int>();
   Eigen::Affine3d patient_from_voxel = Eigen::Affine3d::Identity();
-  patient_from_voxel.linear() = spacing_mm.asDiagonal();
-  patient_from_voxel.translation() = options.placement.isocenter_patient_mm -
-                                     0.5 * Eigen::Vector3d((size.array() - 1).cast<double>() * spacing_mm.array()) +
-                                     (is_head ? Eigen::Vector3d(0, 0, 4) : Eigen::Vector3d(0, -25, 0));
+  // Tilted slices lean against the table, which moves along z: the voxels' axes are sheared.
+  const double tilt_rad = options.ct_tilt_deg * std::numbers::pi / 180.0;
+  const Eigen::Vector3d along_columns(0.0, std::cos(tilt_rad), std::sin(tilt_rad));
+  patient_from_voxel.linear() << Eigen::Vector3d::UnitX() * spacing_mm.x(), along_columns * spacing_mm.y(),
+      Eigen::Vector3d::UnitZ() * spacing_mm.z();
+  patient_from_voxel.translation() =
+      options.placement.isocenter_patient_mm + (is_head ? Eigen::Vector3d(0, 0, 4) : Eigen::Vector3d(0, -25, 0)) -
+      0.5 * (patient_from_voxel.linear() * Eigen::Vector3d((size.array() - 1).cast<double>()));
   const Volume<float> ct = ct_of_shapes(phantom_shapes(options), size, patient_from_voxel);
 
   std::filesystem::create_directories(folder);
@@ -100,7 +105,8 @@ void write_ct(const PhantomOptions& options, const StudyUids& study, Uids& uids,
     dataset.put(DCM_InstanceNumber, fmt::format("{}", k + 1));
     dataset.put(DCM_ImagePositionPatient,
                 std::span(Eigen::Vector3d(patient_from_voxel * Eigen::Vector3d(0, 0, k)).data(), 3));
-    dataset.put(DCM_ImageOrientationPatient, "1\\0\\0\\0\\1\\0");
+    dataset.put(DCM_ImageOrientationPatient,
+                std::array{1.0, 0.0, 0.0, along_columns.x(), along_columns.y(), along_columns.z()});
     dataset.put(DCM_PixelSpacing, std::array{spacing_mm.y(), spacing_mm.x()});
     dataset.put(DCM_SliceThickness, spacing_mm.z());
     put_pixel_format(dataset, {.columns = size.x(), .rows = size.y(), .is_signed = true});
@@ -181,6 +187,7 @@ void write_xray(const PhantomOptions& options, const StudyUids& study, const std
                 std::size_t number, const std::filesystem::path& path) {
   Imager imager;
   imager.gantry_angle_deg = options.gantry_angles_deg[number];
+  imager.receptor_angle_deg = options.receptor_angle_deg;
   imager.pixels = options.image_pixels;
   imager.pixel_mm = kPanelMm / options.image_pixels;
   const Image<float> intensity =
@@ -207,7 +214,7 @@ void write_xray(const PhantomOptions& options, const StudyUids& study, const std
   dataset.put(DCM_ReportedValuesOrigin, "ACTUAL");
   dataset.put(DCM_RTImagePlane, "NORMAL");
   dataset.put(DCM_XRayImageReceptorTranslation, std::array{0.0, 0.0, imager.sad_mm - imager.sid_mm});
-  dataset.put(DCM_XRayImageReceptorAngle, 0.0);
+  dataset.put(DCM_XRayImageReceptorAngle, options.receptor_angle_deg);
   dataset.put(DCM_RTImageOrientation, "1\\0\\0\\0\\-1\\0");
   dataset.put(DCM_ImagePlanePixelSpacing, std::array{imager.pixel_mm, imager.pixel_mm});
   dataset.put(DCM_RTImagePosition, std::array{-corner_mm, corner_mm});
@@ -268,8 +275,10 @@ void PhantomOptions::check() const {
     if (!std::isfinite(angle_deg) || !labels.insert(image_label(angle_deg)).second)
       throw UsageError(fmt::format("gantry angle {}: expected finite angles, a degree or more apart", angle_deg));
   if (!placement.translation_mm.allFinite() || !placement.rotation_deg.allFinite() ||
-      !std::isfinite(placement.couch_angle_deg))
-    throw UsageError("the setup error and the couch angle must be finite numbers");
+      !std::isfinite(placement.couch_angle_deg) || !std::isfinite(receptor_angle_deg))
+    throw UsageError("the setup error, the couch angle and the receptor angle must be finite numbers");
+  if (!(std::abs(ct_tilt_deg) <= 30.0))
+    throw UsageError(fmt::format("a CT tilt of {} degrees is not within 30", ct_tilt_deg));
   if (!(photons >= 0.0 && std::isfinite(photons)))
     throw UsageError(fmt::format("{} photons: expected 0 or more", photons));
 }

@@ -152,8 +152,11 @@ Eigen::Vector3d Imager::source_fixed_mm() const {
 Eigen::Vector3d Imager::pixel_fixed_mm(double column, double row) const {
   const double s = sin_deg(gantry_angle_deg), c = cos_deg(gantry_angle_deg);
   const double below_mm = sid_mm - sad_mm;
-  const double right_mm = (column - 0.5 * (pixels - 1)) * pixel_mm;  // along the gantry's x axis
-  const double up_mm = (0.5 * (pixels - 1) - row) * pixel_mm;        // toward the gantry
+  const double along_rows_mm = (column - 0.5 * (pixels - 1)) * pixel_mm;
+  const double along_columns_mm = (0.5 * (pixels - 1) - row) * pixel_mm;
+  const double turned_s = sin_deg(receptor_angle_deg), turned_c = cos_deg(receptor_angle_deg);
+  const double right_mm = turned_c * along_rows_mm - turned_s * along_columns_mm;  // along the gantry's x axis
+  const double up_mm = turned_s * along_rows_mm + turned_c * along_columns_mm;     // toward the gantry
   return {-below_mm * s + right_mm * c, up_mm, -below_mm * c - right_mm * s};
 }
 

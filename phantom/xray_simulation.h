@@ -33,9 +33,10 @@ struct Imager {
   double gantry_angle_deg = 0.0;  // clockwise seen facing the gantry: 90 puts the source at the viewer's right
   double sad_mm = 1000.0;
   double sid_mm = 1500.0;
-  int pixels = 512;             // along each edge
-  double pixel_mm = 0.8;        // on the panel
-  double scatter_share = 0.12;  // of the primary beam, reaching the panel blurred
+  int pixels = 512;                 // along each edge
+  double pixel_mm = 0.8;            // on the panel
+  double receptor_angle_deg = 0.0;  // the panel's turn about the central ray, counter-clockwise seen from the source
+  double scatter_share = 0.12;      // of the primary beam, reaching the panel blurred
 
   Eigen::Vector3d source_fixed_mm() const;
   // Center of a pixel; column 0 at the left and row 0 at the top, seen from the source with the gantry at the top.

@@ -1,0 +1,21 @@
+// A libFuzzer target: one reader, chosen when it is built (ISOSHIFT_READER), on whatever bytes the fuzzer invents. They
+// are read from a file in memory. ./dev fuzz builds and runs one per reader.
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/mman.h>
+#include <unistd.h>
+
+#include "geometry/error.h"
+#include "tests/fuzz/readers.h"
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  static const int memory = ::memfd_create("fuzzed", 0);
+  static const std::filesystem::path path = fmt::format("/proc/self/fd/{}", memory);
+  if (::ftruncate(memory, 0) != 0 || ::pwrite(memory, data, size, 0) != static_cast<ssize_t>(size)) return 0;
+  try {
+    isoshift::kReaders.at(ISOSHIFT_READER)(path);
+  } catch (const isoshift::Error&) {
+  }
+  return 0;
+}

@@ -1,0 +1,148 @@
+// Reads damaged copies of every kind of file isoshift reads: cut short, with bytes changed, lengths made huge, parts
+// doubled or left out. Every one must be read or refused with Error, within 10 s. Prints what came of them; exits with
+// 1 at the first that did anything else.
+//
+//   mutations [count=12000] [first seed=1]
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cstdlib>
+#include <fstream>
+#include <iostream>
+#include <random>
+
+#include "geometry/error.h"
+#include "io/decoder_process.h"
+#include "tests/fuzz/readers.h"
+#include "tests/support/small_study.h"
+
+namespace isoshift {
+namespace {
+
+struct Original {
+  std::string reader;
+  std::string name;
+  std::string bytes;
+};
+
+std::string bytes_of(const std::filesystem::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+std::vector<Original> originals() {
+  std::vector<Original> list;
+  SmallStudy study;
+  const auto add = [&](const std::string& reader, const std::filesystem::path& path, const std::string& name) {
+    list.push_back({reader, name, bytes_of(path)});
+  };
+  add("ct", study.ct_slice(18), "CT slice");
+  for (const char* command : {"dcmcjpls +el", "dcmcjpeg +e1", "dcmcrle", "dcmconv +td", "dcmconv +ti", "dcmconv +tb"}) {
+    const std::filesystem::path copy = study.path() / "copy.dcm";
+    if (run_shell(fmt::format("{} {} {}", command, study.ct_slice(18).string(), copy.string())).exit_status != 0)
+      throw Error(fmt::format("{} failed", command));
+    add("ct", copy, command);
+    std::filesystem::remove(copy);
+  }
+  add("rt_image", study.image(1), "RT Image");
+  add("rt_plan", study.plan(), "RT Plan");
+  draw(study, {{"Ball", {rectangle({-12, 38, -410}, 30, 20), rectangle({-12, 38, -404}, 30, 20)}}});
+  add("rt_structures", study.structures(), "RT Structure Set");
+  register_study(study, {"--write-reg-for-review"});
+  add("spatial_registration", study.output() / "spatial_registration.dcm", "Spatial Registration");
+  join_images(study);
+  add("rt_image", study.image(0), "RT Image of two frames");
+  return list;
+}
+
+class Mutator {
+ public:
+  explicit Mutator(std::uint64_t seed) : random_(seed) {}
+
+  std::string mutated(std::string bytes) {
+    const int changes = 1 + static_cast<int>(below(3));
+    for (int n = 0; n < changes; ++n) change(bytes);
+    return bytes;
+  }
+
+ private:
+  std::size_t below(std::size_t count) { return std::uniform_int_distribution<std::size_t>(0, count - 1)(random_); }
+
+  // Half of all changes hit the header, where every byte means something.
+  std::size_t place(const std::string& bytes) {
+    const std::size_t header = std::min<std::size_t>(bytes.size(), 3000);
+    return below(2) == 0 ? below(header) : below(bytes.size());
+  }
+
+  void change(std::string& bytes) {
+    if (bytes.size() < 16) return;
+    const std::size_t at = place(bytes), left = bytes.size() - at;
+    switch (below(7)) {
+      case 0: bytes.resize(at); break;
+      case 1:
+        for (std::size_t n = 0, count = 1 + below(16); n < count; ++n)
+          bytes[place(bytes)] = static_cast<char>(below(256));
+        break;
+      case 2: bytes[at] = static_cast<char>(bytes[at] ^ (1 << below(8))); break;
+      case 3: bytes.replace(at, std::min<std::size_t>(left, 4), std::min<std::size_t>(left, 4), '\xFF'); break;
+      case 4: bytes.erase(at, std::min(left, 1 + below(64))); break;
+      case 5: bytes.insert(at, bytes.substr(place(bytes), 1 + below(64))); break;
+      case 6: {  // a number of text becomes another
+        static const std::vector<std::string> numbers = {"-1",          "0",    "1e308",  "nan",
+                                                         "99999999999", "-0.0", "1e-320", "\\"};
+        const std::string& number = numbers[below(numbers.size())];
+        bytes.replace(at, std::min(left, number.size()), number.substr(0, left));
+        break;
+      }
+    }
+  }
+
+  std::mt19937_64 random_;
+};
+
+int run(std::uint64_t count, std::uint64_t first_seed) {
+  const TemporaryFolder folder;
+  const std::filesystem::path path = folder / "mutated.dcm";
+  std::uint64_t read = 0, refused = 0, died = 0, stalled = 0;
+  double slowest_s = 0.0;
+  const std::vector<Original> list = originals();
+  for (std::uint64_t seed = first_seed; seed < first_seed + count; ++seed) {
+    const Original& original = list[seed % list.size()];
+    std::ofstream(path, std::ios::binary) << Mutator(seed).mutated(original.bytes);
+    const auto start = std::chrono::steady_clock::now();
+    try {
+      kReaders.at(original.reader)(path);
+      ++read;
+    } catch (const Error& error) {
+      ++refused;
+      const std::string_view message = error.what();
+      died += message.find("the decoder ended with") != message.npos ? 1 : 0;
+      stalled += message.find("were not decoded within") != message.npos ? 1 : 0;
+    } catch (const std::exception& error) {
+      std::cerr << fmt::format("seed {} ({}): {}\n", seed, original.name, error.what());
+      return 1;
+    }
+    const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    slowest_s = std::max(slowest_s, seconds);
+    if (seconds > 11.0) {
+      std::cerr << fmt::format("seed {} ({}) took {:.1f} s\n", seed, original.name, seconds);
+      return 1;
+    }
+  }
+  std::cout << fmt::format(
+      "{} files, seeds {} to {}: {} read, {} refused, of these {} by a decoder that died and {} by one that was ended; "
+      "the slowest took {:.2f} s\n",
+      count, first_seed, first_seed + count - 1, read, refused, died, stalled, slowest_s);
+  return 0;
+}
+
+}  // namespace
+}  // namespace isoshift
+
+int main(int argc, char** argv) {
+  isoshift::use_decoder(ISOSHIFT_PROGRAM);
+  return isoshift::run(argc > 1 ? std::strtoull(argv[1], nullptr, 10) : 12000,
+                       argc > 2 ? std::strtoull(argv[2], nullptr, 10) : 1);
+}

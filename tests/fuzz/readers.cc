@@ -1,0 +1,54 @@
+#include "tests/fuzz/readers.h"
+
+#include "io/ct_series.h"
+#include "io/decode.h"
+#include "io/registration_check.h"
+#include "io/rt_image.h"
+#include "io/rt_plan.h"
+#include "io/rt_structures.h"
+#include "io/spatial_registration.h"
+#include "io/structure_mask.h"
+#include "io/study_files.h"
+
+namespace isoshift {
+namespace {
+
+void read_ct(const std::filesystem::path& path) {
+  Notes notes;
+  scan_study({path});
+  const std::vector<std::filesystem::path> files = {path};
+  read_ct_series(files, {{"gaps", "hostile"}}, notes, {});
+}
+
+void read_rt_image(const std::filesystem::path& path) {
+  Notes notes;
+  for (const RtImage& image : read_rt_images(path, notes)) {
+    if (!missing_attributes(image).empty()) continue;
+    rt_image_findings(image);
+    read_xray_image(image, xray_view(image, beam_of(image, notes), notes));
+  }
+}
+
+void read_structures(const std::filesystem::path& path) {
+  const RtStructures structures = read_rt_structures(path);
+  Volume<float> ct({40, 40, 30}, Eigen::Affine3d::Identity());
+  ct.patient_from_voxel.linear() *= 5.0;
+  for (const Structure& structure : structures.structures) mask_of(structure, ct.size, ct.patient_from_voxel);
+}
+
+}  // namespace
+
+const std::map<std::string, std::function<void(const std::filesystem::path&)>> kReaders = {
+    {"ct", read_ct},
+    {"rt_image", read_rt_image},
+    {"rt_plan", [](const std::filesystem::path& path) { read_rt_plan(path); }},
+    {"rt_structures", read_structures},
+    {"spatial_registration",
+     [](const std::filesystem::path& path) {
+       check_registration(path);
+       read_spatial_registration(path);
+     }},
+    {"decoder", [](const std::filesystem::path& path) { decompressed_frame(path, 0); }},
+};
+
+}  // namespace isoshift
