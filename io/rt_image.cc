@@ -127,6 +127,7 @@ RtImage read_frame(const std::filesystem::path& path, const DicomItem& d, const 
   if (const auto sign = d.number(DCM_PixelIntensityRelationshipSign); sign && (*sign == 1 || *sign == -1))
     image.intensity_sign = static_cast<int>(*sign);
   image.photometric_interpretation = d.text(DCM_PhotometricInterpretation).value_or("");
+  image.is_lossy = d.text(DCM_LossyImageCompression) == "01";
   image.has_modality_lut = !d.items(DCM_ModalityLUTSequence).empty();
   return image;
 }

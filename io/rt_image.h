@@ -68,6 +68,7 @@ struct RtImage {
   std::optional<int> intensity_sign;
   std::string photometric_interpretation;
   bool has_modality_lut = false;
+  bool is_lossy = false;  // compressed with loss
 
   bool is_rt_image() const;  // and not an X-ray of another class
 };

@@ -302,7 +302,11 @@ Study load_study(const StudyRequest& request, Notes& notes, const Progress& prog
   }
   check_nothing_missing(study.rt_images, refused);
   for (const RtImage& image : study.rt_images)
-    if (!image.reported_values_origin)
+    if (image.is_lossy)
+      notes.warnings.push_back(
+          fmt::format("{}: has been compressed with loss ({})", image.label, described(DCM_LossyImageCompression)));
+  for (const RtImage& image : study.rt_images)
+    if (image.is_rt_image() && !image.reported_values_origin)
       notes.warnings.push_back(fmt::format("{}: does not say whether its angles were measured ({} is missing)",
                                            image.label, described(DCM_ReportedValuesOrigin)));
 

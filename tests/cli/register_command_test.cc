@@ -197,5 +197,39 @@ TEST_F(RegisterCommandTest, FramesOfOneFileAreViewsAsFilesOfTheirOwn) {
   EXPECT_THAT(checked.out, testing::Not(HasSubstr("Error"))) << checked.out;
 }
 
+TEST_F(RegisterCommandTest, NamesInOtherCharacterSetsAreKept) {
+  const auto rename = [](const std::filesystem::path& path) {
+    edit(path, [](DicomItem d) {
+      d.put(DCM_SpecificCharacterSet, "ISO_IR 100");
+      d.put(DCM_PatientName, "M\xFCller^J\xF6rg");
+    });
+  };
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(study_.path()))
+    if (entry.path().extension() == ".dcm") rename(entry.path());
+  const CommandOutcome outcome = register_study(study_, {"--write-reg-for-review"});
+  EXPECT_NE(outcome.exit_status, 1) << outcome.err;
+  EXPECT_THAT(outcome.out, HasSubstr("Müller^Jörg"));
+  const CommandOutcome dumped =
+      run_shell("dcmdump +P 0008,0005 +P 0010,0010 " + (study_.output() / "spatial_registration.dcm").string());
+  EXPECT_THAT(dumped.out, HasSubstr("[ISO_IR 192]"));
+  EXPECT_THAT(dumped.out, HasSubstr("[Müller^Jörg]"));
+}
+
+// Old exports begin with the dataset: no 128 bytes, no "DICM", no transfer syntax.
+TEST_F(RegisterCommandTest, FilesWithoutAHeaderAreReadToo) {
+  ASSERT_NE(register_study(study_).exit_status, 1);
+  const nlohmann::json expected = result()["setup_error"];
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(study_.path()))
+    if (entry.path().extension() == ".dcm") {
+      const std::string file = entry.path().string();
+      const CommandOutcome converted =
+          run_shell(fmt::format("dcmconv -F +ti '{}' '{}.new' && mv '{}.new' '{}'", file, file, file, file));
+      ASSERT_EQ(converted.exit_status, 0) << converted.out;
+    }
+  const CommandOutcome again = register_study(study_, {"--overwrite"});
+  EXPECT_NE(again.exit_status, 1) << again.err;
+  EXPECT_EQ(result()["setup_error"], expected);
+}
+
 }  // namespace
 }  // namespace isoshift

@@ -268,5 +268,17 @@ TEST_F(CtSeriesTest, MoreFramesThanItemsAreRefused) {
   EXPECT_THAT(error_of_reading(), testing::HasSubstr("has 6 items, expected one for each of 7 frames"));
 }
 
+TEST_F(CtSeriesTest, AStackThatIsNoBodyIsRefused) {
+  write_even(4);
+  EXPECT_THAT(error_of_reading(), testing::HasSubstr("its slices span 15.0 mm, expected 20 to 2500 mm"));
+}
+
+TEST_F(CtSeriesTest, CompressionWithLossIsWarnedOf) {
+  for (int k = 0; k < 6; ++k)
+    write(k, {10, 20, 30 + 5.0 * k}, [](DicomItem d) { d.put(DCM_LossyImageCompression, "01"); });
+  read();
+  EXPECT_THAT(notes_.warnings, testing::ElementsAre(testing::HasSubstr("compressed with loss")));
+}
+
 }  // namespace
 }  // namespace isoshift

@@ -67,5 +67,35 @@ TEST_F(RtPlanTest, ABeamThatIsNotThereIsNamed) {
               HasSubstr("has no beam 7, to which an image refers"));
 }
 
+// An ion plan holds the same under other names.
+TEST_F(RtPlanTest, IonPlansAreReadAndChairsRefused) {
+  edit(study_.plan(), [](DicomItem d) {
+    d.put(DCM_SOPClassUID, "1.2.840.10008.5.1.4.1.1.481.8");
+    DicomItem beam = d.append_item(DCM_IonBeamSequence);
+    beam.put(DCM_BeamNumber, 1);
+    beam.put(DCM_PatientSupportType, "TABLE");
+    beam.put(DCM_ReferencedPatientSetupNumber, 1);
+    beam.append_item(DCM_IonControlPointSequence).put(DCM_IsocenterPosition, "1\\2\\3");
+    d.erase(DCM_BeamSequence);
+  });
+  const RtPlan plan = read_rt_plan(study_.plan());
+  EXPECT_THAT(common_isocenter(plan, plan.beams), VectorNear(Eigen::Vector3d(1, 2, 3), 1e-12));
+  EXPECT_EQ(plan.beams.front().patient_position, "HFS");
+  edit(study_.plan(), [](DicomItem d) { d.items(DCM_IonBeamSequence).front().put(DCM_PatientSupportType, "CHAIR"); });
+  EXPECT_THAT(error_of([](const RtPlan&) {}), HasSubstr("PatientSupportType (300A,0350) is CHAIR, expected TABLE"));
+}
+
+TEST_F(RtPlanTest, ASetupDisplacementAndAMissingApprovalAreWarnedOf) {
+  edit(study_.plan(), [](DicomItem d) {
+    d.put(DCM_ApprovalStatus, "UNAPPROVED");
+    DicomItem setup = d.items(DCM_PatientSetupSequence).front();
+    setup.put(DCM_TableTopVerticalSetupDisplacement, -12.0);
+  });
+  const CommandOutcome outcome = register_study(study_);
+  EXPECT_NE(outcome.exit_status, 1) << outcome.err;
+  EXPECT_THAT(outcome.err, HasSubstr("the plan moves the table by (-12.0, 0.0, 0.0) mm"));
+  EXPECT_THAT(outcome.err, HasSubstr("the plan is not approved (ApprovalStatus (300E,0002) is \"UNAPPROVED\")"));
+}
+
 }  // namespace
 }  // namespace isoshift

@@ -170,5 +170,28 @@ TEST_F(SpatialRegistrationFileTest, ReaderRefusesAScaledMatrix) {
   EXPECT_THROW(read_spatial_registration(path()), Error);
 }
 
+// The other rows of the table of docs/dicom.md 4.4: a frame of its own, and the images in the General Reference.
+TEST_F(SpatialRegistrationFileTest, ImagesThatAgreeOnNoFrameGetANewOneOfDicomMd44) {
+  const auto expect_new_frame = [&](const std::function<void(RtImage&)>& change) {
+    Study study = load();
+    change(study.rt_images[1]);
+    std::filesystem::remove(path());
+    const SpatialRegistration registration = write_truth(study);
+    const std::string& frame = registration.items[1].frame_of_reference_uid;
+    EXPECT_NE(frame, study.ct.frame_of_reference_uid);
+    for (const RtImage& image : study.rt_images) EXPECT_NE(frame, image.frame_of_reference_uid);
+    EXPECT_THAT(Vector3d(actual_ * (registration.items[1].registered_from_source * Vector3d::Zero())),
+                VectorNear(Vector3d::Zero().eval(), 1e-6));
+    const DicomFile file = DicomFile::read(path(), DicomFile::Extent::kWhole);
+    EXPECT_TRUE(file.dataset().items(DCM_RegistrationSequence)[1].items(DCM_ReferencedImageSequence).empty());
+    EXPECT_EQ(file.dataset().items(DCM_ReferencedImageSequence).size(), 2U);
+  };
+  for (const int n : {0, 1}) edit(small_.image(n), [](DicomItem d) { d.put(DCM_IsocenterPosition, "9\\-150\\-251"); });
+  expect_new_frame([](RtImage& image) { image.isocenter_mm.reset(); });
+  expect_new_frame([](RtImage& image) { image.frame_of_reference_uid.reset(); });
+  expect_new_frame([](RtImage& image) { image.frame_of_reference_uid = "1.2.3"; });
+  expect_new_frame([](RtImage& image) { image.isocenter_mm->x() += 1.0; });
+}
+
 }  // namespace
 }  // namespace isoshift
