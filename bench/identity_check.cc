@@ -2,13 +2,14 @@
 // that were mirrored, turned, exchanged or taken from the other side, and with those of all other patients. Prints a
 // line of CSV per registration and a summary; exits with 1 if anything wrong was accepted.
 //
-//   identity_check [patients=20] > identity.csv
+//   identity_check [patients=20 [only the CT of patient]] > identity.csv
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <iostream>
 #include <map>
+#include <optional>
 #include <random>
 
 #include "bench/scene.h"
@@ -99,7 +100,7 @@ std::vector<std::pair<std::string, std::vector<XrayImage>>> variants(const std::
   return list;
 }
 
-int check(int patient_count) {
+int check(int patient_count, std::optional<int> only) {
   std::vector<Patient> patients;
   for (int n = 0; n < patient_count; ++n) patients.push_back(make_patient(static_cast<std::uint64_t>(100 + n)));
   Eigen::Isometry3d planned = Eigen::Isometry3d::Identity();  // HFS: (x, y, z) of the room is (x, z, -y) of the patient
@@ -156,6 +157,7 @@ int check(int patient_count) {
     wrong_accepted = wrong_accepted || (result.verdict == Verdict::kAccepted && (what != "right" || mtre_mm > 2.0));
   };
   for (int ct = 0; ct < patient_count; ++ct) {
+    if (only && ct != *only) continue;
     const Volume<float> hu = ct_of(patients[static_cast<std::size_t>(ct)]);
     const RendererPyramid renderers(RendererKind::kCpu, hu, {}, std::array{Beam::kKilovoltage});
     RegionOfInterest all_of_the_ct;
@@ -178,4 +180,7 @@ int check(int patient_count) {
 }  // namespace
 }  // namespace isoshift
 
-int main(int argc, char** argv) { return isoshift::check(argc > 1 ? std::atoi(argv[1]) : 20); }
+int main(int argc, char** argv) {
+  return isoshift::check(argc > 1 ? std::atoi(argv[1]) : 20,
+                         argc > 2 ? std::optional(std::atoi(argv[2])) : std::nullopt);
+}

@@ -189,6 +189,11 @@ TEST(Quality, PartsThatDisagreeNeedReview) {
   for (const std::size_t view : {0U, 1U})
     expect_review([&](RegistrationResult& result) { result.views[view].consistency = parts(10, 10, 5); },
                   fmt::format("10 of 20 parts of view {} match elsewhere", view + 1));
+  // Of many parts, a smaller share: one place is in up to four of them.
+  expect_accepted([](RegistrationResult& result) { result.views[0].consistency = parts(74, 3); });
+  expect_review([](RegistrationResult& result) { result.views[0].consistency = parts(73, 4); }, "4 of 77 parts");
+  expect_accepted([](RegistrationResult& result) { result.views[0].consistency = parts(196, 6); });
+  expect_review([](RegistrationResult& result) { result.views[0].consistency = parts(193, 7); }, "7 of 200 parts");
   // One alone may be anything, and parts without a signal say nothing.
   expect_accepted([](RegistrationResult& result) { result.views[0].consistency = parts(1, 1); });
   expect_accepted([](RegistrationResult& result) { result.views[0].consistency = parts(2, 0, 30); });
