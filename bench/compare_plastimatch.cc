@@ -277,7 +277,8 @@ void run(const Options& options) {
 }  // namespace isoshift
 
 int main(int argc, char** argv) try {
-  isoshift::use_decoder(ISOSHIFT_PROGRAM);
+  // The program of the same build.
+  isoshift::use_decoder(std::filesystem::read_symlink("/proc/self/exe").parent_path().parent_path() / "cli/isoshift");
   isoshift::Options options;
   std::vector<std::string> renderers(isoshift::kRendererKinds.size());
   std::ranges::transform(isoshift::kRendererKinds, renderers.begin(), [](auto kind) { return to_string(kind); });

@@ -102,7 +102,9 @@ std::vector<std::pair<std::string, std::vector<XrayImage>>> variants(const std::
 
 int check(int patient_count, std::optional<int> only) {
   std::vector<Patient> patients;
-  for (int n = 0; n < patient_count; ++n) patients.push_back(make_patient(static_cast<std::uint64_t>(100 + n)));
+  patients.reserve(static_cast<std::size_t>(patient_count));
+  constexpr std::uint64_t kFirstSeed = 100;
+  for (int n = 0; n < patient_count; ++n) patients.push_back(make_patient(kFirstSeed + static_cast<std::uint64_t>(n)));
   Eigen::Isometry3d planned = Eigen::Isometry3d::Identity();  // HFS: (x, y, z) of the room is (x, z, -y) of the patient
   planned.linear() << 1, 0, 0, 0, 0, 1, 0, -1, 0;
 

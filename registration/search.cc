@@ -145,6 +145,7 @@ SearchResult search(const RendererPyramid& renderers, const FixedViews& views,
         best_of(candidates_about(kept.front(), stage, options, random), more, similarity_at, report.evaluations),
         std::back_inserter(kept));
     std::vector<OptimizerOptions> searches;
+    searches.reserve(kept.size());
     for (const Parameters& start : kept) searches.push_back(optimizer_options(stage, options, start));
     std::vector<OptimizerResult> found = maximize(similarity_at, searches);
     std::ranges::stable_sort(found, std::greater(), &OptimizerResult::value);
