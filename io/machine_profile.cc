@@ -9,7 +9,6 @@
 #include <cmath>
 #include <fstream>
 #include <nlohmann/json.hpp>
-#include <ranges>
 
 #include "geometry/error.h"
 
@@ -85,9 +84,11 @@ MachineProfile::Rule rule_from(Section section, const std::string& where) {
   using Words = std::map<std::string, std::string, std::less<>>;
   rule.where = section.find<Words>("where", "an object of keywords and texts").value_or(Words());
   for (const auto& [keyword, value] : rule.where)
-    if (!kEquipmentAttributes.contains(keyword))
-      throw Error(fmt::format("{}: where: images are not told apart by {}, but by {}", where, keyword,
-                              fmt::join(std::views::keys(kEquipmentAttributes), ", ")));
+    if (!kEquipmentAttributes.contains(keyword)) {
+      std::string known;
+      for (const auto& [name, tag] : kEquipmentAttributes) known += (known.empty() ? "" : ", ") + name;
+      throw Error(fmt::format("{}: where: images are not told apart by {}, but by {}", where, keyword, known));
+    }
   rule.gantry_angle_offset_deg = section.number("gantry_angle_offset_deg", -360, 360).value_or(0.0);
   if (const auto plane = section.find<std::string>("spacing_plane", "SID or SAD")) {
     if (plane != "SID" && plane != "SAD") section.refuse("spacing_plane", "SID or SAD");
