@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <cmath>
 #include <memory>
 #include <nlohmann/json.hpp>
 
@@ -49,6 +50,8 @@ std::optional<PlannedSetup> planned_setup(const CheckOptions& options) {
   if (!options.isocenter.empty()) isocenter = Eigen::Vector3d(options.isocenter.data());
   if (!options.patient_position.empty()) position = options.patient_position;
   if (!isocenter && !position) return std::nullopt;
+  if ((isocenter && !isocenter->allFinite()) || !std::isfinite(options.couch_angle_deg))
+    throw UsageError("--isocenter and --couch-angle take finite numbers");
   if (!isocenter) throw UsageError("the shift needs the planned isocenter: --plan FILE or --isocenter X,Y,Z");
   if (!position) throw UsageError("the shift needs the patient position: --plan FILE or --patient-position HFS");
   const auto known = patient_position_from(*position);

@@ -72,6 +72,9 @@ TEST_F(CheckCommandTest, TheShiftNeedsIsocenterAndPosition) {
   EXPECT_EQ(outcome.exit_status, 2);
   EXPECT_THAT(outcome.err, HasSubstr("--patient-position"));
   EXPECT_EQ(run_command({"check", study_->plan().string()}).exit_status, 1);
+  const CommandOutcome endless = run_command({"check", ours(), "--isocenter", "nan,2,3", "--patient-position", "HFS"});
+  EXPECT_EQ(endless.exit_status, 2);
+  EXPECT_THAT(endless.err, HasSubstr("--isocenter and --couch-angle take finite numbers"));
 }
 
 }  // namespace
