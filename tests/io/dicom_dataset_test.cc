@@ -9,6 +9,7 @@
 #include <random>
 
 #include "geometry/error.h"
+#include "tests/support/small_study.h"
 #include "tests/support/temporary_folder.h"
 
 namespace isoshift {
@@ -100,6 +101,23 @@ TEST(DicomDataset, TruncatedFilesAreNamed) {
     FAIL();
   } catch (const Error& error) {
     EXPECT_THAT(error.what(), testing::HasSubstr("broken.dcm: cannot be read as a DICOM file"));
+  }
+}
+
+// Nested without end, sequences would take all of the stack.
+TEST(DicomDataset, SequencesNestedWithoutEndAreRefused) {
+  const SmallStudy study;
+  std::ifstream whole(study.plan(), std::ios::binary);
+  std::string bytes{std::istreambuf_iterator<char>(whole), {}};
+  for (int n = 0; n < 100'000; ++n)
+    bytes += std::string("\xFA\x30\xB0\x00SQ\0\0\xFF\xFF\xFF\xFF\xFE\xFF\x00\xE0\xFF\xFF\xFF\xFF", 20);
+  const std::filesystem::path path = study.path() / "nested.dcm";
+  std::ofstream(path, std::ios::binary) << bytes;
+  try {
+    DicomFile::read(path, DicomFile::Extent::kWhole);
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_THAT(error.what(), testing::HasSubstr("its sequences are nested more than 500 deep"));
   }
 }
 
