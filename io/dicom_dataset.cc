@@ -12,6 +12,7 @@
 #include <cstring>
 #include <fstream>
 #include <random>
+#include <sstream>
 
 #include "geometry/error.h"
 
@@ -49,8 +50,9 @@ void make_printable(std::string& text) {
 // by their tags (FFFE,E000), wherever they stand, and close at their length's end or by (FFFE,E00D).
 void check_nesting(const std::filesystem::path& path) {
   constexpr std::size_t kMaxDepth = 500;  // no object nests more than ten deep
-  std::ifstream stream(path, std::ios::binary);
-  const std::string bytes{std::istreambuf_iterator<char>(stream), {}};
+  std::ostringstream read;
+  read << std::ifstream(path, std::ios::binary).rdbuf();
+  const std::string bytes = std::move(read).str();
   std::vector<std::size_t> ends;  // of the items that are open; npos: until it is closed
   const auto look = [&](std::string_view item, std::string_view close, bool is_little_endian) {
     ends.clear();

@@ -15,22 +15,36 @@ namespace {
 constexpr double kMaxAngleNoiseDeg = 0.01;  // read-outs such as 359.998 mean 0
 
 // The items of the Exposure Sequence that speak of one frame: of several frames those that name it.
-std::vector<DicomItem> exposures_of(const DicomItem& dataset, int frame, int frames) {
-  std::vector<DicomItem> exposures = dataset.items(DCM_ExposureSequence);
-  if (frames > 1)
-    std::erase_if(exposures, [&](const DicomItem& exposure) {
-      const auto number = exposure.number(DCM_ReferencedFrameNumber);
-      return number && *number != frame + 1;
-    });
-  return exposures;
-}
+class Exposures {
+ public:
+  Exposures(const DicomItem& dataset, int frames) : items_(dataset.items(DCM_ExposureSequence)) {
+    frame_numbers_.resize(items_.size());
+    if (frames > 1)
+      std::ranges::transform(items_, frame_numbers_.begin(),
+                             [](const DicomItem& item) { return item.number(DCM_ReferencedFrameNumber); });
+  }
+
+  bool name_frames() const {
+    return std::ranges::any_of(frame_numbers_, [](const auto& number) { return number.has_value(); });
+  }
+  std::vector<DicomItem> of(int frame) const {
+    std::vector<DicomItem> items;
+    for (std::size_t n = 0; n < items_.size(); ++n)
+      if (!frame_numbers_[n] || *frame_numbers_[n] == frame + 1) items.push_back(items_[n]);
+    return items;
+  }
+
+ private:
+  std::vector<DicomItem> items_;
+  std::vector<std::optional<double>> frame_numbers_;  // which frame each names, if there are several
+};
 
 // A dataset as one frame sees it: the exposure's value where it has one, else the top level's. Several exposures must
 // agree.
 class FrameAttributes {
  public:
-  FrameAttributes(DicomItem dataset, int frame, int frames)
-      : dataset_(std::move(dataset)), exposures_(exposures_of(dataset_, frame, frames)) {}
+  FrameAttributes(DicomItem dataset, std::vector<DicomItem> exposures)
+      : dataset_(std::move(dataset)), exposures_(std::move(exposures)) {}
 
   std::optional<double> number(const DcmTagKey& tag) const {
     for (const DicomItem& exposure : exposures_) {
@@ -76,8 +90,9 @@ void replace(std::optional<T>& value, const T& by, const std::string& what, cons
   value = by;
 }
 
-RtImage read_frame(const std::filesystem::path& path, const DicomItem& d, const PixelFormat& format, int frame) {
-  const FrameAttributes attributes(d, frame, format.frames);
+RtImage read_frame(const std::filesystem::path& path, const DicomItem& d, const PixelFormat& format, int frame,
+                   std::vector<DicomItem> exposures) {
+  const FrameAttributes attributes(d, std::move(exposures));
   RtImage image;
   image.path = path;
   image.identity = read_identity(d);
@@ -87,7 +102,6 @@ RtImage read_frame(const std::filesystem::path& path, const DicomItem& d, const 
   image.frame_of_reference_uid = d.text(DCM_FrameOfReferenceUID);
   image.label = d.text(DCM_RTImageLabel).value_or(path.stem().string());
   image.frame = frame;
-  image.frames = format.frames;
   if (format.frames > 1) image.label += fmt::format("#{}", frame + 1);
   if (const auto type = d.texts(DCM_ImageType); type.size() > 2) image.image_type = type[2];
   image.reported_values_origin = d.text(DCM_ReportedValuesOrigin);
@@ -178,17 +192,15 @@ std::vector<RtImage> read_rt_images(const std::filesystem::path& path, Notes& no
   const DicomFile file = DicomFile::read(path, DicomFile::Extent::kHeader);
   const DicomItem dataset = file.dataset();
   const PixelFormat format = pixel_format(dataset);
-  const auto exposures = dataset.items(DCM_ExposureSequence);
-  const bool names_frames = format.frames > 1 && std::ranges::any_of(exposures, [](const DicomItem& exposure) {
-                              return exposure.has_value(DCM_ReferencedFrameNumber);
-                            });
+  const Exposures exposures(dataset, format.frames);
   std::vector<RtImage> images;
   for (int frame = 0; frame < format.frames; ++frame) {
-    if (names_frames && exposures_of(dataset, frame, format.frames).empty())
+    std::vector<DicomItem> of_frame = exposures.of(frame);
+    if (exposures.name_frames() && of_frame.empty())
       notes.warnings.push_back(fmt::format("{}: frame {} was left out: no item of {} tells its geometry", path.string(),
                                            frame + 1, described(DCM_ExposureSequence)));
     else
-      images.push_back(read_frame(path, dataset, format, frame));
+      images.push_back(read_frame(path, dataset, format, frame, std::move(of_frame)));
   }
   return images;
 }

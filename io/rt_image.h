@@ -32,7 +32,7 @@ std::string to_string(const PixelIntensity& intensity);
 // lengths in mm.
 struct RtImage {
   std::filesystem::path path;
-  int frame = 0, frames = 1;  // of the file; counted from 0
+  int frame = 0;  // of the file, counted from 0
   Identity identity;
   std::string sop_class_uid;
   std::string sop_instance_uid;
