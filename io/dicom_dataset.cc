@@ -12,9 +12,9 @@
 #include <cstring>
 #include <fstream>
 #include <random>
-#include <sstream>
 
 #include "geometry/error.h"
+#include "io/nesting.h"
 
 namespace isoshift {
 namespace {
@@ -44,35 +44,6 @@ std::string_view trimmed(std::string_view text) {
 void make_printable(std::string& text) {
   for (char& c : text)
     if (static_cast<unsigned char>(c) < 0x20 || c == 0x7F) c = ' ';
-}
-
-// DCMTK follows sequences by calling itself: a file that nests them without end would end the program. Items are found
-// by their tags (FFFE,E000), wherever they stand, and close at their length's end or by (FFFE,E00D).
-void check_nesting(const std::filesystem::path& path) {
-  constexpr std::size_t kMaxDepth = 500;  // no object nests more than ten deep
-  std::ostringstream read;
-  read << std::ifstream(path, std::ios::binary).rdbuf();
-  const std::string bytes = std::move(read).str();
-  std::vector<std::size_t> ends;  // of the items that are open; npos: until it is closed
-  const auto look = [&](std::string_view item, std::string_view close, bool is_little_endian) {
-    ends.clear();
-    for (std::size_t at = bytes.find(item.substr(0, 2)); at != std::string::npos && at + 8 <= bytes.size();
-         at = bytes.find(item.substr(0, 2), at + 1)) {
-      const std::string_view tag(bytes.data() + at, 4);
-      while (!ends.empty() && ends.back() != std::string::npos && ends.back() <= at) ends.pop_back();
-      if (tag == close && !ends.empty()) ends.pop_back();
-      if (tag != item) continue;
-      std::uint32_t length = 0;
-      for (std::size_t n = 0; n < 4; ++n)
-        length |= static_cast<std::uint32_t>(static_cast<unsigned char>(bytes[at + 4 + n]))
-                  << 8 * (is_little_endian ? n : 3 - n);
-      ends.push_back(length == 0xFFFFFFFF ? std::string::npos : at + 8 + length);
-      if (ends.size() > kMaxDepth)
-        throw Error(fmt::format("{}: its sequences are nested more than {} deep", path.string(), kMaxDepth));
-    }
-  };
-  look({"\xFE\xFF\x00\xE0", 4}, {"\xFE\xFF\x0D\xE0", 4}, true);
-  look({"\xFF\xFE\xE0\x00", 4}, {"\xFF\xFE\xE0\x0D", 4}, false);
 }
 
 bool is_text_vr(DcmEVR vr) { return vr == EVR_DS || vr == EVR_IS; }
@@ -258,8 +229,8 @@ DicomFile& DicomFile::operator=(DicomFile&&) noexcept = default;
 DicomFile::~DicomFile() = default;
 
 DicomFile DicomFile::read(const std::filesystem::path& path, Extent extent) {
-  check_nesting(path);
   DicomFile file;
+  check_nesting(path);
   file.path_ = path;
   const OFCondition loaded = extent == Extent::kWhole
                                  ? file.file_->loadFile(path.c_str())
