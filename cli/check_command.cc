@@ -30,25 +30,22 @@ struct CheckOptions {
 
 // Where the patient was planned to lie.
 struct PlannedSetup {
-  PatientPosition patient_position = PatientPosition::kHfs;
   TableAngles table;
   Eigen::Vector3d isocenter_patient_mm = Eigen::Vector3d::Zero();
+  Eigen::Isometry3d room_from_patient = Eigen::Isometry3d::Identity();
 };
 
+// What the switches say, else the plan; nothing where neither says anything.
 std::optional<PlannedSetup> planned_setup(const CheckOptions& options) {
   std::optional<Eigen::Vector3d> isocenter;
   std::optional<std::string> position;
-  if (!options.plan.empty()) {
-    for (const RtPlan::Beam& beam : read_rt_plan(options.plan).beams) {
-      if (isocenter && beam.isocenter_patient_mm && *beam.isocenter_patient_mm != *isocenter)
-        throw Error(
-            fmt::format("{}: has several isocenters.\n       Name one: --isocenter X,Y,Z", options.plan.string()));
-      if (beam.isocenter_patient_mm) isocenter = beam.isocenter_patient_mm;
-      if (beam.patient_position) position = beam.patient_position;
-    }
-  }
   if (!options.isocenter.empty()) isocenter = Eigen::Vector3d(options.isocenter.data());
   if (!options.patient_position.empty()) position = options.patient_position;
+  if (!options.plan.empty()) {
+    const RtPlan plan = read_rt_plan(options.plan);
+    if (!isocenter) isocenter = common_isocenter(plan, plan.beams);
+    if (!position) position = common_patient_position(plan, plan.beams);
+  }
   if (!isocenter && !position) return std::nullopt;
   if ((isocenter && !isocenter->allFinite()) || !std::isfinite(options.couch_angle_deg))
     throw UsageError("--isocenter and --couch-angle take finite numbers");
@@ -56,21 +53,25 @@ std::optional<PlannedSetup> planned_setup(const CheckOptions& options) {
   if (!position) throw UsageError("the shift needs the patient position: --plan FILE or --patient-position HFS");
   const auto known = patient_position_from(*position);
   if (!known) throw UsageError(fmt::format("the patient position is {}, expected HFS, HFP, FFS, FFP, ...", *position));
-  return PlannedSetup{.patient_position = *known,
-                      .table = {.support_rad = rad_from_deg(options.couch_angle_deg)},
-                      .isocenter_patient_mm = *isocenter};
+  const TableAngles table = {.support_rad = rad_from_deg(options.couch_angle_deg)};
+  return PlannedSetup{.table = table,
+                      .isocenter_patient_mm = *isocenter,
+                      .room_from_patient = planned_room_from_patient(*known, table, *isocenter)};
 }
 
-// The setup error that a matrix from the treatment frame to the planning CT means.
-Eigen::Isometry3d setup_error_of(const Eigen::Isometry3d& ct_from_treatment, const PlannedSetup& setup) {
-  const Eigen::Isometry3d planned =
-      planned_room_from_patient(setup.patient_position, setup.table, setup.isocenter_patient_mm);
-  return setup_error_from_poses(planned, actual_room_from_patient(planned, ct_from_treatment));
+// The setup error that a matrix to the planning CT means.
+Eigen::Isometry3d setup_error_of(const Eigen::Isometry3d& ct_from_source, bool source_is_room,
+                                 const PlannedSetup& setup) {
+  const Eigen::Isometry3d actual =
+      source_is_room ? ct_from_source.inverse() : actual_room_from_patient(setup.room_from_patient, ct_from_source);
+  return setup_error_from_poses(setup.room_from_patient, actual);
 }
 
 std::optional<Eigen::Isometry3d> rigid_of(const CheckedRegistration& checked) {
   return checked.registered_from_source ? as_rigid(*checked.registered_from_source) : std::nullopt;
 }
+
+bool is_from_room(const CheckedRegistration& checked) { return checked.source_frame_uid == kIecFixedFrameUid; }
 
 Json json_of(const CouchShift& shift) {
   return {{"lateral_mm", shift.translation_mm.x()},        {"longitudinal_mm", shift.translation_mm.y()},
@@ -87,7 +88,8 @@ std::optional<CouchShift> shift_of(CheckedRegistration& checked, const PlannedSe
   const auto off_isocenter_mm = [&](const Eigen::Isometry3d& pose) {
     return (pose.translation() - setup.isocenter_patient_mm).norm();
   };
-  if (off_isocenter_mm(*matrix) < kMaxSetupErrorMm) return couch_shift_for(setup_error_of(*matrix, setup), setup.table);
+  if (off_isocenter_mm(*matrix) < kMaxSetupErrorMm)
+    return couch_shift_for(setup_error_of(*matrix, is_from_room(checked), setup), setup.table);
   const bool is_inverted = off_isocenter_mm(matrix->inverse()) < kMaxSetupErrorMm;
   checked.findings.push_back(
       {.is_error = is_inverted,
@@ -137,6 +139,8 @@ Json compare(const CheckedRegistration& first, const CheckedRegistration& other,
   if (!a || !b) return cannot("as not both hold one rigid matrix");
   if (first.registered_frame_uid != other.registered_frame_uid)
     return cannot("as they register different frames (CTs)");
+  if (is_from_room(first) != is_from_room(other))
+    return cannot("as one begins in the room's axes (IEC 61217 Fixed) and the other does not: compare their shifts");
   const RegistrationDifference difference = difference_between(*a, *b);
   is_inverted = difference.other_is_inverted;
   text += fmt::format("difference: {:.3f} mm at the isocenter, {:.3f} deg\n", difference.translation_mm,

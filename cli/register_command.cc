@@ -136,9 +136,9 @@ bool may_write_registration(const RegisterOptions& options, const RegistrationRe
   return result.verdict == Verdict::kAccepted || (result.verdict == Verdict::kReview && options.write_reg_for_review);
 }
 
-SpatialRegistrationLabel label_of(Verdict verdict) {
-  if (verdict == Verdict::kAccepted) return {};
-  return {.content_label = "SETUP_REVIEW", .content_description = "NOT ACCEPTED: REVIEW"};
+SpatialRegistrationOptions registration_options(RegistrationSource source, Verdict verdict) {
+  if (verdict == Verdict::kAccepted) return {.source = source};
+  return {.content_label = "SETUP_REVIEW", .content_description = "NOT ACCEPTED: REVIEW", .source = source};
 }
 
 std::vector<ViewComparison::Disagreement> disagreements_of(const ViewReport& view, const XrayView& camera) {
@@ -196,8 +196,9 @@ int run_register(const RegisterOptions& given, Console& console) {
 
   SetupReport report = make_report(options, study, renderer, setup.options(), result);
   if (may_write_registration(options, result))
-    report.spatial_registration_uid = write_spatial_registration(
-        study, result.actual_room_from_patient, label_of(result.verdict), output.path() / kRegistrationFile, notes);
+    report.spatial_registration_uid = write_spatial_registration(study, result.actual_room_from_patient,
+                                                                 registration_options(options.source, result.verdict),
+                                                                 output.path() / kRegistrationFile, notes);
   write_pictures(study, renderer, result, output.path());
   report.overrides = notes.overrides;
   report.left_aside = notes.left_aside;
@@ -233,6 +234,15 @@ void add_register_command(CLI::App& app, Console& console, int& exit_status) {
       ->type_name("FILE");
   command->add_flag("--write-reg-for-review", options->write_reg_for_review,
                     "Write the registration object for a result that needs review, too, marked as not accepted");
+  command
+      ->add_option_function<std::string>(
+          "--source-for",
+          [options](const std::string& name) {
+            options->source = name == "treatment" ? RegistrationSource::kTreatment : RegistrationSource::kIecFixed;
+          },
+          "Axes that the registration object takes to the CT: the patient's as planned, or the room's")
+      ->check(CLI::IsMember({"treatment", "iec-fixed"}))
+      ->default_str("treatment");
   command->add_flag("--overwrite", options->overwrite, "Replace an earlier output in that folder");
   command->add_flag("--json", options->json, "Print result.json instead of the report");
   add_registration_flags(*command, options->flags);

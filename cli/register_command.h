@@ -8,6 +8,7 @@
 #include "cli/console.h"
 #include "cli/registration_setup.h"
 #include "cli/study_options.h"
+#include "io/spatial_registration.h"
 
 namespace isoshift {
 
@@ -19,6 +20,7 @@ struct RegisterOptions {
   bool overwrite = false;
   bool json = false;
   bool write_reg_for_review = false;
+  RegistrationSource source = RegistrationSource::kTreatment;
 };
 
 // Returns the exit status that the verdict asks for.

@@ -1,17 +1,15 @@
 #include "io/drr_image.h"
 
 #include <dcmtk/dcmdata/dcuid.h>
-#include <fmt/chrono.h>
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 
 #include "geometry/error.h"
 #include "geometry/rotation.h"
 #include "io/decode.h"
-#include "io/version.h"
+#include "io/object_header.h"
 
 namespace isoshift {
 namespace {
@@ -19,21 +17,15 @@ namespace {
 constexpr double kLineIntegralPerStored = 0.001;
 
 void put_general(DicomItem dataset, const Study& study, std::size_t index, const std::string& series_instance_uid) {
-  const std::tm local = fmt::localtime(std::chrono::system_clock::to_time_t(std::chrono::system_clock::now()));
-  put_identity(dataset, study.ct.identity);
-  dataset.put(DCM_SOPClassUID, UID_RTImageStorage);
-  dataset.put(DCM_SOPInstanceUID, new_uid());
-  dataset.put(DCM_Modality, "RTIMAGE");
-  dataset.put(DCM_SeriesInstanceUID, series_instance_uid);
-  dataset.put(DCM_SeriesNumber, "9002");
-  dataset.put(DCM_SeriesDescription, "DRR");
+  put_header(dataset, {.identity = study.ct.identity,
+                       .sop_class_uid = UID_RTImageStorage,
+                       .sop_instance_uid = new_uid(),
+                       .modality = "RTIMAGE",
+                       .series_instance_uid = series_instance_uid,
+                       .series_number = 9002,
+                       .series_description = "DRR",
+                       .instance_number = static_cast<int>(index + 1)});
   dataset.put(DCM_OperatorsName, "");
-  dataset.put(DCM_Manufacturer, "isoshift");
-  dataset.put(DCM_ManufacturerModelName, "isoshift");
-  dataset.put(DCM_SoftwareVersions, kVersion);
-  dataset.put(DCM_InstanceNumber, fmt::format("{}", index + 1));
-  dataset.put(DCM_ContentDate, fmt::format("{:%Y%m%d}", local));
-  dataset.put(DCM_ContentTime, fmt::format("{:%H%M%S}", local));
   dataset.put(DCM_ImageType, "DERIVED\\SECONDARY\\DRR");
   dataset.put(DCM_ConversionType, "WSD");
   dataset.put(DCM_PatientOrientation, "");

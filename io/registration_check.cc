@@ -99,6 +99,10 @@ class Checker {
       error(fmt::format("{} items are not the identity. SlicerRT multiplies all matrices of a file", others));
       result_.registered_from_source.reset();
     }
+    if (result_.source_frame_uid == kIecFixedFrameUid)
+      note(
+          "begins in the room's axes (IEC 61217 Fixed): to be chained only with registrations of the same patient "
+          "position (C.20.2.1.1)");
     if (others == 0 && items.size() > 1)
       note("all matrices are the identity: readers that look for the other one find none");
   }

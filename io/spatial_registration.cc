@@ -1,17 +1,14 @@
 #include "io/spatial_registration.h"
 
 #include <dcmtk/dcmdata/dcuid.h>
-#include <fmt/chrono.h>
 #include <fmt/format.h>
 
 #include <algorithm>
-
-#include <chrono>
 #include <map>
 #include <optional>
 
 #include "geometry/error.h"
-#include "io/version.h"
+#include "io/object_header.h"
 
 namespace isoshift {
 namespace {
@@ -23,7 +20,8 @@ struct SourceFrame {
   bool lists_images = false;                               // the RT Images are in it
 };
 
-SourceFrame source_frame(const Study& study, Notes& notes) {
+SourceFrame source_frame(const Study& study, RegistrationSource axes, Notes& notes) {
+  if (axes == RegistrationSource::kIecFixed) return {.uid = kIecFixedFrameUid};
   const RtImage& first = study.rt_images.front();
   for (const RtImage& image : study.rt_images) {
     if (!image.frame_of_reference_uid || !image.isocenter_mm ||
@@ -96,40 +94,31 @@ void put_common_instance_references(DicomItem dataset, const Study& study) {
   }
 }
 
-void put_series_and_equipment(DicomItem dataset, const Study& study, const std::string& sop_instance_uid,
-                              const SpatialRegistrationLabel& label) {
-  const std::time_t now = std::chrono::system_clock::to_time_t(std::chrono::system_clock::now());
-  const std::tm local = fmt::localtime(now);
-  put_identity(dataset, study.ct.identity);
-  dataset.put(DCM_SOPClassUID, UID_SpatialRegistrationStorage);
-  dataset.put(DCM_SOPInstanceUID, sop_instance_uid);
-  dataset.put(DCM_ContentDate, fmt::format("{:%Y%m%d}", local));
-  dataset.put(DCM_ContentTime, fmt::format("{:%H%M%S}", local));
-  dataset.put(DCM_TimezoneOffsetFromUTC, fmt::format("{:%z}", local));
-  dataset.put(DCM_Modality, "REG");
-  dataset.put(DCM_SeriesInstanceUID, new_uid());
-  dataset.put(DCM_SeriesNumber, "9001");
-  dataset.put(DCM_SeriesDescription, "2D/3D setup registration");
+void put_general(DicomItem dataset, const Study& study, const std::string& sop_instance_uid,
+                 const SpatialRegistrationOptions& options) {
+  put_header(dataset, {.identity = study.ct.identity,
+                       .sop_class_uid = UID_SpatialRegistrationStorage,
+                       .sop_instance_uid = sop_instance_uid,
+                       .modality = "REG",
+                       .series_instance_uid = new_uid(),
+                       .series_number = 9001,
+                       .series_description = "2D/3D setup registration"});
   if (!study.ct.body_part_examined.empty())
     dataset.put(DCM_BodyPartExamined, study.ct.body_part_examined);
   else
     dataset.put(DCM_Laterality, "");  // type 2C: required, possibly empty, where the body part is unknown
-  dataset.put(DCM_Manufacturer, "isoshift");
-  dataset.put(DCM_ManufacturerModelName, "isoshift");
-  dataset.put(DCM_SoftwareVersions, kVersion);
   dataset.put(DCM_FrameOfReferenceUID, study.ct.frame_of_reference_uid);
   dataset.put(DCM_PositionReferenceIndicator, "");
-  dataset.put(DCM_InstanceNumber, "1");
-  dataset.put(DCM_ContentLabel, label.content_label);
-  dataset.put(DCM_ContentDescription, label.content_description);
+  dataset.put(DCM_ContentLabel, options.content_label);
+  dataset.put(DCM_ContentDescription, options.content_description);
   dataset.put(DCM_ContentCreatorName, "");
 }
 
 DicomFile registration_object(const Study& study, const SourceFrame& source, const Eigen::Isometry3d& ct_from_source,
-                              const std::string& sop_instance_uid, const SpatialRegistrationLabel& label) {
+                              const std::string& sop_instance_uid, const SpatialRegistrationOptions& options) {
   DicomFile file;
   DicomItem dataset = file.dataset();
-  put_series_and_equipment(dataset, study, sop_instance_uid, label);
+  put_general(dataset, study, sop_instance_uid, options);
 
   DicomItem ct_item = dataset.append_item(DCM_RegistrationSequence);
   ct_item.put(DCM_FrameOfReferenceUID, study.ct.frame_of_reference_uid);
@@ -202,13 +191,15 @@ Eigen::Isometry3d actual_room_from_patient(const Eigen::Isometry3d& planned_room
 }
 
 std::string write_spatial_registration(const Study& study, const Eigen::Isometry3d& actual_room_from_patient,
-                                       const SpatialRegistrationLabel& label, const std::filesystem::path& path,
+                                       const SpatialRegistrationOptions& options, const std::filesystem::path& path,
                                        Notes& notes) {
-  const SourceFrame source = source_frame(study, notes);
-  Eigen::Isometry3d ct_from_source = ct_from_treatment(study.planned_room_from_patient, actual_room_from_patient);
+  const SourceFrame source = source_frame(study, options.source, notes);
+  Eigen::Isometry3d ct_from_source = options.source == RegistrationSource::kIecFixed
+                                         ? actual_room_from_patient.inverse()
+                                         : ct_from_treatment(study.planned_room_from_patient, actual_room_from_patient);
   ct_from_source.translate(-source.isocenter_mm);
   std::string sop_instance_uid = new_uid();
-  DicomFile file = registration_object(study, source, ct_from_source, sop_instance_uid, label);
+  DicomFile file = registration_object(study, source, ct_from_source, sop_instance_uid, options);
   file.write(path);
   check_read_back(path, ct_from_source);
   return sop_instance_uid;

@@ -23,15 +23,22 @@ Eigen::Isometry3d ct_from_treatment(const Eigen::Isometry3d& planned_room_from_p
 Eigen::Isometry3d actual_room_from_patient(const Eigen::Isometry3d& planned_room_from_patient,
                                            const Eigen::Isometry3d& ct_from_treatment);
 
-struct SpatialRegistrationLabel {
+// The well-known frame of reference "IEC 61217 Fixed Coordinate System Frame of Reference" (PS3.6, table A-2).
+inline constexpr const char* kIecFixedFrameUid = "1.2.840.10008.1.4.3.1";
+
+// Which frame the registration takes to the CT: the treatment frame, or the room's own axes.
+enum class RegistrationSource { kTreatment, kIecFixed };
+
+struct SpatialRegistrationOptions {
   std::string content_label = "SETUP_2D3D";  // CS
   std::string content_description;           // LO
+  RegistrationSource source = RegistrationSource::kTreatment;
 };
 
 // Writes the object whole or not at all, reads it back and compares. Returns its SOP Instance UID. Adds a warning where
 // the images' frame of reference had to be replaced.
 std::string write_spatial_registration(const Study& study, const Eigen::Isometry3d& actual_room_from_patient,
-                                       const SpatialRegistrationLabel& label, const std::filesystem::path& path,
+                                       const SpatialRegistrationOptions& options, const std::filesystem::path& path,
                                        Notes& notes);
 
 // A Spatial Registration object of any program. Throws Error for anything else.

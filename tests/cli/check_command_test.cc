@@ -1,6 +1,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <fstream>
 #include <nlohmann/json.hpp>
 
 #include "tests/support/small_study.h"
@@ -59,6 +60,21 @@ TEST_F(CheckCommandTest, AnInvertedOneIsFoundByThePlanAndByItsPair) {
   const CommandOutcome by_pair = run_command({"check", ours(), inverted()});
   EXPECT_EQ(by_pair.exit_status, 1);
   EXPECT_THAT(by_pair.out, HasSubstr("the second one looks inverted"));
+}
+
+TEST_F(CheckCommandTest, OneFromTheRoomMeansTheSameShift) {
+  const std::string from_room = (folder_ / "from_room").string();
+  ASSERT_EQ(
+      run_command({"register", study_->path().string(), "-o", from_room, "--source-for", "iec-fixed"}).exit_status, 0);
+  const std::string theirs = from_room + "/spatial_registration.dcm", plan = study_->plan().string();
+  const CommandOutcome outcome = run_command({"check", ours(), theirs, "--plan", plan, "--json"});
+  ASSERT_EQ(outcome.exit_status, 0) << outcome.err;
+  const auto checked = nlohmann::json::parse(outcome.out);
+  for (const char* axis : {"lateral_mm", "longitudinal_mm", "vertical_mm", "yaw_deg", "pitch_deg", "roll_deg"})
+    EXPECT_NEAR(checked["registrations"][0]["couch_shift"][axis].get<double>(),
+                checked["registrations"][1]["couch_shift"][axis].get<double>(), 1e-6)
+        << axis;
+  EXPECT_THAT(checked["difference"]["reason"].get<std::string>(), HasSubstr("compare their shifts"));
 }
 
 TEST_F(CheckCommandTest, TheSameTwiceDoesNotDiffer) {

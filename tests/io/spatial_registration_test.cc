@@ -88,9 +88,23 @@ TEST_F(SpatialRegistrationFileTest, HoldsAnExactIdentityAndTheTreatmentMatrix) {
   EXPECT_THAT(Vector3d(study.planned_room_from_patient.linear() * error_patient),
               VectorNear(Vector3d(truth().translation()), 1e-6));
 
+  EXPECT_THAT(actual_room_from_patient(study.planned_room_from_patient, m), PoseNear(actual_, 1e-6, 1e-6));
+
   // The inverse on the way back would fail this.
   const Vector3d inverted = m * study.isocenter_patient_mm;
   EXPECT_GT((study.planned_room_from_patient.linear() * inverted - truth().translation()).norm(), 100.0);
+}
+
+// docs/dicom.md 4.4, --source-for iec-fixed: from the room's axes, the inverse of the pose.
+TEST_F(SpatialRegistrationFileTest, FromTheRoomItIsTheInverseOfThePose) {
+  const Study study = load();
+  const Eigen::Isometry3d actual = truth() * study.planned_room_from_patient;
+  write_spatial_registration(study, actual, {.source = RegistrationSource::kIecFixed}, path(), notes_);
+  const SpatialRegistration::Item item = read_spatial_registration(path()).items[1];
+  EXPECT_EQ(item.frame_of_reference_uid, "1.2.840.10008.1.4.3.1");
+  EXPECT_THAT(item.registered_from_source, PoseNear(actual.inverse(), 1e-6, 1e-6));
+  const CommandOutcome checked = run_shell("dciodvfy -new " + path().string());
+  EXPECT_THAT(checked.out, testing::Not(HasSubstr("Error"))) << checked.out;
 }
 
 TEST_F(SpatialRegistrationFileTest, PassesDciodvfy) {
