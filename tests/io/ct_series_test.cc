@@ -9,6 +9,7 @@
 
 #include "geometry/error.h"
 #include "io/decode.h"
+#include "tests/support/command.h"
 #include "tests/support/pose_near.h"
 #include "tests/support/small_study.h"
 
@@ -233,6 +234,19 @@ TEST_F(CtSeriesTest, AnEnhancedCtIsTheSameVolumeAsItsSlices) {
   EXPECT_EQ(enhanced.hu.voxels, slices.hu.voxels);
   EXPECT_TRUE(enhanced.hu.patient_from_voxel.isApprox(slices.hu.patient_from_voxel, 1e-12));
   EXPECT_THAT(enhanced.sop_instance_uids, testing::ElementsAre("1.2.3.99"));
+}
+
+TEST_F(CtSeriesTest, AnEnhancedCtMayBeCompressed) {
+  write_even(6);
+  convert_to_enhanced();
+  const std::vector<float> voxels = read().hu.voxels;
+  const std::filesystem::path plain = files_.front();
+  for (const std::string command : {"dcmcrle", "dcmcjpls +el", "dcmcjpeg +e1", "dcmconv +td"}) {
+    files_ = {folder_ / (command.substr(0, command.find(' ')) + ".dcm")};
+    ASSERT_EQ(run_shell(fmt::format("{} {} {}", command, plain.string(), files_.front().string())).exit_status, 0)
+        << command;
+    EXPECT_EQ(read().hu.voxels, voxels) << command;
+  }
 }
 
 TEST_F(CtSeriesTest, OfSeveralStacksNoneIsChosen) {
