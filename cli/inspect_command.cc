@@ -27,8 +27,7 @@ std::string line(std::string_view name, std::string_view value) { return fmt::fo
 // The source and the panel's center in the room: what the angles and distances mean once put together.
 std::string geometry_as_understood(const RtImage& image) {
   Notes notes;
-  const CarmGeometry geometry = carm_geometry(image, notes);
-  const XrayView view = make_xray_view(geometry, Beam::kKilovoltage);
+  const XrayView view = xray_view(image, Beam::kKilovoltage, notes);
   const Ray center = view.ray(0.5 * (view.columns - 1), 0.5 * (view.rows - 1));
   std::string text =
       line("source, IEC fixed", fmt::format("({:.2f}) mm", fmt::join(view.source_room_mm, ", "))) +
@@ -39,7 +38,10 @@ std::string geometry_as_understood(const RtImage& image) {
   return text;
 }
 
-std::string describe_rt_image(RtImage image, const std::optional<std::string>& planned_position) {
+std::string describe_rt_image(RtImage image, const std::optional<std::string>& planned_position,
+                              const std::optional<MachineProfile>& machine) {
+  Notes applied;
+  if (machine) image = with_machine(image, *machine, {}, applied);
   if (!image.patient_position) image.patient_position = planned_position;
   std::string text =
       fmt::format("{} \"{}\", {}\n", image.is_rt_image() ? "RT Image" : "X-ray", image.label, image.path.string());
@@ -60,6 +62,7 @@ std::string describe_rt_image(RtImage image, const std::optional<std::string>& p
           line("frame of reference", or_missing(image.frame_of_reference_uid)) +
           line("isocenter in that frame", or_missing(image.isocenter_mm, "mm")) +
           line("acquired", or_missing(image.acquisition_date) + " " + or_missing(image.acquisition_time));
+  for (const std::string& override_ : applied.overrides) text += line("profile", override_);
   const auto missing = missing_attributes(image);
   for (const MissingAttribute& attribute : missing)
     text += line("MISSING", fmt::format("{}; {}", described(attribute.tag),
@@ -69,8 +72,8 @@ std::string describe_rt_image(RtImage image, const std::optional<std::string>& p
   try {
     for (const Finding& finding : rt_image_findings(image))
       text += line("CHECK", fmt::format("{}; allowed by --allow {}=REASON", finding.message, finding.key));
-    const bool has_geometry = image.plane && image.pixel_spacing_mm && image.position_mm && image.sad_mm &&
-                              image.sid_mm && image.gantry_angle_deg;
+    const bool has_geometry = image.pixel_from_room || (image.plane && image.pixel_spacing_mm && image.position_mm &&
+                                                        image.sad_mm && image.sid_mm && image.gantry_angle_deg);
     if (has_geometry) text += geometry_as_understood(image);
   } catch (const Error& error) {
     text += line("REFUSED", error.what());
@@ -133,7 +136,8 @@ std::string describe_ct(const std::string& series_uid, const std::vector<std::fi
   return text + "\n";
 }
 
-void run_inspect(const std::vector<std::filesystem::path>& paths, Console& console) {
+void run_inspect(const std::vector<std::filesystem::path>& paths, const std::optional<MachineProfile>& machine,
+                 Console& console) {
   const StudyFiles files = scan_study(paths);
   std::optional<std::string> planned_position;
   for (const auto& [path, uid, frame, structures] : files.plans) {
@@ -146,7 +150,7 @@ void run_inspect(const std::vector<std::filesystem::path>& paths, Console& conso
     for (const StudyFiles::Image& file : images) {
       Notes notes;
       for (const RtImage& image : read_rt_images(file.file, notes))
-        console.out << describe_rt_image(image, planned_position);
+        console.out << describe_rt_image(image, planned_position, machine);
       for (const std::string& warning : notes.warnings) console.out << "note: " << warning << "\n";
     }
   for (const auto& structures : files.structures) console.out << describe_structures(structures.file);
@@ -164,6 +168,7 @@ void run_inspect(const std::vector<std::filesystem::path>& paths, Console& conso
 void add_inspect_command(CLI::App& app, Console& console, int&) {
   struct Options {
     std::vector<std::filesystem::path> paths;
+    std::filesystem::path machine;
     bool devices = false;
   };
   auto options = std::make_shared<Options>();
@@ -172,11 +177,16 @@ void add_inspect_command(CLI::App& app, Console& console, int&) {
   command->footer(
       "\nExample:\n  isoshift inspect exported/\n  isoshift inspect RTIMAGE/KV_AP.dcm\n  isoshift inspect --devices");
   auto* paths = command->add_option("path", options->paths, "Files or folders")->type_name("PATH");
+  command->add_option("--machine", options->machine, "Machine profile: what becomes of the X-rays with it")
+      ->type_name("FILE");
   auto* devices = command->add_flag("--devices", options->devices, "Say what there is to render on");
   command->require_option(1, 0);
   paths->excludes(devices);
   command->callback([options, &console] {
-    if (!options->devices) return run_inspect(options->paths, console);
+    if (!options->devices)
+      return run_inspect(
+          options->paths,
+          options->machine.empty() ? std::nullopt : std::optional(read_machine_profile(options->machine)), console);
     for (const std::string& line : describe_gl_devices()) console.out << "OpenGL, " << line << "\n";
     console.out << fmt::format("--renderer auto is {}\n", has_hardware_gl() ? "raycast" : "cpu");
   });

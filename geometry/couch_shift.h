@@ -24,4 +24,15 @@ struct CouchShift {
 // R_new = R^T Rz Rx Ry: negated angles would leave an error of second order, since rotations do not commute.
 CouchShift couch_shift_for(const Eigen::Isometry3d& setup_error, const TableAngles& table);
 
+// Which of its six motions a couch can make: all; translations and yaw; translations.
+enum class CouchDof { kThree = 3, kFour = 4, kSix = 6 };
+
+// The part of a shift that such a couch can apply; the angles it cannot change stay as at imaging.
+CouchShift applicable(const CouchShift& shift, const TableAngles& table, CouchDof dof);
+
+// Where anatomy planned at `point_mm` (from the isocenter, IEC 61217 fixed) lies after the couch has applied `shift`,
+// minus where it was planned (docs/dicom.md 5.1).
+Eigen::Vector3d left_over_mm(const Eigen::Isometry3d& setup_error, const TableAngles& table, const CouchShift& shift,
+                             const Eigen::Vector3d& point_mm);
+
 }  // namespace isoshift

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "geometry/error.h"
@@ -78,6 +79,20 @@ XrayView xray_view_from_matrix(const Eigen::Matrix<double, 3, 4>& pixel_from_roo
   if (!(view.pixel_from_room(2, 3) > 0.0 && view.pixel_from_room(2, 3) < 1.0))
     throw Error(fmt::format(
         "the projection matrix and the SID of {} mm put the isocenter not between source and receptor", sid_mm));
+
+  // Any matrix has a camera; that of an X-ray has pixels such as receptors have.
+  constexpr double kMinPitchMm = 0.05, kMaxPitchMm = 6.0, kMaxCosine = 0.01, kMaxPitchRatio = 2.0;
+  const Eigen::Matrix3d receptor_from_pixel = view.pixel_from_room.leftCols<3>().inverse();
+  const Eigen::Vector3d column_step = receptor_from_pixel.col(0), row_step = receptor_from_pixel.col(1);
+  const auto [small_mm, large_mm] = std::minmax({column_step.norm(), row_step.norm()});
+  const double cosine = column_step.normalized().dot(row_step.normalized());
+  if (small_mm < kMinPitchMm || large_mm > kMaxPitchMm || large_mm > kMaxPitchRatio * small_mm ||
+      std::abs(cosine) > kMaxCosine)
+    throw Error(fmt::format(
+        "the projection matrix and the SID of {} mm make pixels of {:.4g} x {:.4g} mm whose edges meet at {:.1f} "
+        "degrees, expected {} to {} mm, of sizes alike and at right angles",
+        sid_mm, column_step.norm(), row_step.norm(), deg_from_rad(std::acos(std::clamp(cosine, -1.0, 1.0))),
+        kMinPitchMm, kMaxPitchMm));
   return view;
 }
 

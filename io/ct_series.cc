@@ -31,6 +31,8 @@ struct Slice {
   PixelFormat format;
   std::string sop_instance_uid;
   std::string frame_of_reference_uid;
+  Identity identity;
+  bool is_lossy = false;  // compressed with loss
   std::vector<float> hu;
 };
 
@@ -105,6 +107,8 @@ Slice slice_at(const FrameGeometry& geometry, const DicomItem& dataset, const st
   slice.where = where;
   slice.sop_instance_uid = dataset.required_text(DCM_SOPInstanceUID);
   slice.frame_of_reference_uid = dataset.required_text(DCM_FrameOfReferenceUID);
+  slice.identity = read_identity(dataset);
+  slice.is_lossy = dataset.text(DCM_LossyImageCompression) == "01";
   slice.position_mm = Eigen::Vector3d(geometry.position.required_numbers(DCM_ImagePositionPatient, 3).data());
   const std::vector<double> orientation = geometry.orientation.required_numbers(DCM_ImageOrientationPatient, 6);
   slice.row_direction = Eigen::Vector3d(orientation.data());
@@ -211,6 +215,19 @@ void check_same_lattice(const std::vector<Slice>& slices) {
         (slice.column_direction - first.column_direction).cwiseAbs().maxCoeff() > 1e-4)
       differs(slice, DCM_ImageOrientationPatient);
   }
+}
+
+// One patient throughout, whatever the Series Instance UID says.
+std::vector<Finding> patient_findings(const std::vector<Slice>& slices) {
+  const Slice& first = slices.front();
+  for (const Slice& slice : slices)
+    for (const auto& [tag, member] :
+         {std::pair(DCM_PatientID, &Identity::patient_id), std::pair(DCM_PatientName, &Identity::patient_name),
+          std::pair(DCM_PatientBirthDate, &Identity::patient_birth_date)})
+      if (slice.identity.*member != first.identity.*member)
+        return {{"patient-mismatch", fmt::format("{}: {} differs from that of {}: slices of different patients",
+                                                 slice.where, described(tag), first.where)}};
+  return {};
 }
 
 // CT-6. The same instance twice counts once; two different slices in one place are an error.
@@ -325,10 +342,11 @@ CtSeries read_ct_series(std::span<const std::filesystem::path> files, const Allo
   series.frame_of_reference_uid = header.required_text(DCM_FrameOfReferenceUID);
   series.body_part_examined = header.text(DCM_BodyPartExamined).value_or("");
   series.patient_position = header.text(DCM_PatientPosition).value_or("");
-  if (header.text(DCM_LossyImageCompression) == "01")
-    notes.warnings.push_back("the CT has been compressed with loss (LossyImageCompression is 01)");
 
   std::vector<Slice> slices = read_slices(files, progress);
+  if (std::ranges::any_of(slices, &Slice::is_lossy))
+    notes.warnings.push_back("the CT has been compressed with loss (LossyImageCompression is 01)");
+  settle(patient_findings(slices), allowed, notes);
   check_same_lattice(slices);
   const Eigen::Matrix3d axes = orthonormal_axes(slices.front());
   std::ranges::sort(slices, {}, [&](const Slice& slice) { return slice.position_mm.dot(axes.col(2)); });

@@ -1,5 +1,8 @@
 #include "io/decode.h"
 
+#include <dcmtk/dcmdata/dccodec.h>
+#include <dcmtk/dcmdata/dcpixseq.h>
+#include <dcmtk/dcmdata/dcpxitem.h>
 #include <dcmtk/dcmdata/dcrledrg.h>
 #include <dcmtk/dcmdata/dctk.h>
 #include <dcmtk/dcmjpeg/djdecode.h>
@@ -7,6 +10,9 @@
 #include <fmt/format.h>
 
 #include <cstring>
+#include <optional>
+#include <span>
+#include <utility>
 
 #include "geometry/error.h"
 #include "io/decoder_process.h"
@@ -70,6 +76,36 @@ std::span<const std::uint8_t> native_frame(DcmItem& dataset, const PixelFormat& 
   return {bytes + static_cast<std::size_t>(frame) * format.bytes_per_frame(), format.bytes_per_frame()};
 }
 
+// The size that a JPEG stream itself gives, from its frame header (ITU-T T.81, B.2.2): columns and rows; nothing where
+// there is none. DCMTK's decoder takes its word and lets the header's Rows and Columns fall out of step.
+std::optional<std::pair<int, int>> jpeg_size(std::span<const Uint8> stream) {
+  for (std::size_t at = 2; at + 9 <= stream.size() && stream[at] == 0xFF;) {
+    const int marker = stream[at + 1];
+    const bool is_frame_header =
+        (marker >= 0xC0 && marker <= 0xCF && marker != 0xC4 && marker != 0xC8 && marker != 0xCC) || marker == 0xF7;
+    if (is_frame_header) return std::pair(stream[at + 7] << 8 | stream[at + 8], stream[at + 5] << 8 | stream[at + 6]);
+    at += 2 + static_cast<std::size_t>(stream[at + 2] << 8 | stream[at + 3]);
+  }
+  return std::nullopt;
+}
+
+void check_jpeg_size(DcmPixelData& pixels, const DcmDataset& dataset, int frame, const PixelFormat& format,
+                     const std::string& where) {
+  DcmPixelSequence* fragments = nullptr;
+  DcmPixelItem* fragment = nullptr;
+  Uint32 index = 0;
+  Uint8* bytes = nullptr;
+  const E_TransferSyntax syntax = dataset.getOriginalXfer();
+  if (syntax == EXS_RLELossless || pixels.getEncapsulatedRepresentation(syntax, nullptr, fragments).bad() ||
+      DcmCodec::determineStartFragment(static_cast<Uint32>(frame), format.frames, fragments, index).bad() ||
+      fragments->getItem(fragment, index).bad() || fragment->getUint8Array(bytes).bad() || bytes == nullptr)
+    return;  // the decoder will say what is wrong
+  if (const auto size = jpeg_size({bytes, fragment->getLength()});
+      size && *size != std::pair(format.columns, format.rows))
+    throw Error(fmt::format("{}: its compressed pixels are {} x {}, {} and {} say {} x {}", where, size->first,
+                            size->second, described(DCM_Columns), described(DCM_Rows), format.columns, format.rows));
+}
+
 }  // namespace
 
 PixelFormat pixel_format(const DicomItem& dataset) {
@@ -130,15 +166,17 @@ std::vector<std::int32_t> decode_frame(const DicomFile& file, const PixelFormat&
   return stored_values;
 }
 
-std::vector<std::uint8_t> decompressed_frame(const std::filesystem::path& path, int frame) {
+std::vector<std::uint8_t> decompressed_frame(const DicomFile& file, int frame) {
   register_decoders();
-  const DicomFile file = DicomFile::read(path, DicomFile::Extent::kWhole);
-  const std::size_t size = pixel_format(file.dataset()).bytes_per_frame();
+  const std::string where = file.path().string();
+  const PixelFormat format = pixel_format(file.dataset());
+  const std::size_t size = format.bytes_per_frame();
   auto& dataset = dynamic_cast<DcmDataset&>(file.dataset().dcmtk());
   DcmElement* element = nullptr;
   if (dataset.findAndGetElement(DCM_PixelData, element).bad() || dynamic_cast<DcmPixelData*>(element) == nullptr)
-    throw Error(fmt::format("{}: {} is missing", path.string(), described(DCM_PixelData)));
+    throw Error(fmt::format("{}: {} is missing", where, described(DCM_PixelData)));
   auto& pixels = dynamic_cast<DcmPixelData&>(*element);
+  check_jpeg_size(pixels, dataset, frame, format, where);
   Uint32 frame_size = 0;
   Uint32 fragment = 0;  // found by the decoder
   OFString color_model;
@@ -151,7 +189,7 @@ std::vector<std::uint8_t> decompressed_frame(const std::filesystem::path& path, 
     throw Error(
         fmt::format("{}: pixel data in transfer syntax {} cannot be decoded.\n"
                     "       Convert the file first: gdcmconv --raw IN.dcm OUT.dcm (Debian package libgdcm-tools)",
-                    path.string(), DcmXfer(dataset.getOriginalXfer()).getXferName()));
+                    where, DcmXfer(dataset.getOriginalXfer()).getXferName()));
   bytes.resize(size);
   return bytes;
 }

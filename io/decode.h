@@ -36,6 +36,6 @@ std::vector<std::int32_t> decode_frame(const DicomFile& file, const PixelFormat&
 
 // One compressed frame as bytes, those of 16-bit pixels in the order of this machine: DCMTK's decoders, run here. Only
 // for the child process and for tests of hostile files.
-std::vector<std::uint8_t> decompressed_frame(const std::filesystem::path& path, int frame);
+std::vector<std::uint8_t> decompressed_frame(const DicomFile& file, int frame);
 
 }  // namespace isoshift

@@ -18,6 +18,7 @@
 #include <mutex>
 #include <optional>
 #include <string>
+#include <utility>
 
 #include "geometry/error.h"
 #include "io/decode.h"
@@ -201,6 +202,24 @@ IdleDecoders& idle_decoders() {
   return decoders;
 }
 
+// The file that the child read last: frames of one file come one after another.
+class LastFile {
+ public:
+  const DicomFile& at(const std::filesystem::path& path) {
+    const std::pair state(std::filesystem::last_write_time(path), std::filesystem::file_size(path));
+    if (!file_ || file_->path() != path || state != state_) {
+      file_.reset();
+      file_ = DicomFile::read(path, DicomFile::Extent::kWhole);
+      state_ = state;
+    }
+    return *file_;
+  }
+
+ private:
+  std::optional<DicomFile> file_;
+  std::pair<std::filesystem::file_time_type, std::uintmax_t> state_;
+};
+
 // Of the child, before it looks at a file. (The address sanitizer needs all addresses there are.)
 void limit_resources() {
   const auto limit = [](auto resource, rlim_t soft, rlim_t hard) {
@@ -239,6 +258,7 @@ std::vector<std::uint8_t> frame_from_decoder(const std::filesystem::path& path, 
 
 int run_decoder() {
   const Connection connection(STDIN_FILENO);
+  LastFile file;
   Request request;
   while (connection.receive(&request, sizeof request)) {
     std::string path(request.path_bytes, '\0');
@@ -247,7 +267,7 @@ int run_decoder() {
     std::vector<std::uint8_t> pixels;
     std::string error;
     try {
-      pixels = decompressed_frame(path, request.frame);
+      pixels = decompressed_frame(file.at(path), request.frame);
     } catch (const Error& refused) {
       error = std::string(refused.what()).substr(0, kMaxErrorBytes);
     } catch (const std::exception& failed) {

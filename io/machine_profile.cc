@@ -2,73 +2,18 @@
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
-#include <openssl/evp.h>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <fstream>
-#include <nlohmann/json.hpp>
 
 #include "geometry/error.h"
+#include "io/json_file.h"
 
 namespace isoshift {
 namespace {
 
-using Json = nlohmann::json;
-
-std::string sha256_of(const std::string& content) {
-  std::array<unsigned char, EVP_MAX_MD_SIZE> digest{};
-  unsigned size = 0;
-  if (EVP_Digest(content.data(), content.size(), digest.data(), &size, EVP_sha256(), nullptr) != 1)
-    throw Error("SHA-256 is not available");
-  return fmt::format("{:02x}", fmt::join(digest.begin(), digest.begin() + size, ""));
-}
-
-// An object of the file, with its place in it for messages. Every key must be asked for: what is left is a mistake.
-class Section {
- public:
-  Section(const Json& json, std::string where) : json_(json), where_(std::move(where)) {
-    if (!json_.is_object()) throw Error(fmt::format("{}: expected an object", where_));
-  }
-
-  template <class T>
-  std::optional<T> find(const char* key, const char* expected) {
-    known_.emplace_back(key);
-    if (!json_.contains(key)) return std::nullopt;
-    try {
-      return json_.at(key).get<T>();
-    } catch (const Json::exception&) {
-      refuse(key, expected);
-    }
-  }
-  template <class T>
-  T required(const char* key, const char* expected) {
-    if (auto value = find<T>(key, expected)) return *value;
-    throw Error(fmt::format("{}: {} is missing, expected {}", where_, key, expected));
-  }
-  std::optional<double> number(const char* key, double low, double high) {
-    const auto value = find<double>(key, "a number");
-    if (value && !(*value >= low && *value <= high))
-      throw Error(fmt::format("{}: {} is {}, expected {} to {}", where_, key, *value, low, high));
-    return value;
-  }
-  [[noreturn]] void refuse(const char* key, const char* expected) const {
-    throw Error(fmt::format("{}: {} is {}, expected {}", where_, key, json_.at(key).dump(), expected));
-  }
-  void end() const {
-    for (const auto& [key, value] : json_.items())
-      if (std::ranges::find(known_, key) == known_.end())
-        throw Error(fmt::format("{}: there is no key {}; the keys are {}", where_, key, fmt::join(known_, ", ")));
-  }
-
- private:
-  const Json& json_;
-  std::string where_;
-  std::vector<std::string> known_;
-};
-
-Eigen::Matrix<double, 3, 4> matrix_from(const std::vector<std::vector<double>>& rows, const Section& section) {
+Eigen::Matrix<double, 3, 4> matrix_from(const std::vector<std::vector<double>>& rows, const JsonSection& section) {
   constexpr const char* kExpected = "three rows of four finite numbers";
   Eigen::Matrix<double, 3, 4> matrix;
   if (rows.size() != 3) section.refuse("pixel_from_room", kExpected);
@@ -79,7 +24,7 @@ Eigen::Matrix<double, 3, 4> matrix_from(const std::vector<std::vector<double>>& 
   return matrix;
 }
 
-MachineProfile::Rule rule_from(Section section, const std::string& where) {
+MachineProfile::Rule rule_from(JsonSection section) {
   MachineProfile::Rule rule;
   using Words = std::map<std::string, std::string, std::less<>>;
   rule.where = section.find<Words>("where", "an object of keywords and texts").value_or(Words());
@@ -87,7 +32,8 @@ MachineProfile::Rule rule_from(Section section, const std::string& where) {
     if (!kEquipmentAttributes.contains(keyword)) {
       std::string known;
       for (const auto& [name, tag] : kEquipmentAttributes) known += (known.empty() ? "" : ", ") + name;
-      throw Error(fmt::format("{}: where: images are not told apart by {}, but by {}", where, keyword, known));
+      throw Error(
+          fmt::format("{}: where: images are not told apart by {}, but by {}", section.where(), keyword, known));
     }
   rule.gantry_angle_offset_deg = section.number("gantry_angle_offset_deg", -360, 360).value_or(0.0);
   if (const auto plane = section.find<std::string>("spacing_plane", "SID or SAD")) {
@@ -113,10 +59,12 @@ MachineProfile::Rule rule_from(Section section, const std::string& where) {
     rule.pixel_from_room = matrix_from(*rows, section);
     rule.columns = section.required<int>("columns", "the width of the images, in pixels");
     rule.rows = section.required<int>("rows", "the height of the images, in pixels");
-    if (!rule.switches.sid_mm) throw Error(fmt::format("{}: sid_mm is missing, which pixel_from_room needs", where));
+    if (!rule.switches.sid_mm)
+      throw Error(fmt::format("{}: sid_mm is missing, which pixel_from_room needs", section.where()));
     if (rule.gantry_angle_offset_deg != 0.0 || rule.spacing_at_axis || !rule.receptor_offset_mm.isZero() ||
         rule.switches.assume_centered)
-      throw Error(fmt::format("{}: pixel_from_room says where all pixels are; it goes with no other geometry", where));
+      throw Error(fmt::format("{}: pixel_from_room says where all pixels are; it goes with no other geometry",
+                              section.where()));
   }
   section.end();
   return rule;
@@ -132,31 +80,20 @@ bool fits(const MachineProfile::Rule& rule, const RtImage& image) {
 }  // namespace
 
 MachineProfile read_machine_profile(const std::filesystem::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  const std::string content{std::istreambuf_iterator<char>(file), {}};
-  if (!file) throw Error(fmt::format("{}: cannot be read", path.string()));
-  Json json;
-  try {
-    json = Json::parse(content);
-  } catch (const Json::exception& error) {
-    throw Error(fmt::format("{}: is no JSON: {}", path.string(), error.what()));
-  }
-  Section section(json, path.string());
+  const JsonFile file = read_json_file(path);
+  JsonSection section(file.json, path.string());
   if (const int version = section.required<int>("machine_profile", "1, the version of its format"); version != 1)
     section.refuse("machine_profile", "1, the version of its format");
-  MachineProfile profile{
-      .path = path, .name = section.required<std::string>("name", "a text"), .sha256 = sha256_of(content)};
-  const auto images = section.required<std::vector<Json>>("images", "a list of rules");
-  for (std::size_t n = 0; n < images.size(); ++n) {
-    const std::string where = fmt::format("{}: images[{}]", path.string(), n);
-    profile.rules.push_back(rule_from(Section(images[n], where), where));
-  }
+  MachineProfile profile{.path = path, .name = section.required<std::string>("name", "a text"), .sha256 = file.sha256};
+  const auto images = section.required<std::vector<nlohmann::json>>("images", "a list of rules");
+  for (std::size_t n = 0; n < images.size(); ++n)
+    profile.rules.push_back(rule_from(JsonSection(images[n], fmt::format("{}: images[{}]", path.string(), n))));
   section.end();
   if (profile.rules.empty()) throw Error(fmt::format("{}: images is empty, expected a list of rules", path.string()));
   return profile;
 }
 
-RtImage with_machine(RtImage image, const MachineProfile& profile, Notes& notes) {
+RtImage with_machine(RtImage image, const MachineProfile& profile, const RtImageSwitches& command_line, Notes& notes) {
   const auto rule = std::ranges::find_if(profile.rules, [&](const auto& candidate) { return fits(candidate, image); });
   if (rule == profile.rules.end()) {
     std::string attributes;
@@ -169,6 +106,9 @@ RtImage with_machine(RtImage image, const MachineProfile& profile, Notes& notes)
     notes.overrides.push_back(fmt::format("{}: {} by {}", image.label, what, origin));
   };
   image = with_switches(image, rule->switches, notes, origin);
+  // What the command line will replace decides what the other rules make of the file's values.
+  const std::optional<double> sad_mm = command_line.sad_mm ? command_line.sad_mm : image.sad_mm;
+  const std::optional<double> sid_mm = command_line.sid_mm ? command_line.sid_mm : image.sid_mm;
   if (rule->pixel_from_room) {
     if (image.columns != rule->columns || image.rows != rule->rows)
       throw Error(fmt::format("{}: has {} x {} pixels; the projection matrix of {} is for {} x {}", image.path.string(),
@@ -180,14 +120,14 @@ RtImage with_machine(RtImage image, const MachineProfile& profile, Notes& notes)
     *image.gantry_angle_deg += rule->gantry_angle_offset_deg;
     note(fmt::format("{} {:+} degrees", described(DCM_GantryAngle), rule->gantry_angle_offset_deg));
   }
-  if (rule->spacing_at_axis && image.sad_mm && image.sid_mm) {
-    const double magnified = *image.sid_mm / *image.sad_mm;
+  if (rule->spacing_at_axis && sad_mm && sid_mm) {
+    const double magnified = *sid_mm / *sad_mm;
     if (image.pixel_spacing_mm) *image.pixel_spacing_mm *= magnified;
     if (image.position_mm) *image.position_mm *= magnified;
     note(fmt::format("{} brought from the axis to the receptor", described(DCM_ImagePlanePixelSpacing)));
   }
-  if (!rule->receptor_offset_mm.isZero() && image.sad_mm && image.sid_mm) {
-    if (!image.receptor_translation_mm) image.receptor_translation_mm = {0.0, 0.0, *image.sad_mm - *image.sid_mm};
+  if (!rule->receptor_offset_mm.isZero() && sad_mm && sid_mm) {
+    if (!image.receptor_translation_mm) image.receptor_translation_mm = {0.0, 0.0, *sad_mm - *sid_mm};
     image.receptor_translation_mm->head<2>() += rule->receptor_offset_mm;
     note(fmt::format("{} moved by ({:.2f}) mm", described(DCM_XRayImageReceptorTranslation),
                      fmt::join(rule->receptor_offset_mm, ", ")));

@@ -32,7 +32,8 @@ struct MachineProfile {
 // Throws Error naming the file, the place in it and what is expected there.
 MachineProfile read_machine_profile(const std::filesystem::path& path);
 
-// The image with the first rule that fits it applied, each change noted as an override. Throws Error if none fits.
-RtImage with_machine(RtImage image, const MachineProfile& profile, Notes& notes);
+// The image with the first rule that fits it applied, each change noted as an override. What the command line will
+// replace afterwards counts already where a rule needs SAD and SID. Throws Error if no rule fits.
+RtImage with_machine(RtImage image, const MachineProfile& profile, const RtImageSwitches& command_line, Notes& notes);
 
 }  // namespace isoshift

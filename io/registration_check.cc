@@ -94,6 +94,7 @@ class Checker {
       ++others;
       result_.registered_from_source = matrix;
       result_.source_frame_uid = frame;
+      result_.source_is_that_of_images = !items[n].items(DCM_ReferencedImageSequence).empty();
     }
     if (others > 1) {
       error(fmt::format("{} items are not the identity. SlicerRT multiplies all matrices of a file", others));

@@ -16,8 +16,9 @@ struct RegistrationFinding {
 };
 
 struct CheckedRegistration {
-  std::string registered_frame_uid;  // dataset-level Frame of Reference UID: usually the planning CT's
-  std::string source_frame_uid;      // of the item that is not the identity
+  std::string registered_frame_uid;       // dataset-level Frame of Reference UID: usually the planning CT's
+  std::string source_frame_uid;           // of the item that is not the identity
+  bool source_is_that_of_images = false;  // that item lists images: their frame's origin may lie anywhere
   // Takes a point of the source frame to the registered one (PS3.3 C.20.2.1.1), as it stands in the file, if there is
   // one such matrix of 16 numbers. It need not be rigid: the findings say.
   std::optional<Eigen::Affine3d> registered_from_source;

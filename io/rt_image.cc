@@ -13,6 +13,7 @@ namespace isoshift {
 namespace {
 
 constexpr double kMaxAngleNoiseDeg = 0.01;  // read-outs such as 359.998 mean 0
+constexpr double kMaxReadOutNoise = 0.01;   // degrees or mm, between exposures of one image
 
 // The items of the Exposure Sequence that speak of one frame: of several frames those that name it.
 class Exposures {
@@ -47,23 +48,18 @@ class FrameAttributes {
       : dataset_(std::move(dataset)), exposures_(std::move(exposures)) {}
 
   std::optional<double> number(const DcmTagKey& tag) const {
+    std::optional<double> agreed;
     for (const DicomItem& exposure : exposures_) {
       const auto value = exposure.number(tag);
       if (!value) continue;
-      if (exposures_.size() > 1 && value != exposures_.front().number(tag))
-        throw Error(fmt::format("{}: {} differs between exposures of one image", dataset_.where(), described(tag)));
-      return value;
+      if (agreed && std::abs(*value - *agreed) > kMaxReadOutNoise)
+        throw Error(
+            fmt::format("{}: {} is {} in one exposure and {} in another of the same image, or {} is missing, which "
+                        "tells their frames",
+                        dataset_.where(), described(tag), *agreed, *value, described(DCM_ReferencedFrameNumber)));
+      if (!agreed) agreed = value;
     }
-    return dataset_.number(tag);
-  }
-
-  // (lateral, longitudinal, vertical) where all three are there.
-  std::optional<Eigen::Vector3d> table_position() const {
-    const auto lateral = number(DCM_TableTopLateralPosition);
-    const auto longitudinal = number(DCM_TableTopLongitudinalPosition);
-    const auto vertical = number(DCM_TableTopVerticalPosition);
-    if (!lateral || !longitudinal || !vertical) return std::nullopt;
-    return Eigen::Vector3d(*lateral, *longitudinal, *vertical);
+    return agreed ? agreed : dataset_.number(tag);
   }
 
  private:
@@ -130,7 +126,9 @@ RtImage read_frame(const std::filesystem::path& path, const DicomItem& d, const 
   image.eccentric_angle_deg = attributes.number(DCM_TableTopEccentricAngle);
   image.table_pitch_deg = attributes.number(DCM_TableTopPitchAngle);
   image.table_roll_deg = attributes.number(DCM_TableTopRollAngle);
-  image.table_position_mm = attributes.table_position();
+  image.table_lateral_mm = attributes.number(DCM_TableTopLateralPosition);
+  image.table_longitudinal_mm = attributes.number(DCM_TableTopLongitudinalPosition);
+  image.table_vertical_mm = attributes.number(DCM_TableTopVerticalPosition);
   image.isocenter_mm = vector_of<3>(d, DCM_IsocenterPosition);
 
   for (const auto& [keyword, tag] : kEquipmentAttributes)
@@ -208,22 +206,27 @@ std::vector<RtImage> read_rt_images(const std::filesystem::path& path, Notes& no
 RtImage with_switches(RtImage image, const RtImageSwitches& switches, Notes& notes, const std::string& origin) {
   const auto by = [&](const std::string& flag) { return origin.empty() ? flag : origin + ", as by " + flag; };
   const auto named = [&](const DcmTagKey& tag) { return fmt::format("{}: {}", image.label, described(tag)); };
-  if (const auto angle = switches.gantry_angle_deg.find(image.label); angle != switches.gantry_angle_deg.end())
+  const bool by_matrix = image.pixel_from_room.has_value();  // says all of the geometry but the couch's
+  if (const auto angle = switches.gantry_angle_deg.find(image.label);
+      angle != switches.gantry_angle_deg.end() && by_matrix)
+    throw UsageError(fmt::format("--gantry-angle {}={}: the machine profile gives this image a projection matrix",
+                                 image.label, angle->second));
+  else if (angle != switches.gantry_angle_deg.end())
     replace(image.gantry_angle_deg, angle->second, named(DCM_GantryAngle),
             by(fmt::format("--gantry-angle {}={}", image.label, angle->second)), notes);
   if (switches.couch_angle_deg)
     replace(image.support_angle_deg, *switches.couch_angle_deg, named(DCM_PatientSupportAngle),
             by(fmt::format("--couch-angle {}", *switches.couch_angle_deg)), notes);
-  if (switches.sad_mm)
-    replace(image.sad_mm, *switches.sad_mm, named(DCM_RadiationMachineSAD), fmt::format("--sad {}", *switches.sad_mm),
-            notes);
-  if (switches.sid_mm)
+  if (switches.sad_mm && !by_matrix)
+    replace(image.sad_mm, *switches.sad_mm, named(DCM_RadiationMachineSAD),
+            by(fmt::format("--sad {}", *switches.sad_mm)), notes);
+  if (switches.sid_mm && !by_matrix)
     replace(image.sid_mm, *switches.sid_mm, named(DCM_RTImageSID), by(fmt::format("--sid {}", *switches.sid_mm)),
             notes);
-  if (switches.position_mm)
+  if (switches.position_mm && !by_matrix)
     replace(image.position_mm, *switches.position_mm, named(DCM_RTImagePosition),
             by(fmt::format("--rt-image-position {},{}", switches.position_mm->x(), switches.position_mm->y())), notes);
-  if (switches.assume_centered && !image.position_mm && image.pixel_spacing_mm)
+  if (switches.assume_centered && !image.position_mm && image.pixel_spacing_mm && !by_matrix)
     replace(image.position_mm,
             Eigen::Vector2d(-0.5 * (image.columns - 1) * image.pixel_spacing_mm->y(),
                             0.5 * (image.rows - 1) * image.pixel_spacing_mm->x()),
@@ -286,7 +289,8 @@ std::vector<Finding> rt_image_findings(const RtImage& image) {
   if (image.has_modality_lut)
     throw Error(fmt::format("{}: {}: pixel values through a table are not supported", where,
                             described(DCM_ModalityLUTSequence)));
-  if (std::abs(wrapped_rad(rad_from_deg(image.gantry_pitch_angle_deg.value_or(0.0)))) > rad_from_deg(kMaxAngleNoiseDeg))
+  const double gantry_pitch_rad = wrapped_rad(rad_from_deg(image.gantry_pitch_angle_deg.value_or(0.0)));
+  if (!image.pixel_from_room && std::abs(gantry_pitch_rad) > rad_from_deg(kMaxAngleNoiseDeg))
     throw Error(
         fmt::format("{}: {} is {} degrees; a tilted gantry is not supported, since the order of its rotations is "
                     "not defined",
@@ -305,19 +309,26 @@ Beam beam_of(const RtImage& image, Notes& notes) {
   return is_portal ? Beam::kMegavoltage : Beam::kKilovoltage;
 }
 
-TableAngles table_angles(const RtImage& image, Notes& notes) {
-  const auto angle = [&](const std::optional<double>& value_deg, const DcmTagKey& tag) {
-    if (!value_deg) notes.warnings.push_back(fmt::format("{}: {} is missing, taken as 0", image.label, described(tag)));
+TableAngles table_angles(std::span<const RtImage> images, Notes& notes) {
+  const auto first_deg = [&](const std::optional<double> RtImage::*angle_deg) -> std::optional<double> {
+    const auto says =
+        std::ranges::find_if(images, [&](const RtImage& image) { return (image.*angle_deg).has_value(); });
+    return says == images.end() ? std::nullopt : *says.*angle_deg;
+  };
+  const auto angle_rad = [&](const std::optional<double>& value_deg, const DcmTagKey& tag) {
+    if (!value_deg) notes.warnings.push_back(fmt::format("{} is missing in all X-rays, taken as 0", described(tag)));
     return wrapped_rad(rad_from_deg(value_deg.value_or(0.0)));
   };
-  TableAngles table;
-  table.support_rad = angle(image.support_angle_deg, DCM_PatientSupportAngle);
-  table.pitch_rad = angle(image.table_pitch_deg, DCM_TableTopPitchAngle);
-  table.roll_rad = angle(image.table_roll_deg, DCM_TableTopRollAngle);
-  table.eccentric_rad = wrapped_rad(rad_from_deg(image.eccentric_angle_deg.value_or(0.0)));
+  const double eccentric_deg = first_deg(&RtImage::eccentric_angle_deg).value_or(0.0);
+  const TableAngles table{
+      .support_rad = angle_rad(first_deg(&RtImage::support_angle_deg), DCM_PatientSupportAngle),
+      .eccentric_rad = wrapped_rad(rad_from_deg(eccentric_deg)),
+      .pitch_rad = angle_rad(first_deg(&RtImage::table_pitch_deg), DCM_TableTopPitchAngle),
+      .roll_rad = angle_rad(first_deg(&RtImage::table_roll_deg), DCM_TableTopRollAngle),
+  };
   if (std::abs(table.eccentric_rad) > rad_from_deg(kMaxAngleNoiseDeg))
-    notes.warnings.push_back(fmt::format("{}: {} is {} degrees and was added to the couch angle", image.label,
-                                         described(DCM_TableTopEccentricAngle), *image.eccentric_angle_deg));
+    notes.warnings.push_back(fmt::format("{} is {} degrees and was added to the couch angle",
+                                         described(DCM_TableTopEccentricAngle), eccentric_deg));
   return table;
 }
 
@@ -341,10 +352,6 @@ CarmGeometry carm_geometry(const RtImage& image, Notes& notes) {
     notes.warnings.push_back(fmt::format("{}: {} is missing, taken as (0, 0, SAD - SID)", image.label,
                                          described(DCM_XRayImageReceptorTranslation)));
   }
-  if (image.photometric_interpretation == "MONOCHROME1")
-    notes.warnings.push_back(
-        fmt::format("{}: {} is MONOCHROME1, which is for display only; pixel values are taken as they are", image.label,
-                    described(DCM_PhotometricInterpretation)));
   if (sid_mm == geometry.sad_mm)
     notes.warnings.push_back(
         fmt::format("{}: {} equals the SAD; its true value may be unknown", image.label, described(DCM_RTImageSID)));
@@ -384,6 +391,10 @@ CarmGeometry carm_geometry(const RtImage& image, Notes& notes) {
 }
 
 XrayView xray_view(const RtImage& image, Beam beam, Notes& notes) {
+  if (image.photometric_interpretation == "MONOCHROME1")
+    notes.warnings.push_back(
+        fmt::format("{}: {} is MONOCHROME1, which is for display only; pixel values are taken as they are", image.label,
+                    described(DCM_PhotometricInterpretation)));
   if (!image.pixel_from_room) return make_xray_view(carm_geometry(image, notes), beam);
   try {
     return xray_view_from_matrix(*image.pixel_from_room, image.sid_mm.value(), image.columns, image.rows, beam);
@@ -392,8 +403,7 @@ XrayView xray_view(const RtImage& image, Beam beam, Notes& notes) {
   }
 }
 
-XrayImage read_xray_image(const RtImage& image, const XrayView& view) {
-  const DicomFile file = DicomFile::read(image.path, DicomFile::Extent::kWhole);
+XrayImage read_xray_image(const DicomFile& file, const RtImage& image, const XrayView& view) {
   const PixelFormat format = pixel_format(file.dataset());
   const std::vector<std::int32_t> stored_values = decode_frame(file, format, image.frame);
   const double slope = file.dataset().number(DCM_RescaleSlope).value_or(1.0);

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <map>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -57,8 +58,8 @@ struct RtImage {
   std::optional<Eigen::Vector2d> position_mm;
   std::optional<double> gantry_angle_deg, gantry_pitch_angle_deg, collimator_angle_deg;
   std::optional<double> support_angle_deg, eccentric_angle_deg, table_pitch_deg, table_roll_deg;
-  std::optional<Eigen::Vector3d> table_position_mm;  // lateral, longitudinal, vertical
-  std::optional<Eigen::Vector3d> isocenter_mm;       // IsocenterPosition, in this image's own frame of reference
+  std::optional<double> table_lateral_mm, table_longitudinal_mm, table_vertical_mm;
+  std::optional<Eigen::Vector3d> isocenter_mm;  // IsocenterPosition, in this image's own frame of reference
 
   std::map<std::string, std::string, std::less<>> equipment;   // what machine profiles tell images apart by, by keyword
   std::optional<Eigen::Matrix<double, 3, 4>> pixel_from_room;  // instead of all that follows from the attributes above
@@ -111,8 +112,8 @@ std::vector<Finding> rt_image_findings(const RtImage& image);
 // The beam quality: KVP above 1000 is MV; without KVP by image type (PORTAL is MV), with a warning.
 Beam beam_of(const RtImage& image, Notes& notes);
 
-// Table read-outs at imaging. Precondition: nothing missing. Warns of angles assumed to be 0.
-TableAngles table_angles(const RtImage& image, Notes& notes);
+// Table read-outs at imaging, each from the first image that has it. Warns of angles that none has, taken as 0.
+TableAngles table_angles(std::span<const RtImage> images, Notes& notes);
 
 // The imager's geometry in IEC terms. Precondition: nothing missing. Throws Error where values contradict each other.
 CarmGeometry carm_geometry(const RtImage& image, Notes& notes);
@@ -120,7 +121,8 @@ CarmGeometry carm_geometry(const RtImage& image, Notes& notes);
 // The camera: from carm_geometry(), or from the projection matrix.
 XrayView xray_view(const RtImage& image, Beam beam, Notes& notes);
 
-// Reads the pixels and turns them into intensity or line integrals as the image declares (docs/conventions.md).
-XrayImage read_xray_image(const RtImage& image, const XrayView& view);
+// Turns the pixels of its file, read whole, into intensity or line integrals as the image declares
+// (docs/conventions.md).
+XrayImage read_xray_image(const DicomFile& file, const RtImage& image, const XrayView& view);
 
 }  // namespace isoshift

@@ -21,12 +21,16 @@ RtPlan::Beam read_beam(const DicomItem& beam_item, const DcmTagKey& control_poin
       beam.isocenter_patient_mm = Eigen::Vector3d(points.front().required_numbers(DCM_IsocenterPosition, 3).data());
     beam.support_angle_deg = points.front().number(DCM_PatientSupportAngle);
   }
-  // A beam that refers to no setup takes what all setups agree on.
   const auto setup_number = beam_item.number(DCM_ReferencedPatientSetupNumber);
   std::set<std::optional<std::string>> positions;
-  for (const DicomItem& setup : plan.items(DCM_PatientSetupSequence))
-    if (!setup_number || setup.number(DCM_PatientSetupNumber) == setup_number)
-      positions.insert(setup.text(DCM_PatientPosition));
+  for (const DicomItem& setup : plan.items(DCM_PatientSetupSequence)) {
+    if (setup_number && setup.number(DCM_PatientSetupNumber) != setup_number) continue;
+    positions.insert(setup.text(DCM_PatientPosition));
+    const Eigen::Vector3d displacement_mm(setup.number(DCM_TableTopVerticalSetupDisplacement).value_or(0.0),
+                                          setup.number(DCM_TableTopLongitudinalSetupDisplacement).value_or(0.0),
+                                          setup.number(DCM_TableTopLateralSetupDisplacement).value_or(0.0));
+    if (displacement_mm.norm() > beam.setup_displacement_mm.norm()) beam.setup_displacement_mm = displacement_mm;
+  }
   if (positions.size() == 1) beam.patient_position = *positions.begin();
   return beam;
 }
@@ -51,10 +55,6 @@ RtPlan read_rt_plan(const std::filesystem::path& path) {
       throw Error(fmt::format("{}: {} is CHAIR, expected TABLE", beam.where(), described(DCM_PatientSupportType)));
     plan.beams.push_back(read_beam(beam, is_ion ? DCM_IonControlPointSequence : DCM_ControlPointSequence, dataset));
   }
-  for (const DicomItem& setup : dataset.items(DCM_PatientSetupSequence))
-    plan.setup_displacement_mm = Eigen::Vector3d(setup.number(DCM_TableTopVerticalSetupDisplacement).value_or(0.0),
-                                                 setup.number(DCM_TableTopLongitudinalSetupDisplacement).value_or(0.0),
-                                                 setup.number(DCM_TableTopLateralSetupDisplacement).value_or(0.0));
   if (plan.beams.empty())
     throw Error(fmt::format("{}: {} is missing or empty", path.string(),
                             described(is_ion ? DCM_IonBeamSequence : DCM_BeamSequence)));

@@ -18,7 +18,9 @@ struct RtPlan {
     std::string name;
     std::optional<Eigen::Vector3d> isocenter_patient_mm;  // IsocenterPosition of the first control point
     std::optional<double> support_angle_deg;              // PatientSupportAngle of the first control point
-    std::optional<std::string> patient_position;          // of the patient setup that the beam refers to
+    // Of the patient setup that the beam refers to; without one what all setups agree on, and the largest displacement.
+    std::optional<std::string> patient_position;
+    Eigen::Vector3d setup_displacement_mm = Eigen::Vector3d::Zero();  // vertical, longitudinal, lateral (300A,01D2..6)
   };
 
   std::filesystem::path path;
@@ -30,7 +32,6 @@ struct RtPlan {
   std::optional<std::string> frame_of_reference_uid;
   std::string approval_status;
   std::vector<Beam> beams;
-  Eigen::Vector3d setup_displacement_mm = Eigen::Vector3d::Zero();  // vertical, longitudinal, lateral (300A,01D2..01D6)
 };
 
 RtPlan read_rt_plan(const std::filesystem::path& path);

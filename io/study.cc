@@ -8,8 +8,10 @@
 #include <charconv>
 #include <chrono>
 #include <cmath>
+#include <tuple>
 
 #include "geometry/error.h"
+#include "io/decode.h"
 
 namespace isoshift {
 namespace {
@@ -83,11 +85,6 @@ std::vector<Finding> plan_findings(const Study& study, Notes& notes) {
         {"for-mismatch", fmt::format("{}: {} is not that of the CT, so the plan's isocenter does not apply "
                                      "to it",
                                      plan.path.string(), described(DCM_FrameOfReferenceUID))});
-  if (plan.setup_displacement_mm.norm() > 0.0)
-    notes.warnings.push_back(fmt::format(
-        "the plan moves the table by ({:.1f}) mm (vertical, longitudinal, lateral) from marks to treatment ({}): "
-        "find out whether the X-rays were taken before or after that move",
-        fmt::join(plan.setup_displacement_mm, ", "), described(DCM_TableTopVerticalSetupDisplacement)));
   if (plan.approval_status != "APPROVED")
     notes.warnings.push_back(
         fmt::format("the plan is not approved ({} is \"{}\")", described(DCM_ApprovalStatus), plan.approval_status));
@@ -148,22 +145,29 @@ std::vector<Finding> session_findings(const Study& study, Notes& notes) {
                                                     image.path.string(), std::abs(at_s - first_s) / 60.0,
                                                     first.path.string(), described(DCM_AcquisitionTime))};
           });
-  const auto has_positions = [](const RtImage& image) { return image.table_position_mm.has_value(); };
-  if (std::ranges::any_of(study.rt_images, has_positions))
-    compare(
-        DCM_TableTopVerticalPosition, [](const RtImage& image) { return image.table_position_mm; },
-        [](const RtImage& image, const Eigen::Vector3d& at_mm, const RtImage& first,
-           const Eigen::Vector3d& first_mm) -> std::optional<Finding> {
-          const Eigen::Vector3d moved_mm = at_mm - first_mm;
-          if (moved_mm.cwiseAbs().maxCoeff() <= kMaxTableMoveMm) return std::nullopt;
-          return Finding{"table-moved", fmt::format("{}: the table moved by ({:.1f}) mm since {} ({})",
-                                                    image.path.string(), fmt::join(moved_mm, ", "), first.path.string(),
-                                                    described(DCM_TableTopVerticalPosition))};
+  // Read-outs of the table, where any view has them.
+  using ReadOut = const std::optional<double> RtImage::*;
+  const auto compare_read_out = [&](ReadOut read_out, const DcmTagKey& tag, auto&& finding_of) {
+    const auto value_of = [&](const RtImage& image) { return image.*read_out; };
+    if (std::ranges::any_of(study.rt_images, [&](const RtImage& image) { return value_of(image).has_value(); }))
+      compare(tag, value_of, finding_of);
+  };
+  const auto compare_position = [&](ReadOut position, const DcmTagKey& tag) {
+    compare_read_out(
+        position, tag,
+        [&](const RtImage& image, double at_mm, const RtImage& first, double first_mm) -> std::optional<Finding> {
+          if (std::abs(at_mm - first_mm) <= kMaxTableMoveMm) return std::nullopt;
+          return Finding{"table-moved",
+                         fmt::format("{}: the table moved by {:.1f} mm since {} ({})", image.path.string(),
+                                     at_mm - first_mm, first.path.string(), described(tag))};
         });
-  const auto compare_angle = [&](const std::optional<double> RtImage::*angle, const DcmTagKey& tag) {
-    if (std::ranges::none_of(study.rt_images, [&](const RtImage& image) { return (image.*angle).has_value(); })) return;
-    compare(
-        tag, [&](const RtImage& image) { return image.*angle; },
+  };
+  compare_position(&RtImage::table_lateral_mm, DCM_TableTopLateralPosition);
+  compare_position(&RtImage::table_longitudinal_mm, DCM_TableTopLongitudinalPosition);
+  compare_position(&RtImage::table_vertical_mm, DCM_TableTopVerticalPosition);
+  const auto compare_angle = [&](ReadOut angle, const DcmTagKey& tag) {
+    compare_read_out(
+        angle, tag,
         [&](const RtImage& image, double at_deg, const RtImage& first, double first_deg) -> std::optional<Finding> {
           const double turned_deg = deg_from_rad(wrapped_rad(rad_from_deg(at_deg - first_deg)));
           if (std::abs(turned_deg) <= kMaxTableTurnDeg) return std::nullopt;
@@ -188,6 +192,21 @@ void check_one_patient_position(const Study& study) {
                               first.patient_position.value_or("missing")));
 }
 
+// Whether two images of one UID show the same from the same place.
+bool is_same_xray(const RtImage& a, const RtImage& b) {
+  const auto geometry = [](const RtImage& image) {
+    return std::tie(image.sad_mm, image.sid_mm, image.gantry_angle_deg, image.support_angle_deg, image.pixel_spacing_mm,
+                    image.position_mm, image.orientation, image.receptor_translation_mm, image.receptor_angle_deg,
+                    image.acquisition_time);
+  };
+  if (geometry(a) != geometry(b)) return false;
+  const auto pixels = [](const RtImage& image) {
+    const DicomFile file = DicomFile::read(image.path, DicomFile::Extent::kWhole);
+    return decode_frame(file, pixel_format(file.dataset()), image.frame);
+  };
+  return pixels(a) == pixels(b);
+}
+
 // An X-ray that lies there twice is one view (C.12.1: the UID is the instance's own).
 void drop_repeated_images(std::vector<RtImage>& images, Notes& notes) {
   for (auto image = images.begin(); image != images.end();) {
@@ -198,6 +217,9 @@ void drop_repeated_images(std::vector<RtImage>& images, Notes& notes) {
       ++image;
       continue;
     }
+    if (!is_same_xray(*first, *image))
+      throw Error(fmt::format("{}: has the {} of {}, but shows something else", image->path.string(),
+                              described(DCM_SOPInstanceUID), first->path.string()));
     notes.left_aside.push_back(fmt::format("{}: the same X-ray as {}", image->path.string(), first->path.string()));
     image = images.erase(image);
   }
@@ -229,6 +251,16 @@ std::vector<RtPlan::Beam> imaged_beams(const Study& study) {
     numbers.push_back(*image.beam_number);
   }
   return selected_beams(*study.plan, numbers);
+}
+
+void warn_of_planned_displacement(const std::vector<RtPlan::Beam>& beams, Notes& notes) {
+  for (const RtPlan::Beam& beam : beams)
+    if (beam.setup_displacement_mm.norm() > 0.0)
+      notes.warnings.push_back(fmt::format(
+          "beam {} of the plan moves the table by ({:.1f}) mm (vertical, longitudinal, lateral) from marks to "
+          "treatment "
+          "({}): find out whether the X-rays were taken before or after that move",
+          beam.number, fmt::join(beam.setup_displacement_mm, ", "), described(DCM_TableTopVerticalSetupDisplacement)));
 }
 
 void warn_of_planned_couch_angle(const Study& study, const std::vector<RtPlan::Beam>& beams, Notes& notes) {
@@ -278,12 +310,12 @@ Study load_study(const StudyRequest& request, Notes& notes, const Progress& prog
   drop_repeated_images(study.rt_images, notes);
   check_labels(request.switches, study.rt_images);
   for (RtImage& image : study.rt_images) {
-    if (request.machine) image = with_machine(image, *request.machine, notes);
+    if (request.machine) image = with_machine(image, *request.machine, request.switches, notes);
     image = with_switches(image, request.switches, notes);
   }
   std::ranges::stable_sort(study.rt_images, {}, [](const RtImage& image) { return seconds_of(image); });
 
-  // A position or isocenter that only the plan has; a switch wins over both.
+  // A patient position that only the plan has.
   std::vector<RtPlan::Beam> beams;
   if (study.plan) {
     beams = imaged_beams(study);
@@ -319,7 +351,7 @@ Study load_study(const StudyRequest& request, Notes& notes, const Progress& prog
   check_one_patient_position(study);
 
   study.patient_position = patient_position_from(study.rt_images.front().patient_position.value()).value();
-  study.table = table_angles(study.rt_images.front(), notes);
+  study.table = table_angles(study.rt_images, notes);
   if (request.isocenter_patient_mm) {
     study.isocenter_patient_mm = *request.isocenter_patient_mm;
     notes.overrides.push_back(fmt::format("{}: ({}) mm by --isocenter", described(DCM_IsocenterPosition),
@@ -334,18 +366,23 @@ Study load_study(const StudyRequest& request, Notes& notes, const Progress& prog
   }
   if (const auto planned = study.plan ? common_patient_position(*study.plan, beams) : std::nullopt;
       planned && *planned != to_string(study.patient_position))
-    throw Error(fmt::format("{}: {} is {}, that of {} is {}", study.rt_images.front().path.string(),
-                            described(DCM_PatientPosition), to_string(study.patient_position),
-                            study.plan->path.string(), *planned));
+    throw Error(fmt::format(
+        "{}: {} is {}, that of {} is {}",
+        request.switches.patient_position ? "--patient-position" : study.rt_images.front().path.string(),
+        described(DCM_PatientPosition), to_string(study.patient_position), study.plan->path.string(), *planned));
   if (!study.ct.patient_position.empty() && study.ct.patient_position != to_string(study.patient_position))
     notes.warnings.push_back(fmt::format("the CT was scanned in {}, the patient is treated in {} ({})",
                                          study.ct.patient_position, to_string(study.patient_position),
                                          described(DCM_PatientPosition)));
   warn_of_planned_couch_angle(study, beams, notes);
+  warn_of_planned_displacement(beams, notes);
   study.planned_room_from_patient =
       planned_room_from_patient(study.patient_position, study.table, study.isocenter_patient_mm);
-  for (const RtImage& image : study.rt_images)
-    study.xrays.push_back(read_xray_image(image, xray_view(image, beam_of(image, notes), notes)));
+  std::optional<DicomFile> file;  // of several frames read once
+  for (const RtImage& image : study.rt_images) {
+    if (!file || file->path() != image.path) file = DicomFile::read(image.path, DicomFile::Extent::kWhole);
+    study.xrays.push_back(read_xray_image(*file, image, xray_view(image, beam_of(image, notes), notes)));
+  }
   check_isocenter(study);
   return study;
 }

@@ -67,7 +67,7 @@ TEST_F(CheckCommandTest, OneFromTheRoomMeansTheSameShift) {
   ASSERT_EQ(
       run_command({"register", study_->path().string(), "-o", from_room, "--source-for", "iec-fixed"}).exit_status, 0);
   const std::string theirs = from_room + "/spatial_registration.dcm", plan = study_->plan().string();
-  const CommandOutcome outcome = run_command({"check", ours(), theirs, "--plan", plan, "--json"});
+  const CommandOutcome outcome = run_command({"check", ours(), theirs, "--plan", plan, "--couch-angle", "0", "--json"});
   ASSERT_EQ(outcome.exit_status, 0) << outcome.err;
   const auto checked = nlohmann::json::parse(outcome.out);
   for (const char* axis : {"lateral_mm", "longitudinal_mm", "vertical_mm", "yaw_deg", "pitch_deg", "roll_deg"})
@@ -75,6 +75,31 @@ TEST_F(CheckCommandTest, OneFromTheRoomMeansTheSameShift) {
                 checked["registrations"][1]["couch_shift"][axis].get<double>(), 1e-6)
         << axis;
   EXPECT_THAT(checked["difference"]["reason"].get<std::string>(), HasSubstr("compare their shifts"));
+}
+
+// The frame of images may begin anywhere: without the isocenter in it nothing is told, with it the same shift.
+TEST_F(CheckCommandTest, OneFromTheImagesFrameNeedsTheirIsocenter) {
+  const SmallStudy with_frame;
+  for (const int n : {0, 1})
+    edit(with_frame.image(n), [](DicomItem d) {
+      d.put(DCM_FrameOfReferenceUID, "1.2.3.4");
+      d.put(DCM_IsocenterPosition, std::array{20.0, -50.0, 60.0});
+    });
+  ASSERT_EQ(register_study(with_frame).exit_status, 0);
+  const std::string theirs = (with_frame.output() / "spatial_registration.dcm").string();
+  const std::string plan = study_->plan().string();
+  const CommandOutcome without = run_command({"check", theirs, "--plan", plan});
+  EXPECT_THAT(without.out, HasSubstr("its source frame is that of images"));
+  EXPECT_THAT(without.out, testing::Not(HasSubstr("couch shift")));
+  EXPECT_THAT(run_command({"check", ours(), theirs}).out, HasSubstr("difference: none"));
+
+  const CommandOutcome with =
+      run_command({"check", ours(), theirs, "--plan", plan, "--source-isocenter", "20,-50,60", "--json"});
+  const auto checked = nlohmann::json::parse(with.out);
+  for (const char* axis : {"lateral_mm", "longitudinal_mm", "vertical_mm", "yaw_deg"})
+    EXPECT_NEAR(checked["registrations"][0]["couch_shift"][axis].get<double>(),
+                checked["registrations"][1]["couch_shift"][axis].get<double>(), 1e-6)
+        << axis;
 }
 
 TEST_F(CheckCommandTest, TheSameTwiceDoesNotDiffer) {

@@ -50,6 +50,34 @@ TEST_F(ErrorMessagesTest, TwoCtSeries) {
   EXPECT_THAT(outcome.err, testing::EndsWith("\n       Name the planning CT: --ct FOLDER\n"));
 }
 
+TEST_F(ErrorMessagesTest, OneUidForTwoImages) {
+  std::string uid;
+  edit(study_.image(0), [&](DicomItem d) { uid = d.required_text(DCM_SOPInstanceUID); });
+  edit(study_.image(1), [&](DicomItem d) { d.put(DCM_SOPInstanceUID, uid); });
+  expect_error(fmt::format("{}: has the SOPInstanceUID (0008,0018) of {}, but shows something else",
+                           where(study_.image(1)), where(study_.image(0))));
+}
+
+TEST_F(ErrorMessagesTest, ATableThatMovedInOneAxis) {
+  for (const int n : {0, 1})
+    edit(study_.image(n), [&](DicomItem d) {
+      d.erase(DCM_ExposureSequence);
+      d.erase(DCM_TableTopLateralPosition);
+      d.erase(DCM_TableTopLongitudinalPosition);
+      d.put(DCM_TableTopVerticalPosition, -150.0 + 50.0 * n);
+    });
+  expect_error(
+      fmt::format("{}: the table moved by 50.0 mm since {} (TableTopVerticalPosition (300A,0128))\n"
+                  "       If that is known to be right, allow it: --allow table-moved=REASON",
+                  where(study_.image(1)), where(study_.image(0))));
+}
+
+TEST_F(ErrorMessagesTest, APatientPositionAgainstThePlan) {
+  expect_error(
+      fmt::format("--patient-position: PatientPosition (0018,5100) is HFP, that of {} is HFS", where(study_.plan())),
+      {"--patient-position", "HFP"});
+}
+
 TEST_F(ErrorMessagesTest, MissingSlice) {
   std::string uid;
   edit(study_.ct_slice(20), [&](DicomItem d) { uid = d.required_text(DCM_SeriesInstanceUID); });

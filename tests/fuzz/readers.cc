@@ -25,7 +25,8 @@ void read_rt_image(const std::filesystem::path& path) {
   for (const RtImage& image : read_rt_images(path, notes)) {
     if (!missing_attributes(image).empty()) continue;
     rt_image_findings(image);
-    read_xray_image(image, xray_view(image, beam_of(image, notes), notes));
+    read_xray_image(DicomFile::read(path, DicomFile::Extent::kWhole), image,
+                    xray_view(image, beam_of(image, notes), notes));
   }
 }
 
@@ -48,7 +49,10 @@ const std::map<std::string, std::function<void(const std::filesystem::path&)>> k
        check_registration(path);
        read_spatial_registration(path);
      }},
-    {"decoder", [](const std::filesystem::path& path) { decompressed_frame(path, 0); }},
+    {"decoder",
+     [](const std::filesystem::path& path) {
+       decompressed_frame(DicomFile::read(path, DicomFile::Extent::kWhole), 0);
+     }},
 };
 
 }  // namespace isoshift

@@ -49,17 +49,33 @@ TEST(CouchShift, IsThatOfDicomMd51) {
   expect_shift(couch_shift_for(error, couch(10)), {-2.607127, 2.490560, -1.5}, {9.006284, 0.368649, -0.868385}, 6e-7);
 }
 
-TEST(CouchShift, FourDegreesOfFreedomLeaveWhatDicomMd51Says) {
-  // 50 mm superior (HFS: toward the gantry), a couch without pitch and roll.
+// 50 mm superior (HFS: toward the gantry).
+TEST(CouchShift, SmallerCouchesLeaveWhatDicomMd51Says) {
   const Eigen::Isometry3d error = setup_error({3, -2, 1.5}, 1, -0.5, 0.8);
-  CouchShift shift = couch_shift_for(error, couch(0));
-  shift.change.x_rad = shift.change.y_rad = 0.0;
+  const CouchShift shift = couch_shift_for(error, couch(0));
   const Vector3d superior(0, 50, 0);
-  EXPECT_THAT(Vector3d(couch_motion(shift, couch(0)) * error * superior - superior),
-              VectorNear(Vector3d(-0.006, -0.002, -0.436), 6e-4));
-  shift.change.z_rad = 0.0;
-  EXPECT_THAT(Vector3d(couch_motion(shift, couch(0)) * error * superior - superior),
-              VectorNear(Vector3d(-0.873, -0.010, -0.436), 6e-4));
+  const auto left_over = [&](CouchDof dof, const Vector3d& point) {
+    return left_over_mm(error, couch(0), applicable(shift, couch(0), dof), point);
+  };
+  EXPECT_THAT(left_over(CouchDof::kFour, superior), VectorNear(Vector3d(-0.006, -0.002, -0.436), 6e-4));
+  EXPECT_THAT(left_over(CouchDof::kThree, superior), VectorNear(Vector3d(-0.873, -0.010, -0.436), 6e-4));
+  EXPECT_THAT(left_over(CouchDof::kSix, superior), VectorNear(Vector3d(0, 0, 0), 1e-12));
+  EXPECT_THAT(left_over(CouchDof::kThree, Vector3d::Zero()), VectorNear(Vector3d(0, 0, 0), 1e-12));
+}
+
+// The same by a simulation of the couch's motion, at any table angles.
+TEST(CouchShift, WhatIsLeftOverIsWhereTheMotionPutsAPoint) {
+  const Eigen::Isometry3d error = setup_error({12, -8, 6}, 6, -5, 7);
+  const TableAngles table{
+      .support_rad = rad_from_deg(30), .pitch_rad = rad_from_deg(1.5), .roll_rad = rad_from_deg(-2)};
+  const Vector3d point(20, 50, -30);
+  for (const CouchDof dof : {CouchDof::kThree, CouchDof::kFour, CouchDof::kSix}) {
+    const CouchShift part = applicable(couch_shift_for(error, table), table, dof);
+    EXPECT_THAT(left_over_mm(error, table, part, point),
+                VectorNear(Vector3d(couch_motion(part, table) * error * point - point), 1e-9));
+    EXPECT_EQ(part.change.x_rad == 0.0, dof != CouchDof::kSix);
+    EXPECT_EQ(part.change.z_rad == 0.0, dof == CouchDof::kThree);
+  }
 }
 
 TEST(CouchShift, FixedVectorAtCouch30) {

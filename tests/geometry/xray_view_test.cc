@@ -7,6 +7,7 @@
 #include <array>
 #include <cmath>
 
+#include "geometry/error.h"
 #include "geometry/patient_setup.h"
 #include "tests/support/pose_near.h"
 
@@ -184,6 +185,27 @@ TEST(XrayView, DownscaledBlocksKeepTheirCenters) {
   EXPECT_EQ(quarter.columns, 256);
   // Block (10, 20) holds columns 40..43 and rows 80..83, whose middle is (41.5, 81.5).
   EXPECT_THAT(quarter.ray(10, 20).pixel_room_mm, VectorNear(view.ray(41.5, 81.5).pixel_room_mm, 1e-9));
+}
+
+// A matrix without sense also has a camera: pixels that no receptor has give it away.
+TEST(XrayView, AMatrixOfImpossiblePixelsIsRefused) {
+  CarmGeometry geometry{.sad_mm = 1000,
+                        .receptor_translation_mm = {0, 0, -500},
+                        .column_spacing_mm = 0.4,
+                        .row_spacing_mm = 0.4,
+                        .position_mm = {-200, 200},
+                        .columns = 1000,
+                        .rows = 1000};
+  const Eigen::Matrix<double, 3, 4> right = make_xray_view(geometry, Beam::kKilovoltage).pixel_from_room;
+  const auto view_of = [](const Eigen::Matrix<double, 3, 4>& matrix) {
+    return xray_view_from_matrix(matrix, 1500, 1000, 1000, Beam::kKilovoltage);
+  };
+  EXPECT_NO_THROW(view_of(right));
+  Eigen::Matrix<double, 3, 4> sheared = right, thin = right, fine = right;
+  sheared.row(0) += 0.1 * right.row(1);
+  thin.row(0) *= 3.0;
+  fine.topRows<2>() *= 10.0;
+  for (const auto& matrix : {sheared, thin, fine}) EXPECT_THROW(view_of(matrix), Error);
 }
 
 }  // namespace

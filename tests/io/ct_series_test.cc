@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <map>
 #include <random>
 
 #include "geometry/error.h"
@@ -194,10 +195,49 @@ TEST_F(CtSeriesTest, AllowedGapsAreInterpolated) {
   EXPECT_THAT(notes_.overrides, testing::ElementsAre(testing::HasSubstr("(allowed by gaps: repaired by hand)")));
 }
 
+// CT-2.
 TEST_F(CtSeriesTest, RefusesWhatWouldMisplaceVoxels) {
-  write_even(5);
-  write(5, {10, 20, 55}, [](DicomItem d) { d.put(DCM_PixelSpacing, "0.5\\0.26"); });
-  EXPECT_THAT(error_of_reading(), testing::HasSubstr("PixelSpacing (0028,0030) differs"));
+  write_even(6);
+  const std::filesystem::path changed = files_[3];
+  const std::map<std::string, std::pair<DcmTagKey, std::string>> wrong = {
+      {"PixelSpacing (0028,0030)", {DCM_PixelSpacing, "0.5\\0.26"}},
+      {"ImageOrientationPatient (0020,0037)", {DCM_ImageOrientationPatient, "1\\0\\0\\0\\0.999\\0.0447"}},
+      {"FrameOfReferenceUID (0020,0052)", {DCM_FrameOfReferenceUID, "1.2.5"}}};
+  for (const auto& [name, tag_and_value] : wrong) {
+    const auto& [tag, value] = tag_and_value;
+    std::string right;
+    edit(changed, [&](DicomItem d) {
+      right = *d.raw_text(tag);
+      d.put(tag, value);
+    });
+    EXPECT_THAT(error_of_reading(), testing::HasSubstr(name + " differs from that of"));
+    edit(changed, [&](DicomItem d) { d.put(tag, right); });
+  }
+  EXPECT_EQ(error_of_reading(), "no error");
+}
+
+TEST_F(CtSeriesTest, RefusesSlicesOfAnotherSize) {
+  write_even(6);
+  edit(files_[3], [](DicomItem d) {
+    d.put(DCM_Columns, kRows);
+    d.put(DCM_Rows, kColumns);
+  });
+  EXPECT_THAT(error_of_reading(), testing::HasSubstr("Columns (0028,0011) differs from that of"));
+}
+
+// CT-4.
+TEST_F(CtSeriesTest, RefusesAxesThatAreNotPerpendicular) {
+  write_even(6);
+  for (const std::filesystem::path& file : files_)
+    edit(file, [](DicomItem d) { d.put(DCM_ImageOrientationPatient, "1\\0\\0\\0.1\\0.995\\0"); });
+  EXPECT_THAT(error_of_reading(),
+              testing::HasSubstr("ImageOrientationPatient (0020,0037) is not a pair of perpendicular unit vectors"));
+}
+
+TEST_F(CtSeriesTest, SlicesOfAnotherPatientAreRefused) {
+  write_even(6);
+  edit(files_[3], [](DicomItem d) { d.put(DCM_PatientName, "Somebody^Else"); });
+  EXPECT_THAT(error_of_reading(), testing::HasSubstr("PatientName (0010,0010) differs from that of"));
 }
 
 TEST_F(CtSeriesTest, RefusesAStackThatLeavesItsLine) {
@@ -288,8 +328,8 @@ TEST_F(CtSeriesTest, AStackThatIsNoBodyIsRefused) {
 }
 
 TEST_F(CtSeriesTest, CompressionWithLossIsWarnedOf) {
-  for (int k = 0; k < 6; ++k)
-    write(k, {10, 20, 30 + 5.0 * k}, [](DicomItem d) { d.put(DCM_LossyImageCompression, "01"); });
+  write_even(6);
+  edit(files_[3], [](DicomItem d) { d.put(DCM_LossyImageCompression, "01"); });
   read();
   EXPECT_THAT(notes_.warnings, testing::ElementsAre(testing::HasSubstr("compressed with loss")));
 }

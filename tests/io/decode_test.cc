@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstring>
 #include <fstream>
 
 #include "geometry/error.h"
@@ -149,6 +150,36 @@ TEST_F(DecoderThatFailsTest, AnAnswerOfAnotherLengthIsRefused) {
   // is_error, padding, and a length of 2^40.
   EXPECT_THAT(error_with_decoder("printf '\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\1\\0\\0'; exec sleep 5"),
               testing::HasSubstr("was decoded to 1099511627776 bytes, expected 1"));
+}
+
+// What the stream says of its size counts, not only what the header says.
+TEST_F(DecodeTest, AStreamOfAnotherSizeThanTheHeaderIsRefused) {
+  for (const char* command : {"dcmcjpeg +e1", "dcmcjpls +el"}) {
+    const std::filesystem::path compressed = compressed_by(command);
+    std::string bytes = read_text(compressed);
+    std::filesystem::remove(compressed);
+    const auto multiply = [&](std::string_view element, double factor) {
+      const std::size_t at = bytes.find(element) + element.size();
+      std::uint16_t value = 0;
+      std::memcpy(&value, bytes.data() + at, 2);
+      value = static_cast<std::uint16_t>(value * factor);
+      std::memcpy(bytes.data() + at, &value, 2);
+    };
+    multiply({"\x28\x00\x10\x00US\x02\x00", 8}, 0.5);  // Rows
+    multiply({"\x28\x00\x11\x00US\x02\x00", 8}, 2.0);  // Columns
+    write_text(compressed, bytes);
+    EXPECT_THROW(
+        {
+          try {
+            pixels_of(compressed);
+          } catch (const Error& error) {
+            EXPECT_THAT(error.what(), testing::HasSubstr("Rows (0028,0010) say"));
+            throw;
+          }
+        },
+        Error)
+        << command;
+  }
 }
 
 TEST_F(DecodeTest, ADamagedFileIsRefusedAndTheNextOneRead) {

@@ -130,6 +130,19 @@ TEST(DicomDataset, SequencesNestedWithoutEndAreRefused) {
   expect_refused_as_nested(path);
 }
 
+// Sequences of undefined length run on behind the end of the items around them.
+TEST(DicomDataset, SequencesNestedInItemsThatAreTooShortAreRefused) {
+  const TemporaryFolder folder;
+  std::string bytes(
+      "\x08\x00\x16\x00UI\x08\x00"
+      "1.2.3.4\0",
+      16);
+  for (int n = 0; n < 100'000; ++n)
+    bytes += std::string("\x02\x30\x30\x00SQ\0\0\xFF\xFF\xFF\xFF\xFE\xFF\x00\xE0\x08\x00\x00\x00", 20);
+  std::ofstream(folder / "nested.dcm", std::ios::binary) << bytes;
+  expect_refused_as_nested(folder / "nested.dcm");
+}
+
 TEST(DicomDataset, SequencesNestedWithoutEndAreRefusedInDeflatedFilesToo) {
   const TemporaryFolder folder;
   const std::string meta(

@@ -5,6 +5,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <fstream>
 #include <nlohmann/json.hpp>
 
 #include "cli/truth.h"
@@ -64,7 +65,7 @@ TEST_F(MachineProfileTest, SuppliesWhatFilesLack) {
                                                   {"couch_angle_deg", 0},
                                                   {"intensity", "LIN+"},
                                                   {"beam", "kv"}}}),
-                                        notes_);
+                                        {}, notes_);
   EXPECT_TRUE(missing_attributes(supplied).empty());
   const SmallStudy whole;
   const RtImage expected = read_rt_images(whole.image(0), notes_).front();
@@ -76,7 +77,7 @@ TEST_F(MachineProfileTest, SuppliesWhatFilesLack) {
 }
 
 TEST_F(MachineProfileTest, TheGantryAngleMayBeThatOfTheOtherArm) {
-  const RtImage turned = with_machine(image(), profile({{{"gantry_angle_offset_deg", 90}}}), notes_);
+  const RtImage turned = with_machine(image(), profile({{{"gantry_angle_offset_deg", 90}}}), {}, notes_);
   EXPECT_EQ(turned.gantry_angle_deg, 90.0);
   EXPECT_THAT(notes_.overrides, ElementsAre(HasSubstr("GantryAngle (300A,011E) +90 degrees by machine profile")));
 }
@@ -91,22 +92,33 @@ TEST_F(MachineProfileTest, SpacingMayCountAtTheAxis) {
       d.put(tag, values);
     }
   });
-  const RtImage found = with_machine(image(), profile({{{"spacing_plane", "SAD"}}}), notes_);
+  const RtImage found = with_machine(image(), profile({{{"spacing_plane", "SAD"}}}), {}, notes_);
   EXPECT_TRUE(found.pixel_spacing_mm->isApprox(*expected.pixel_spacing_mm, 1e-9));
   EXPECT_TRUE(found.position_mm->isApprox(*expected.position_mm, 1e-9));
 }
 
 TEST_F(MachineProfileTest, ReceptorOffsetsAddToTheTranslation) {
-  const RtImage found = with_machine(image(), profile({{{"receptor_offset_mm", {1.5, -2.0}}}}), notes_);
+  const RtImage found = with_machine(image(), profile({{{"receptor_offset_mm", {1.5, -2.0}}}}), {}, notes_);
   EXPECT_THAT(*found.receptor_translation_mm, VectorNear(Eigen::Vector3d(1.5, -2.0, -500.0), 1e-12));
+}
+
+// The SID may come from the command line: what rules make of it must not depend on where it comes from.
+TEST_F(MachineProfileTest, RulesCountWithTheSidOfTheCommandLine) {
+  RtImage lacking = image();
+  lacking.sid_mm.reset();
+  lacking.receptor_translation_mm.reset();
+  const MachineProfile rules = profile({{{"spacing_plane", "SAD"}, {"receptor_offset_mm", {1.5, -2.0}}}});
+  const RtImage found = with_machine(lacking, rules, {.sid_mm = 1600.0}, notes_);
+  EXPECT_TRUE(found.pixel_spacing_mm->isApprox(1.6 * *lacking.pixel_spacing_mm, 1e-9));
+  EXPECT_THAT(*found.receptor_translation_mm, VectorNear(Eigen::Vector3d(1.5, -2.0, -600.0), 1e-12));
 }
 
 TEST_F(MachineProfileTest, TheFirstRuleThatFitsCounts) {
   const MachineProfile rules = profile({{{"where", {{"RadiationMachineName", "OTHER"}}}, {"sad_mm", 900}},
                                         {{"where", {{"RTImageLabel", "KV_G090"}}}, {"sad_mm", 1100}},
                                         {{"sad_mm", 1200}}});
-  EXPECT_EQ(with_machine(image(0), rules, notes_).sad_mm, 1200.0);
-  EXPECT_EQ(with_machine(image(1), rules, notes_).sad_mm, 1100.0);
+  EXPECT_EQ(with_machine(image(0), rules, {}, notes_).sad_mm, 1200.0);
+  EXPECT_EQ(with_machine(image(1), rules, {}, notes_).sad_mm, 1100.0);
 }
 
 TEST_F(MachineProfileTest, AnImageThatNoRuleFitsIsRefused) {
@@ -114,7 +126,7 @@ TEST_F(MachineProfileTest, AnImageThatNoRuleFitsIsRefused) {
   EXPECT_THROW(
       {
         try {
-          with_machine(image(), rules, notes_);
+          with_machine(image(), rules, {}, notes_);
         } catch (const Error& error) {
           EXPECT_THAT(error.what(), HasSubstr("no rule of machine profile \"Linac 3\" fits this image"));
           EXPECT_THAT(error.what(), HasSubstr("RadiationMachineName=\"PHANTOM\""));
@@ -132,7 +144,41 @@ TEST_F(MachineProfileTest, MistakesAreNamed) {
   EXPECT_THAT(error_of({{{"where", {{"PatientName", "X"}}}}}), HasSubstr("images are not told apart by PatientName"));
   EXPECT_THAT(error_of({{{"pixel_from_room", {{1, 0, 0}}}, {"columns", 1}, {"rows", 1}}}),
               HasSubstr("expected three rows of four finite numbers"));
+  EXPECT_THAT(error_of({{{"receptor_offset_mm", {1, 2, 3}}}}), HasSubstr("is [1,2,3], expected two numbers, x and y"));
+  EXPECT_THAT(error_of({{{"pixel_from_room", {{1, 0, 0}}}, {"columns", 96.7}, {"rows", 1}}}), HasSubstr("expected"));
   EXPECT_THAT(error_of(nlohmann::json::array()), HasSubstr("images is empty, expected a list of rules"));
+}
+
+TEST_F(MachineProfileTest, AKeySaidTwiceIsNamed) {
+  std::ofstream(path_) << R"({"machine_profile": 1, "name": "A", "images": [{"sid_mm": 1500, "sid_mm": 1000}]})";
+  EXPECT_THROW(
+      {
+        try {
+          read_machine_profile(path_);
+        } catch (const Error& error) {
+          EXPECT_THAT(error.what(), HasSubstr("says sid_mm twice"));
+          throw;
+        }
+      },
+      Error);
+}
+
+// The examples of docs/machine-profile.md are profiles, and the matrix in them is that of the camera they tell of.
+TEST_F(MachineProfileTest, TheExamplesInTheDocumentationAreProfiles) {
+  std::ifstream page(std::string(ISOSHIFT_SOURCE_DIR) + "/docs/machine-profile.md");
+  const std::string text{std::istreambuf_iterator<char>(page), {}};
+  std::vector<MachineProfile> examples;
+  for (std::size_t begin = text.find("```json"); begin != std::string::npos; begin = text.find("```json", begin + 7)) {
+    std::ofstream(path_, std::ios::trunc) << text.substr(begin + 7, text.find("```", begin + 7) - begin - 7);
+    examples.push_back(read_machine_profile(path_));
+  }
+  ASSERT_EQ(examples.size(), 2U);
+  const MachineProfile::Rule& rule = examples[1].rules.front();
+  const XrayView view = xray_view_from_matrix(rule.pixel_from_room.value(), rule.switches.sid_mm.value(), rule.columns,
+                                              rule.rows, Beam::kKilovoltage);
+  EXPECT_THAT(view.source_room_mm, VectorNear(Eigen::Vector3d(1344, 0, -1792), 0.05));
+  EXPECT_THAT(view.project(Eigen::Vector3d::Zero()).value(), VectorNear(Eigen::Vector2d(511.5, 511.5), 1e-6));
+  EXPECT_NEAR((view.ray(1, 0).pixel_room_mm - view.ray(0, 0).pixel_room_mm).norm(), 0.4, 1e-4);
 }
 
 // The phantom's images as DX objects, which say nothing of geometry, and their matrices in a profile.
@@ -177,11 +223,16 @@ TEST_F(OtherXrayTest, TheirMatricesMakeTheSameViews) {
   for (const int n : {0, 1}) {
     const RtImage expected = read_rt_images(rt_images.image(n), notes_).front();
     const XrayView by_attributes = xray_view(expected, Beam::kKilovoltage, notes_);
-    const XrayView by_matrix = xray_view(with_machine(image(n), profile, notes_), Beam::kKilovoltage, notes_);
+    const XrayView by_matrix = xray_view(with_machine(image(n), profile, {}, notes_), Beam::kKilovoltage, notes_);
     EXPECT_TRUE(by_matrix.pixel_from_room.isApprox(by_attributes.pixel_from_room, 1e-9));
     EXPECT_THAT(by_matrix.source_room_mm, VectorNear(by_attributes.source_room_mm, 1e-6));
     EXPECT_THAT(by_matrix.ray(10, 80).pixel_room_mm, VectorNear(by_attributes.ray(10, 80).pixel_room_mm, 1e-6));
   }
+}
+
+TEST_F(OtherXrayTest, AGantryAngleForThemIsRefused) {
+  const RtImage supplied = with_machine(image(0), read_machine_profile(path_), {}, notes_);
+  EXPECT_THROW(with_switches(supplied, {.gantry_angle_deg = {{supplied.label, 45.0}}}, notes_), UsageError);
 }
 
 TEST_F(OtherXrayTest, AreRegisteredAsRtImagesAre) {

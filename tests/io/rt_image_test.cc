@@ -33,7 +33,9 @@ class RtImageTest : public testing::Test {
       d.put_pixels(std::vector<std::uint16_t>(96 * 96, 1000));
       change(d);
     });
-    return read_xray_image(image, xray_view(image, Beam::kKilovoltage, notes_)).values.at(0, 0);
+    return read_xray_image(DicomFile::read(image.path, DicomFile::Extent::kWhole), image,
+                           xray_view(image, Beam::kKilovoltage, notes_))
+        .values.at(0, 0);
   }
 
   std::string error_of_geometry(const RtImage& image) {
@@ -116,7 +118,7 @@ TEST_F(RtImageTest, AnglesAreModulo360) {
     d.put(DCM_PatientSupportAngle, 359.998);
     d.put(DCM_TableTopPitchAngle, 359.998);
   });
-  const TableAngles table = table_angles(image, notes_);
+  const TableAngles table = table_angles(std::span(&image, 1), notes_);
   EXPECT_NEAR(deg_from_rad(table.support_rad), -0.002, 1e-9);
   EXPECT_NEAR(deg_from_rad(table.pitch_rad), -0.002, 1e-4);
 }
@@ -225,15 +227,62 @@ TEST_F(RtImageTest, EveryFrameHasTheAnglesOfItsExposure) {
   EXPECT_EQ(frames[1].kvp, 120.0);
   const SmallStudy single;
   const RtImage second = read_rt_images(single.image(1), notes_).front();
-  EXPECT_EQ(read_xray_image(frames[1], xray_view(frames[1], Beam::kKilovoltage, notes_)).values.pixels,
-            read_xray_image(second, xray_view(second, Beam::kKilovoltage, notes_)).values.pixels);
+  EXPECT_EQ(read_xray_image(DicomFile::read(frames[1].path, DicomFile::Extent::kWhole), frames[1],
+                            xray_view(frames[1], Beam::kKilovoltage, notes_))
+                .values.pixels,
+            read_xray_image(DicomFile::read(second.path, DicomFile::Extent::kWhole), second,
+                            xray_view(second, Beam::kKilovoltage, notes_))
+                .values.pixels);
+}
+
+// Which exposure counts for an image must not be guessed.
+TEST_F(RtImageTest, ExposuresOfOneImageMustAgree) {
+  const auto with_exposures = [&](std::initializer_list<double> gantry_angles_deg) {
+    edit(study_.image(0), [&](DicomItem d) {
+      d.erase(DCM_ExposureSequence);
+      d.append_item(DCM_ExposureSequence).put(DCM_KVP, 120.0);
+      for (const double angle_deg : gantry_angles_deg)
+        d.append_item(DCM_ExposureSequence).put(DCM_GantryAngle, angle_deg);
+    });
+    return read_rt_images(study_.image(0), notes_).front();
+  };
+  const RtImage agreeing = with_exposures({30.0, 30.005});
+  EXPECT_EQ(agreeing.gantry_angle_deg, 30.0);
+  EXPECT_EQ(agreeing.kvp, 120.0);
+  EXPECT_THROW(
+      {
+        try {
+          with_exposures({100.0, 90.0});
+        } catch (const Error& error) {
+          EXPECT_THAT(error.what(), HasSubstr("GantryAngle (300A,011E) is 100 in one exposure and 90 in another"));
+          throw;
+        }
+      },
+      Error);
+}
+
+TEST_F(RtImageTest, ExposuresThatNameNoFrameAreNotTakenForAll) {
+  join_images(study_);
+  edit(study_.image(0), [](DicomItem d) {
+    for (DicomItem& exposure : d.items(DCM_ExposureSequence)) exposure.erase(DCM_ReferencedFrameNumber);
+  });
+  EXPECT_THROW(read_rt_images(study_.image(0), notes_), Error);
+}
+
+TEST_F(RtImageTest, TableAnglesAreThoseOfTheFirstViewThatSays) {
+  std::vector<RtImage> images = {read_rt_images(study_.image(0), notes_).front(),
+                                 read_rt_images(study_.image(1), notes_).front()};
+  images[0].table_pitch_deg.reset();
+  images[1].table_pitch_deg = 3.0;
+  images[1].table_roll_deg = images[0].table_roll_deg = std::nullopt;
+  EXPECT_NEAR(table_angles(images, notes_).pitch_rad, rad_from_deg(3.0), 1e-12);
+  EXPECT_THAT(notes_.warnings,
+              testing::Contains(HasSubstr("TableTopRollAngle (300A,0144) is missing in all X-rays, taken as 0")));
 }
 
 TEST_F(RtImageTest, AFrameThatNoExposureNamesIsLeftOut) {
   join_images(study_);
-  edit(study_.image(0), [](DicomItem d) {
-    for (DicomItem& exposure : d.items(DCM_ExposureSequence)) exposure.put(DCM_ReferencedFrameNumber, "2");
-  });
+  edit(study_.image(0), [](DicomItem d) { d.items(DCM_ExposureSequence).front().put(DCM_ReferencedFrameNumber, "3"); });
   const std::vector<RtImage> frames = read_rt_images(study_.image(0), notes_);
   ASSERT_EQ(frames.size(), 1U);
   EXPECT_EQ(frames.front().frame, 1);

@@ -59,7 +59,8 @@ TEST_F(WinstonLutz, TheReceptorTranslationHasTheSignOfTheImageContent) {
     RtImage image = read_rt_images(folder_ / name, notes).front();
     image.intensity_relationship = "LIN";
     image.intensity_sign = 1;
-    const XrayImage xray = read_xray_image(image, xray_view(image, Beam::kMegavoltage, notes));
+    const XrayImage xray = read_xray_image(DicomFile::read(image.path, DicomFile::Extent::kWhole), image,
+                                           xray_view(image, Beam::kMegavoltage, notes));
     const auto percentile = [](std::vector<float> values, double share) {
       const auto nth = values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
       std::ranges::nth_element(values, nth);

@@ -1,0 +1,72 @@
+#pragma once
+// JSON files that people write: every mistake is named with its file, its place and what is expected there.
+
+#include <array>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <type_traits>
+#include <vector>
+
+namespace isoshift {
+
+struct JsonFile {
+  nlohmann::json json;
+  std::string sha256;  // of the file, hexadecimal
+};
+
+// Throws Error for a file that cannot be read, is no JSON, or says a key of an object twice.
+JsonFile read_json_file(const std::filesystem::path& path);
+
+template <class T>
+inline constexpr bool is_array = false;
+template <class T, std::size_t N>
+inline constexpr bool is_array<std::array<T, N>> = true;
+
+// SHA-256, hexadecimal.
+std::string sha256_of(std::string_view content);
+
+// An object in such a file. Every key must be asked for: what is left at end() is a mistake. Throws Error.
+class JsonSection {
+ public:
+  // `where`: the file, and the place in it. The JSON must outlive the section.
+  JsonSection(const nlohmann::json& json, std::string where);
+
+  template <class T>
+  std::optional<T> find(const char* key, const char* expected) {
+    known_.emplace_back(key);
+    if (!json_.contains(key)) return std::nullopt;
+    const nlohmann::json& value = json_.at(key);
+    if constexpr (std::is_integral_v<T> && !std::is_same_v<T, bool>)
+      if (!value.is_number_integer()) refuse(key, expected);
+    if constexpr (is_array<T>)
+      if (!value.is_array() || value.size() != std::tuple_size_v<T>) refuse(key, expected);
+    try {
+      return value.get<T>();
+    } catch (const nlohmann::json::exception&) {
+      refuse(key, expected);
+    }
+  }
+  template <class T>
+  T required(const char* key, const char* expected) {
+    if (auto value = find<T>(key, expected)) return *std::move(value);
+    refuse_missing(key, expected);
+  }
+  std::optional<double> number(const char* key, double low, double high);
+  // An object within; nothing where there is none.
+  std::optional<JsonSection> section(const char* key);
+
+  [[noreturn]] void refuse(const char* key, const char* expected) const;
+  [[noreturn]] void refuse_missing(const char* key, const char* expected) const;
+  const std::string& where() const { return where_; }
+  void end() const;
+
+ private:
+  const nlohmann::json& json_;
+  std::string where_;
+  std::vector<std::string> known_;
+};
+
+}  // namespace isoshift
