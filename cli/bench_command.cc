@@ -16,7 +16,7 @@
 #include "drr/raycast/rasterized.h"
 #include "geometry/rotation.h"
 #include "io/output_folder.h"
-#include "io/report/pictures.h"
+#include "io/report/drawings.h"
 #include "io/version.h"
 
 namespace isoshift {
@@ -236,19 +236,19 @@ void run_bench_figures(const BenchFiguresOptions& options, Console& console) {
     Image<float> image(view.columns, view.rows);
     for (std::size_t n = 0; n < pixels.of_view[0].size(); ++n)
       image.pixels[pixels.of_view[0][n]] = result.line_integrals(0, 0)[n];
-    sparse.push_back({fmt::format("{:.0f} % of the pixels", 100.0 * share), radiograph(image)});
+    sparse.push_back({fmt::format("{:.0f} % of the pixels", 100.0 * share), in_gray(radiograph(image))});
   }
   for (const RendererKind kind : kRendererKinds) {
     const auto renderer = make_renderer(kind, volume.hu, model, beams, {.gl = gl});
     const RenderResult result = renderer->render(std::span(&view, 1), std::span(&pose, 1), PixelSet::all());
     const Image<float> image = image_of(view, result.line_integrals(0, 0));
     require_not_empty(image.pixels, to_string(kind));
-    renderers.push_back({std::string(to_string(kind)), radiograph(image)});
+    renderers.push_back({std::string(to_string(kind)), in_gray(radiograph(image))});
     bar.update(0.3 + 0.7 * static_cast<double>(renderers.size()) / kRendererKinds.size());
   }
-  write_captioned_png(output.path() / "bounding_structures.png", structures, 3);
-  write_captioned_png(output.path() / "sparse_pixels.png", sparse, 4);
-  write_captioned_png(output.path() / "renderers.png", renderers, 3);
+  write_text(output.path() / "bounding_structures.png", captioned_png(structures, 3));
+  write_text(output.path() / "sparse_pixels.png", captioned_png(sparse, 4));
+  write_text(output.path() / "renderers.png", captioned_png(renderers, 3));
   output.commit();
   console.out << fmt::format("{}: bounding_structures.png, sparse_pixels.png, renderers.png\n",
                              options.output.string());

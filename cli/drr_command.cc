@@ -11,7 +11,7 @@
 #include "io/drr_image.h"
 #include "io/image_files.h"
 #include "io/output_folder.h"
-#include "io/report/pictures.h"
+#include "io/report/view_picture.h"
 
 namespace isoshift {
 namespace {
@@ -54,7 +54,7 @@ void run_drr(const DrrOptions& options, Console& console) {
     const Image<float> image = image_of(view, drrs.line_integrals(0, 0));
     require_not_empty(image.pixels, study.xrays[n].label);
     const std::string name = fmt::format("drr{}", n + 1);
-    write_line_integral_png(output.path() / (name + ".png"), image);
+    write_text(output.path() / (name + ".png"), png_of(radiograph(image)));
     write_mha(output.path() / (name + ".mha"), image, pixel_size_mm(view));
     if (options.dicom)
       write_drr_image(study, n, image, setup_error, series_instance_uid, output.path() / (name + ".dcm"));

@@ -37,6 +37,7 @@ int run_isoshift(int argc, const char* const* argv, Console& console) {
   app.get_formatter()->column_width(34);
   add_inspect_command(app, console, exit_status);
   add_check_command(app, console, exit_status);
+  add_report_command(app, console, exit_status);
   add_register_command(app, console, exit_status);
   add_drr_command(app, console, exit_status);
   add_phantom_command(app, console, exit_status);

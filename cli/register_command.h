@@ -17,9 +17,12 @@ struct RegisterOptions {
   RegistrationFlags flags;
   std::filesystem::path output;
   std::filesystem::path truth;  // empty: unknown
+  std::filesystem::path site;   // empty: no site file
+  std::string anatomy;
   bool overwrite = false;
   bool json = false;
   bool write_reg_for_review = false;
+  bool accept_unobservable = false;
   RegistrationSource source = RegistrationSource::kTreatment;
 };
 

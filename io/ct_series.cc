@@ -12,6 +12,7 @@
 
 #include "geometry/error.h"
 #include "io/decode.h"
+#include "io/sha256.h"
 
 namespace isoshift {
 namespace {
@@ -33,6 +34,7 @@ struct Slice {
   std::string frame_of_reference_uid;
   Identity identity;
   bool is_lossy = false;  // compressed with loss
+  std::string sha256;     // of its file
   std::vector<float> hu;
 };
 
@@ -153,6 +155,7 @@ std::vector<Slice> read_slices_of(const std::filesystem::path& path) {
   else if (format.frames != 1)
     throw Error(fmt::format("{}: {} is {}, expected 1 for a CT Image", dataset.where(), described(DCM_NumberOfFrames),
                             format.frames));
+  const std::string sha256 = sha256_of_file(path);
   std::vector<Slice> slices;
   for (std::size_t frame = 0; frame < static_cast<std::size_t>(format.frames); ++frame) {
     FrameGeometry geometry{dataset, dataset, dataset, dataset};
@@ -166,6 +169,7 @@ std::vector<Slice> read_slices_of(const std::filesystem::path& path) {
     }
     slices.push_back(slice_at(geometry, dataset, where));
     slices.back().format = format;
+    slices.back().sha256 = sha256;
     slices.back().hu = hu_from_stored(dataset, geometry.rescale, decode_frame(file, format, static_cast<int>(frame)));
   }
   return slices;
@@ -353,9 +357,13 @@ CtSeries read_ct_series(std::span<const std::filesystem::path> files, const Allo
   drop_duplicates(slices, axes.col(2), notes);
   if (slices.size() < 2) throw Error(fmt::format("CT series {}: only one slice", series.series_instance_uid));
   series.hu = assembled(slices, axes, series.series_instance_uid, allowed, notes);
+  std::string hashes;
   for (const Slice& slice : slices)
-    if (std::ranges::find(series.sop_instance_uids, slice.sop_instance_uid) == series.sop_instance_uids.end())
+    if (std::ranges::find(series.sop_instance_uids, slice.sop_instance_uid) == series.sop_instance_uids.end()) {
       series.sop_instance_uids.push_back(slice.sop_instance_uid);
+      hashes += slice.sha256;
+    }
+  series.sha256 = sha256_of(hashes);
   return series;
 }
 

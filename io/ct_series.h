@@ -23,6 +23,7 @@ struct CtSeries {
   std::string body_part_examined;
   std::string patient_position;                // of the scan; annotation only (C.7.3.1.1.2)
   std::vector<std::string> sop_instance_uids;  // each once, in the order of the slices
+  std::string sha256;  // of the SHA-256 of its files, hexadecimal, one after the other in that order
 };
 
 // Called with (slices done, slices in all), possibly from several threads, never at the same time.

@@ -185,6 +185,7 @@ void DicomItem::put(const DcmTagKey& key, std::span<const double> numbers) {
       case EVR_xs:  // US or SS by PixelRepresentation
       case EVR_US: done = item_->putAndInsertUint16(key, static_cast<Uint16>(number), n); break;
       case EVR_SS: done = item_->putAndInsertSint16(key, static_cast<Sint16>(number), n); break;
+      case EVR_UL: done = item_->putAndInsertUint32(key, static_cast<Uint32>(number), n); break;
       case EVR_FL: done = item_->putAndInsertFloat32(key, static_cast<Float32>(number), n); break;
       case EVR_FD: done = item_->putAndInsertFloat64(key, number, n); break;
       default: throw Error(fmt::format("{}: {} takes no number", where_, described(key)));
@@ -196,6 +197,13 @@ void DicomItem::put(const DcmTagKey& key, std::span<const double> numbers) {
 void DicomItem::put_pixels(std::span<const std::uint16_t> stored_values) {
   check(item_->putAndInsertUint16Array(DCM_PixelData, stored_values.data(), stored_values.size()), where_,
         described(DCM_PixelData));
+}
+
+void DicomItem::put_bytes(const DcmTagKey& tag, std::string_view bytes) {
+  std::string even(bytes);
+  if (even.size() % 2 != 0) even.push_back('\0');
+  check(item_->putAndInsertUint8Array(tag, reinterpret_cast<const Uint8*>(even.data()), even.size()), where_,
+        described(tag));
 }
 
 DicomItem DicomItem::append_item(const DcmTagKey& sequence) {

@@ -50,6 +50,7 @@ class DicomItem {
   void put(const DcmTagKey& tag, std::span<const double> numbers);
   void put(const DcmTagKey& tag, double number) { put(tag, std::span(&number, 1)); }
   void put_pixels(std::span<const std::uint16_t> stored_values);
+  void put_bytes(const DcmTagKey& tag, std::string_view bytes);  // OB, padded to an even length
   DicomItem append_item(const DcmTagKey& sequence);
   DicomItem append_reference(const DcmTagKey& sequence, std::string_view sop_class_uid, std::string_view instance_uid);
   void put_empty_sequence(const DcmTagKey& sequence);

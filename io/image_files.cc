@@ -3,6 +3,7 @@
 #include <cairo.h>
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <bit>
 #include <memory>
 #include <string>
@@ -12,32 +13,53 @@
 
 namespace isoshift {
 
-void write_png(const std::filesystem::path& path, const Image<Rgb>& image) {
-  const std::unique_ptr<cairo_surface_t, decltype(&cairo_surface_destroy)> surface(
-      cairo_image_surface_create(CAIRO_FORMAT_RGB24, image.columns, image.rows), &cairo_surface_destroy);
-  unsigned char* data = cairo_image_surface_get_data(surface.get());
-  if (data == nullptr)
-    throw Error(fmt::format("{}: no picture of {} x {} pixels can be made", path.string(), image.columns, image.rows));
-  const int stride = cairo_image_surface_get_stride(surface.get());
-  for (int row = 0; row < image.rows; ++row) {
-    auto* pixels = reinterpret_cast<std::uint32_t*>(data + static_cast<std::ptrdiff_t>(row) * stride);
-    for (int column = 0; column < image.columns; ++column) {
-      const Rgb& color = image.at(column, row);
-      pixels[column] = (std::uint32_t{color[0]} << 16) | (std::uint32_t{color[1]} << 8) | color[2];
-    }
-  }
-  cairo_surface_mark_dirty(surface.get());
+namespace {
 
-  // Encoded in memory: write_text() then reports a full disk like every other output does.
-  std::string encoded;
-  const auto append = [](void* closure, const unsigned char* bytes, unsigned int count) {
-    static_cast<std::string*>(closure)->append(reinterpret_cast<const char*>(bytes), count);
+using Surface = std::unique_ptr<cairo_surface_t, decltype(&cairo_surface_destroy)>;
+
+std::string encoded(const Surface& surface) {
+  cairo_surface_mark_dirty(surface.get());
+  std::string bytes;
+  const auto append = [](void* closure, const unsigned char* data, unsigned int count) {
+    static_cast<std::string*>(closure)->append(reinterpret_cast<const char*>(data), count);
     return CAIRO_STATUS_SUCCESS;
   };
-  if (const auto status = cairo_surface_write_to_png_stream(surface.get(), append, &encoded);
+  if (const auto status = cairo_surface_write_to_png_stream(surface.get(), append, &bytes);
       status != CAIRO_STATUS_SUCCESS)
-    throw Error(fmt::format("{}: cannot be written: {}", path.string(), cairo_status_to_string(status)));
-  write_text(path, encoded);
+    throw Error(fmt::format("a picture cannot be made: {}", cairo_status_to_string(status)));
+  return bytes;
+}
+
+Surface surface_of(cairo_format_t format, int columns, int rows) {
+  Surface surface(cairo_image_surface_create(format, columns, rows), &cairo_surface_destroy);
+  if (cairo_image_surface_get_data(surface.get()) == nullptr)
+    throw Error(fmt::format("no picture of {} x {} pixels can be made", columns, rows));
+  return surface;
+}
+
+}  // namespace
+
+std::string png_of(const Image<std::uint8_t>& gray) {
+  const Surface surface = surface_of(CAIRO_FORMAT_A8, gray.columns, gray.rows);  // encoded as gray
+  unsigned char* data = cairo_image_surface_get_data(surface.get());
+  const int stride = cairo_image_surface_get_stride(surface.get());
+  for (int row = 0; row < gray.rows; ++row)
+    std::copy_n(&gray.at(0, row), gray.columns, data + static_cast<std::ptrdiff_t>(row) * stride);
+  return encoded(surface);
+}
+
+Image<std::uint8_t> read_gray_png(const std::filesystem::path& path) {
+  const Surface surface(cairo_image_surface_create_from_png(path.c_str()), &cairo_surface_destroy);
+  if (const auto status = cairo_surface_status(surface.get()); status != CAIRO_STATUS_SUCCESS)
+    throw Error(fmt::format("{}: cannot be read as a PNG: {}", path.string(), cairo_status_to_string(status)));
+  Image<std::uint8_t> gray(cairo_image_surface_get_width(surface.get()), cairo_image_surface_get_height(surface.get()));
+  const unsigned char* data = cairo_image_surface_get_data(surface.get());
+  const int stride = cairo_image_surface_get_stride(surface.get());
+  for (int row = 0; row < gray.rows; ++row) {
+    const auto* pixels = reinterpret_cast<const std::uint32_t*>(data + static_cast<std::ptrdiff_t>(row) * stride);
+    for (int column = 0; column < gray.columns; ++column) gray.at(column, row) = pixels[column] & 0xFF;
+  }
+  return gray;
 }
 
 void write_mha(const std::filesystem::path& path, const Image<float>& image, const std::array<double, 2>& spacing_mm) {

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdint>
 #include <filesystem>
+#include <string>
 
 #include "geometry/image.h"
 #include "geometry/xray_view.h"
@@ -12,8 +13,9 @@ namespace isoshift {
 
 using Rgb = std::array<std::uint8_t, 3>;
 
-// Throws Error naming the file if it cannot be written.
-void write_png(const std::filesystem::path& path, const Image<Rgb>& image);
+// A gray picture as the bytes of a PNG file, and back. Reading throws Error naming the file.
+std::string png_of(const Image<std::uint8_t>& gray);
+Image<std::uint8_t> read_gray_png(const std::filesystem::path& path);
 
 // A MetaImage with float elements, little endian, header and data in one .mha file. `spacing_mm` between columns and
 // between rows, on the receptor.

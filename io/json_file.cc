@@ -2,15 +2,14 @@
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
-#include <openssl/evp.h>
 
 #include <algorithm>
-#include <array>
 #include <fstream>
 #include <iterator>
 #include <set>
 
 #include "geometry/error.h"
+#include "io/sha256.h"
 
 namespace isoshift {
 
@@ -32,14 +31,6 @@ JsonFile read_json_file(const std::filesystem::path& path) {
   } catch (const nlohmann::json::exception& error) {
     throw Error(fmt::format("{}: is no JSON: {}", path.string(), error.what()));
   }
-}
-
-std::string sha256_of(std::string_view content) {
-  std::array<unsigned char, EVP_MAX_MD_SIZE> digest{};
-  unsigned size = 0;
-  if (EVP_Digest(content.data(), content.size(), digest.data(), &size, EVP_sha256(), nullptr) != 1)
-    throw Error("SHA-256 is not available");
-  return fmt::format("{:02x}", fmt::join(digest.begin(), digest.begin() + size, ""));
 }
 
 JsonSection::JsonSection(const nlohmann::json& json, std::string where) : json_(json), where_(std::move(where)) {

@@ -25,9 +25,6 @@ inline constexpr bool is_array = false;
 template <class T, std::size_t N>
 inline constexpr bool is_array<std::array<T, N>> = true;
 
-// SHA-256, hexadecimal.
-std::string sha256_of(std::string_view content);
-
 // An object in such a file. Every key must be asked for: what is left at end() is a mistake. Throws Error.
 class JsonSection {
  public:

@@ -132,14 +132,17 @@ SearchResult search(const RendererPyramid& renderers, const FixedViews& views,
                          .pixel_fraction = stage.pixel_fraction,
                          .min_pixels = static_cast<std::size_t>(stage.min_pixels),
                          .seed = options.seed});
+    StageReport report{.name = stage.name, .similarity = std::string(to_string(stage.similarity))};
     const BatchObjective similarity_at = [&](std::span<const Parameters> points) {
       std::vector<Eigen::Isometry3d> poses;
       for (const Parameters& point : points)
         poses.push_back(setup_error_from_parameters(point) * start_room_from_patient);
-      return objective.values(poses);
+      std::vector<double> values = objective.values(poses);
+      for (const double value : values)
+        report.best.push_back(report.best.empty() ? value : std::max(value, report.best.back()));
+      return values;
     };
 
-    StageReport report{.name = stage.name, .similarity = std::string(to_string(stage.similarity))};
     const std::size_t more = static_cast<std::size_t>(stage.starts) - std::min<std::size_t>(stage.starts, kept.size());
     std::ranges::copy(
         best_of(candidates_about(kept.front(), stage, options, random), more, similarity_at, report.evaluations),

@@ -60,6 +60,7 @@ struct StageReport {
   // Between the poses that the starts ended at, where there were several: the largest distance of those that leave not
   // clearly more unexplained than the best one from that.
   std::optional<double> spread_mm, spread_rad;
+  std::vector<double> best;  // the similarity reached after each evaluation
 };
 
 // Progress of a search: the share done, from 0 to 1, an estimate.

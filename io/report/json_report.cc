@@ -1,13 +1,33 @@
-#include <nlohmann/json.hpp>
+#include <fmt/format.h>
 
+#include <array>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <utility>
+
+#include "geometry/error.h"
 #include "geometry/rotation.h"
-#include "io/report/setup_report.h"
-#include "io/version.h"
+#include "io/report/formats.h"
 
 namespace isoshift {
 namespace {
 
 using Json = nlohmann::ordered_json;
+
+constexpr std::array<std::pair<const char*, std::string Identity::*>, 12> kIdentity = {{
+    {"character_set", &Identity::character_set},
+    {"id", &Identity::patient_id},
+    {"id_issuer", &Identity::patient_id_issuer},
+    {"name", &Identity::patient_name},
+    {"birth_date", &Identity::patient_birth_date},
+    {"sex", &Identity::patient_sex},
+    {"study_instance_uid", &Identity::study_instance_uid},
+    {"study_date", &Identity::study_date},
+    {"study_time", &Identity::study_time},
+    {"study_id", &Identity::study_id},
+    {"accession_number", &Identity::accession_number},
+    {"referring_physician", &Identity::referring_physician},
+}};
 
 Json or_null(const std::optional<double>& value) { return value ? Json(*value) : Json(nullptr); }
 
@@ -67,9 +87,66 @@ Json stage_json(const SetupReport::Stage& stage) {
                {"value", stage.value},
                {"optimizer", stage.optimizer},
                {"spread_mm", or_null(stage.spread_mm)},
-               {"spread_deg", or_null(stage.spread_deg)}};
+               {"spread_deg", or_null(stage.spread_deg)},
+               {"best", stage.best}};
   for (const auto& [name, value] : stage.parameters) json["parameters"][name] = value;
   return json;
+}
+
+Json polygons_json(const std::vector<Polygon>& polygons) {
+  Json list = Json::array();
+  for (const Polygon& polygon : polygons) {
+    Json points = Json::array();
+    for (const Eigen::Vector2d& point : polygon)
+      points.push_back({std::round(point.x() * 10.0) / 10.0, std::round(point.y() * 10.0) / 10.0});
+    list.push_back(points);
+  }
+  return list;
+}
+
+Json picture_json(const ViewPicture& picture) {
+  Json structures = Json::array();
+  for (const ViewPicture::Outline& outline : picture.structures)
+    structures.push_back(
+        {{"name", outline.name}, {"planned", polygons_json(outline.planned)}, {"found", polygons_json(outline.found)}});
+  return {{"isocenter_px", array_of(picture.isocenter_px)},
+          {"pixels_per_mm", picture.pixels_per_mm},
+          {"directions", picture.directions},
+          {"field", polygons_json(picture.field)},
+          {"structures", structures}};
+}
+
+Json site_json(const std::optional<SetupReport::Site>& site) {
+  if (!site) return nullptr;
+  Json json = {{"name", site->name},
+               {"sha256", site->sha256},
+               {"anatomy", site->anatomy},
+               {"action_level", nullptr},
+               {"couch_degrees_of_freedom", static_cast<int>(site->couch_dof)},
+               {"couch_scale", nullptr},
+               {"length_unit", site->length_unit == LengthUnit::kCm ? "cm" : "mm"}};
+  if (site->level)
+    json["action_level"] = {{"translation_mm", or_null(site->level->translation_mm)},
+                            {"vector_mm", or_null(site->level->vector_mm)},
+                            {"rotation_deg", or_null(site->level->rotation_deg)}};
+  if (site->couch_scale)
+    json["couch_scale"] = {{"name", to_string(site->couch_scale->scale)},
+                           {"validated_by", site->couch_scale->validated_by},
+                           {"validated_on", site->couch_scale->validated_on}};
+  return json;
+}
+
+Json points_json(const SetupReport& report) {
+  Json list = Json::array();
+  for (const SetupReport::Point& point : report.points)
+    list.push_back({{"name", point.name}, {"room_mm", array_of(point.room_mm)}});
+  return list;
+}
+
+Json left_over_json(const ShownShift& shown) {
+  Json list = Json::array();
+  for (const ShownShift::LeftOver& left : shown.left_over) list.push_back({{"at", left.at}, {"mm", array_of(left.mm)}});
+  return list;
 }
 
 Json parts_json(const SetupReport::View& view) {
@@ -105,10 +182,13 @@ Json unobservable_json(const SetupReport& report) {
 std::string json_report(const SetupReport& report) {
   const ShownShift shown = shown_shift(report);
   Json json = {{"schema", 1},
-               {"program", {{"name", "isoshift"}, {"version", kVersion}, {"commit", kCommit}}},
+               {"program", {{"name", "isoshift"}, {"version", report.version}, {"commit", report.commit}}},
+               {"made_on", report.made_on},
                {"verdict", to_string(report.verdict)},
                {"reasons", report.reasons},
-               {"action", "unset"},
+               {"action", to_string(shown.action)},
+               {"action_reasons", shown.action_reasons},
+               {"patient", Json::object()},
                {"patient_position", report.patient_position},
                {"isocenter_patient_mm", array_of(report.isocenter_patient_mm)},
                {"setup_error", setup_error_json(report, shown)},
@@ -127,6 +207,15 @@ std::string json_report(const SetupReport& report) {
                {"threshold_hu", report.threshold_hu},
                {"renderer", report.renderer},
                {"device", report.device}};
+  for (const auto& [name, member] : kIdentity) json["patient"][name] = report.identity.*member;
+  json["table"] = {{"support_deg", deg_from_rad(report.table.support_rad)},
+                   {"eccentric_deg", deg_from_rad(report.table.eccentric_rad)},
+                   {"pitch_deg", deg_from_rad(report.table.pitch_rad)},
+                   {"roll_deg", deg_from_rad(report.table.roll_rad)},
+                   {"position_mm", report.table_position_mm ? array_of(*report.table_position_mm) : Json(nullptr)}};
+  json["site"] = site_json(report.site);
+  json["points"] = points_json(report);
+  json["left_over"] = left_over_json(shown);
   json["renderer_settings"] = Json::object();
   for (const auto& [name, value] : report.renderer_settings) json["renderer_settings"][name] = value;
   json["window_hu"] = report.window_hu ? array_of(*report.window_hu) : Json(nullptr);
@@ -135,13 +224,23 @@ std::string json_report(const SetupReport& report) {
   for (const SetupReport::View& view : report.views) {
     json["views"].push_back({{"label", view.label},
                              {"sop_instance_uid", view.sop_instance_uid},
+                             {"sop_class_uid", view.sop_class_uid},
+                             {"sha256", view.sha256},
                              {"frame", view.frame},
+                             {"acquired", view.acquired},
+                             {"reported_values_origin", view.origin},
+                             {"beam", view.is_megavoltage ? "MV" : "kV"},
                              {"gantry_deg", or_null(view.gantry_deg)},
+                             {"source_room_mm", array_of(view.source_room_mm)},
+                             {"pixel_mm", view.pixel_mm},
+                             {"columns", view.columns},
+                             {"rows", view.rows},
                              {"similarity_start", view.similarity_start},
                              {"similarity_final", view.similarity_final},
                              {"left_out_mm", or_null(view.left_out_mm)},
                              {"left_out_deg", or_null(view.left_out_deg)},
-                             {"parts", parts_json(view)}});
+                             {"parts", parts_json(view)},
+                             {"picture", picture_json(view.picture)}});
     images.push_back(view.sop_instance_uid);
   }
   for (const SetupReport::Stage& stage : report.stages) {
@@ -156,7 +255,12 @@ std::string json_report(const SetupReport& report) {
                      {"similarity", report.seconds_similarity},
                      {"total", report.seconds_total}};
   json["references"] = {{"ct_series", report.ct_series_uid},
+                        {"ct_sha256", report.ct_sha256},
                         {"plan", or_null(report.plan_uid)},
+                        {"plan_class", report.plan_class_uid},
+                        {"plan_label", report.plan_label},
+                        {"plan_approval", report.plan_approval},
+                        {"plan_sha256", report.plan_sha256},
                         {"images", images},
                         {"spatial_registration", or_null(report.spatial_registration_uid)}};
   json["machine"] =
@@ -167,6 +271,200 @@ std::string json_report(const SetupReport& report) {
   json["left_aside"] = report.left_aside;
   // Text from files may hold bytes that are no UTF-8; they are replaced, never a reason to lose a result.
   return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+namespace {
+
+template <int N>
+Eigen::Matrix<double, N, 1> vector_from(const Json& json) {
+  return Eigen::Matrix<double, N, 1>(json.get<std::array<double, N>>().data());
+}
+
+std::optional<double> number_from(const Json& json) {
+  return json.is_null() ? std::nullopt : std::optional(json.get<double>());
+}
+
+std::string text_from(const Json& json) { return json.is_null() ? "" : json.get<std::string>(); }
+
+std::vector<Polygon> polygons_from(const Json& json) {
+  std::vector<Polygon> polygons;
+  for (const Json& points : json) {
+    Polygon& polygon = polygons.emplace_back();
+    for (const Json& point : points) polygon.push_back(vector_from<2>(point));
+  }
+  return polygons;
+}
+
+ViewPicture picture_from(const Json& json) {
+  ViewPicture picture{.field = polygons_from(json.at("field")),
+                      .isocenter_px = vector_from<2>(json.at("isocenter_px")),
+                      .pixels_per_mm = json.at("pixels_per_mm"),
+                      .directions = json.at("directions")};
+  for (const Json& outline : json.at("structures"))
+    picture.structures.push_back({.name = outline.at("name"),
+                                  .planned = polygons_from(outline.at("planned")),
+                                  .found = polygons_from(outline.at("found"))});
+  return picture;
+}
+
+SetupReport::View view_from(const Json& json) {
+  SetupReport::View view{.label = json.at("label"),
+                         .sop_class_uid = json.at("sop_class_uid"),
+                         .sop_instance_uid = json.at("sop_instance_uid"),
+                         .sha256 = json.at("sha256"),
+                         .frame = json.at("frame"),
+                         .acquired = json.at("acquired"),
+                         .origin = json.at("reported_values_origin"),
+                         .gantry_deg = number_from(json.at("gantry_deg")),
+                         .source_room_mm = vector_from<3>(json.at("source_room_mm")),
+                         .pixel_mm = json.at("pixel_mm"),
+                         .columns = json.at("columns"),
+                         .rows = json.at("rows"),
+                         .is_megavoltage = json.at("beam") == "MV",
+                         .similarity_start = json.at("similarity_start"),
+                         .similarity_final = json.at("similarity_final"),
+                         .left_out_mm = number_from(json.at("left_out_mm")),
+                         .left_out_deg = number_from(json.at("left_out_deg")),
+                         .picture = picture_from(json.at("picture"))};
+  for (const Json& part : json.at("parts"))
+    view.parts.push_back({.center_px = vector_from<2>(part.at("center_px")),
+                          .width_px = part.at("width_px"),
+                          .displacement_mm = vector_from<2>(part.at("displacement_mm")),
+                          .correlation = part.at("correlation"),
+                          .best_correlation = part.at("best_correlation"),
+                          .has_signal = part.at("has_signal"),
+                          .disagrees = part.at("disagrees")});
+  return view;
+}
+
+SetupReport::Stage stage_from(const Json& json) {
+  SetupReport::Stage stage{.name = json.at("name"),
+                           .similarity = json.at("similarity"),
+                           .optimizer = json.at("optimizer"),
+                           .evaluations = json.at("evaluations"),
+                           .seconds = json.at("seconds"),
+                           .value = json.at("value"),
+                           .termination = json.at("termination"),
+                           .spread_mm = number_from(json.at("spread_mm")),
+                           .spread_deg = number_from(json.at("spread_deg")),
+                           .best = json.at("best")};
+  for (const auto& [name, value] : json.at("parameters").items()) stage.parameters.emplace_back(name, value);
+  return stage;
+}
+
+std::optional<SetupReport::Site> site_from(const Json& json) {
+  if (json.is_null()) return std::nullopt;
+  SetupReport::Site site{.name = json.at("name"),
+                         .sha256 = json.at("sha256"),
+                         .anatomy = json.at("anatomy"),
+                         .couch_dof = static_cast<CouchDof>(json.at("couch_degrees_of_freedom").get<int>()),
+                         .length_unit = json.at("length_unit") == "cm" ? LengthUnit::kCm : LengthUnit::kMm};
+  if (const Json& level = json.at("action_level"); !level.is_null())
+    site.level = {.translation_mm = number_from(level.at("translation_mm")),
+                  .vector_mm = number_from(level.at("vector_mm")),
+                  .rotation_deg = number_from(level.at("rotation_deg"))};
+  if (const Json& scale = json.at("couch_scale"); !scale.is_null())
+    site.couch_scale = {.scale = couch_scale_from(scale.at("name").get<std::string>()).value(),
+                        .validated_by = scale.at("validated_by"),
+                        .validated_on = scale.at("validated_on")};
+  return site;
+}
+
+// Components that were not determined come back as 0; the directions that say so come back, too.
+Eigen::Vector3d known_from(const Json& json) {
+  Eigen::Vector3d vector = Eigen::Vector3d::Zero();
+  for (std::size_t axis = 0; axis < 3; ++axis)
+    vector[static_cast<Eigen::Index>(axis)] = number_from(json.at(axis)).value_or(0.0);
+  return vector;
+}
+
+Verdict verdict_from(const std::string& word) {
+  for (const Verdict verdict : {Verdict::kAccepted, Verdict::kReview})
+    if (word == to_string(verdict)) return verdict;
+  return Verdict::kRejected;  // and what no version of isoshift says
+}
+
+SetupReport report_from(const Json& json) {
+  SetupReport report;
+  report.made_on = json.at("made_on");
+  report.version = json.at("program").at("version");
+  report.commit = json.at("program").at("commit");
+  report.verdict = verdict_from(json.at("verdict"));
+  report.reasons = json.at("reasons");
+  report.site = site_from(json.at("site"));
+  for (const auto& [name, member] : kIdentity) report.identity.*member = json.at("patient").at(name);
+  const Json& references = json.at("references");
+  report.plan_label = references.at("plan_label");
+  report.plan_approval = references.at("plan_approval");
+  report.plan_sha256 = references.at("plan_sha256");
+  report.plan_uid = text_from(references.at("plan"));
+  report.plan_class_uid = references.at("plan_class");
+  report.ct_series_uid = references.at("ct_series");
+  report.ct_sha256 = references.at("ct_sha256");
+  report.spatial_registration_uid = text_from(references.at("spatial_registration"));
+  report.patient_position = json.at("patient_position");
+  report.isocenter_patient_mm = vector_from<3>(json.at("isocenter_patient_mm"));
+  const Json& table = json.at("table");
+  report.table = {.support_rad = rad_from_deg(table.at("support_deg")),
+                  .eccentric_rad = rad_from_deg(table.at("eccentric_deg")),
+                  .pitch_rad = rad_from_deg(table.at("pitch_deg")),
+                  .roll_rad = rad_from_deg(table.at("roll_deg"))};
+  if (!table.at("position_mm").is_null()) report.table_position_mm = vector_from<3>(table.at("position_mm"));
+  for (const Json& point : json.at("points"))
+    report.points.push_back({.name = point.at("name"), .room_mm = vector_from<3>(point.at("room_mm"))});
+  const Json& error = json.at("setup_error");
+  report.setup_error.translation() = known_from(error.at("translation_mm"));
+  for (std::size_t row = 0; row < 3; ++row)
+    report.setup_error.linear().row(static_cast<Eigen::Index>(row)) =
+        vector_from<3>(error.at("rotation_matrix").at(row));
+  const Json& uncertainty = json.at("uncertainty");
+  for (const Json& direction : uncertainty.at("unobservable"))
+    report.unobservable_room.push_back(vector_from<3>(direction));
+  if (!uncertainty.at("translation_mm").is_null())
+    report.sigma = {.translation_mm = known_from(uncertainty.at("translation_mm")),
+                    .rotation_deg = known_from(uncertainty.at("rotation_deg"))};
+  report.translation_only = json.at("dof") == "translation";
+  for (const Json& view : json.at("views")) report.views.push_back(view_from(view));
+  for (const Json& stage : json.at("stages")) report.stages.push_back(stage_from(stage));
+  for (const Json& alternative : json.at("alternatives"))
+    report.alternatives.push_back({.description = alternative.at("description"),
+                                   .similarity = alternative.at("similarity"),
+                                   .as_is = alternative.at("as_is")});
+  report.preset = json.at("preset");
+  report.region = json.at("region");
+  report.seed = json.at("seed");
+  report.attenuation = json.at("attenuation");
+  report.threshold_hu = json.at("threshold_hu");
+  if (!json.at("window_hu").is_null()) report.window_hu = json.at("window_hu").get<std::array<double, 2>>();
+  report.renderer = json.at("renderer");
+  report.device = json.at("device");
+  for (const auto& [name, value] : json.at("renderer_settings").items())
+    report.renderer_settings.emplace_back(name, value);
+  const Json& seconds = json.at("seconds");
+  report.seconds_load = seconds.at("load");
+  report.seconds_register = seconds.at("register");
+  report.seconds_rendering = seconds.at("rendering");
+  report.seconds_similarity = seconds.at("similarity");
+  report.seconds_total = seconds.at("total");
+  if (const Json& machine = json.at("machine"); !machine.is_null())
+    report.machine = {.name = machine.at("name"), .sha256 = machine.at("sha256")};
+  report.overrides = json.at("overrides");
+  report.warnings = json.at("warnings");
+  report.left_aside = json.at("left_aside");
+  return report;
+}
+
+}  // namespace
+
+SetupReport report_from_json(const std::string& json, const std::string& where) {
+  try {
+    const Json parsed = Json::parse(json);
+    if (parsed.at("schema") != 1)
+      throw Error(fmt::format("{}: schema is {}, expected 1", where, parsed.at("schema").dump()));
+    return report_from(parsed);
+  } catch (const Json::exception& error) {
+    throw Error(fmt::format("{}: is no result of this program: {}", where, error.what()));
+  }
 }
 
 }  // namespace isoshift

@@ -11,6 +11,9 @@
 
 #include "geometry/couch_shift.h"
 #include "geometry/verdict.h"
+#include "io/identity.h"
+#include "io/report/view_picture.h"
+#include "io/site_file.h"
 
 namespace isoshift {
 
@@ -26,13 +29,21 @@ struct SetupReport {
   };
   struct View {
     std::string label;
-    std::string sop_instance_uid;
+    std::string sop_class_uid, sop_instance_uid;
+    std::string sha256;                // of the file
     int frame = 1;                     // of the instance, counted from 1
+    std::string acquired;              // "2026-03-01 10:15:00"; empty: unknown
+    std::string origin;                // ReportedValuesOrigin: ACTUAL, PLAN; empty: unknown
     std::optional<double> gantry_deg;  // absent for a view given by its matrix
+    Eigen::Vector3d source_room_mm = Eigen::Vector3d::Zero();
+    double pixel_mm = 0.0;  // at the isocenter
+    int columns = 0, rows = 0;
+    bool is_megavoltage = false;
     double similarity_start = -1.0;
     double similarity_final = -1.0;
     std::optional<double> left_out_mm, left_out_deg;  // how far the pose moves without this view
     std::vector<Part> parts;
+    ViewPicture picture;
   };
   struct Stage {
     std::string name;
@@ -44,6 +55,7 @@ struct SetupReport {
     double value = 0.0;  // the similarity reached
     std::string termination;
     std::optional<double> spread_mm, spread_deg;  // between searches from different starts
+    std::vector<double> best;                     // the similarity reached so far, evaluation by evaluation
   };
   struct Sigma {
     Eigen::Vector3d translation_mm = Eigen::Vector3d::Zero();
@@ -56,14 +68,34 @@ struct SetupReport {
     double as_is = 0.0;
   };
 
+  // What the site's file decided about this result.
+  struct Site {
+    std::string name, sha256;
+    std::string anatomy;               // whose action level it is
+    std::optional<ActionLevel> level;  // unset: none
+    CouchDof couch_dof = CouchDof::kSix;
+    std::optional<SiteFile::Scale> couch_scale;
+    LengthUnit length_unit = LengthUnit::kMm;
+  };
+  // A point of the patient at which a person wants to know what is left over.
+  struct Point {
+    std::string name;
+    Eigen::Vector3d room_mm = Eigen::Vector3d::Zero();  // as planned, from the isocenter, IEC 61217 fixed
+  };
+
+  std::string made_on;  // local time, "2026-03-01T10:16:02+0100"
+  std::string version, commit;
   Verdict verdict = Verdict::kRejected;
   std::vector<std::string> reasons;
+  std::optional<Site> site;
 
-  std::string patient_id, patient_name;  // for the report a person reads; not in file names or logs
-  std::string plan_label;
+  Identity identity;  // for reports that people read; not in file names or logs
+  std::string plan_label, plan_approval, plan_sha256;
   std::string patient_position;
   Eigen::Vector3d isocenter_patient_mm = Eigen::Vector3d::Zero();
   TableAngles table;
+  std::optional<Eigen::Vector3d> table_position_mm;  // lateral, longitudinal, vertical read-outs at imaging, IEC 61217
+  std::vector<Point> points;
   Eigen::Isometry3d setup_error = Eigen::Isometry3d::Identity();
   std::vector<Eigen::Vector3d> unobservable_room;
   bool translation_only = false;
@@ -86,12 +118,16 @@ struct SetupReport {
   struct Machine {
     std::string name, sha256;
   };
-  std::optional<Machine> machine;  // the machine profile that was applied
-  std::string ct_series_uid;
-  std::string plan_uid;                  // empty: there was no plan
+  std::optional<Machine> machine;        // the machine profile that was applied
+  std::string ct_series_uid, ct_sha256;  // of all its slices' files
+  std::string plan_uid, plan_class_uid;  // empty: there was no plan
   std::string spatial_registration_uid;  // empty: none was written
   std::vector<std::string> overrides, warnings, left_aside;
 };
+
+// Whether the shift is larger than the site's action level. kUnset: there is none, or it cannot be told.
+enum class Action { kUnset, kWithin, kExceeds };
+std::string_view to_string(Action action);
 
 // What may be shown of the result: components along an unobservable direction are absent, and without a shift
 // (rejected) all of the couch's are.
@@ -102,21 +138,20 @@ struct ShownShift {
   std::array<std::optional<double>, 3> sigma_deg;       // about x, y, z
   bool withheld = false;                                // the verdict forbids a couch shift
   std::array<std::optional<double>, 3> couch_mm;        // lateral, longitudinal, vertical
-  std::array<double, 3> couch_deg;                      // yaw, pitch, roll: change of the read-outs
-  std::array<double, 3> couch_target_deg;               // yaw, pitch, roll: resulting read-outs
+  std::array<std::optional<double>, 3> couch_sigma_mm;
+  std::array<double, 3> couch_deg;         // yaw, pitch, roll: change of the read-outs
+  std::array<double, 3> couch_target_deg;  // yaw, pitch, roll: resulting read-outs
+  std::array<bool, 3> can_rotate;          // yaw, pitch, roll: whether the site's couch can
+  // What remains when it has applied what it can: at the isocenter, 50 mm from it along the patient, and at the points
+  // of the report. Nothing where a component is not determined.
+  struct LeftOver {
+    std::string at;
+    Eigen::Vector3d mm = Eigen::Vector3d::Zero();  // IEC 61217 fixed
+  };
+  std::vector<LeftOver> left_over;
+  Action action = Action::kUnset;
+  std::vector<std::string> action_reasons;
 };
 ShownShift shown_shift(const SetupReport& report);
-
-// One rounding for every format a person reads: to 0.1, halves away from zero, with sign, "-0.0" never.
-std::string rounded(double value);
-
-// The same for an uncertainty: rounded up, so that none is shown smaller than it is, and without sign.
-std::string rounded_up(double value);
-
-// result.json, full precision. docs/result.schema.json describes it.
-std::string json_report(const SetupReport& report);
-
-// report.txt, for a person.
-std::string text_report(const SetupReport& report);
 
 }  // namespace isoshift

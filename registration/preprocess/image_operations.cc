@@ -35,6 +35,20 @@ Image<std::uint8_t> grown(const Image<std::uint8_t>& mask, int radius_px) {
   return result;
 }
 
+std::vector<std::vector<Eigen::Vector2d>> outlines(const Image<std::uint8_t>& mask) {
+  std::vector<std::vector<cv::Point>> contours;
+  cv::findContours(mat_of(mask), contours, cv::RETR_LIST, cv::CHAIN_APPROX_NONE);
+  std::vector<std::vector<Eigen::Vector2d>> polygons;
+  for (const std::vector<cv::Point>& contour : contours) {
+    std::vector<cv::Point> straight;
+    cv::approxPolyDP(contour, straight, 0.5, true);
+    if (straight.size() < 3) continue;
+    std::vector<Eigen::Vector2d>& polygon = polygons.emplace_back();
+    for (const cv::Point& point : straight) polygon.emplace_back(point.x, point.y);
+  }
+  return polygons;
+}
+
 double share_inside(const Image<std::uint8_t>& mask, const PixelSquare& square) {
   return static_cast<double>(cv::countNonZero(mat_of(mask)(rectangle(square)))) / rectangle(square).area();
 }

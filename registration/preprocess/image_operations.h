@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <vector>
 
 #include "geometry/image.h"
 
@@ -18,6 +19,9 @@ Image<float> high_pass(const Image<float>& image, double sigma_px);
 
 // A mask (not 0 inside) grown by a disc.
 Image<std::uint8_t> grown(const Image<std::uint8_t>& mask, int radius_px);
+
+// The edges of a mask's parts and of their holes, as closed polygons of pixels, straight to within half a pixel.
+std::vector<std::vector<Eigen::Vector2d>> outlines(const Image<std::uint8_t>& mask);
 
 // Share of a square that lies inside a mask.
 double share_inside(const Image<std::uint8_t>& mask, const PixelSquare& square);

@@ -37,7 +37,8 @@ TEST_F(RegisterCommandTest, FindsTheSetupErrorFromTheFirstFileToTheLast) {
   EXPECT_EQ(outcome.exit_status, 0) << outcome.err;
   // Slices of 2.25 mm and pixels of 1.07 mm at the isocenter: what the demo asks of the default phantom.
   EXPECT_THAT(read_setup_error(study.output() / "result.json"), PoseNear(read_setup_error(study.truth()), 0.3, 0.2));
-  for (const char* name : {"report.txt", "result.json", "spatial_registration.dcm", "view1.png", "view2.png"})
+  for (const char* name : {"report.txt", "report.csv", "report.pdf", "report.html", "report.dcm", "result.json",
+                           "spatial_registration.dcm", "view1.png", "view2.png"})
     EXPECT_TRUE(std::filesystem::exists(study.output() / name)) << name;
   EXPECT_THAT(outcome.out, HasSubstr("VERDICT      ACCEPTED"));
   EXPECT_THAT(outcome.out, HasSubstr("SETUP ERROR BESIDE THE TRUTH"));
@@ -68,6 +69,55 @@ TEST_F(RegisterCommandTest, OneViewIsReviewWithoutDepthAndWithoutRegistrationObj
   EXPECT_FALSE(result()["setup_error"]["translation_mm"][0].is_null());
   EXPECT_TRUE(result()["couch_shift"]["vertical_mm"].is_null());
   EXPECT_FALSE(std::filesystem::exists(study_.output() / "spatial_registration.dcm"));
+}
+
+TEST_F(RegisterCommandTest, WhatNobodyMeasuredIsWrittenAsZeroOnlyOnRequest) {
+  const CommandOutcome outcome = register_study(
+      study_, {"--image", study_.image(0).string(), "--write-reg-for-review", "--accept-unobservable", "--json"});
+  EXPECT_EQ(outcome.exit_status, 3);
+  EXPECT_THAT(result()["overrides"].dump(), HasSubstr("which was not measured, by --accept-unobservable"));
+  const std::string written = (study_.output() / "spatial_registration.dcm").string();
+  const CommandOutcome checked = run_command({"check", written, "--plan", study_.plan().string(), "--json"});
+  const auto shift = nlohmann::json::parse(checked.out)["registrations"][0]["couch_shift"];
+  EXPECT_NEAR(shift["vertical_mm"], 0.0, 1e-6);
+  EXPECT_NEAR(shift["lateral_mm"], result()["couch_shift"]["lateral_mm"], 1e-6);
+}
+
+TEST_F(RegisterCommandTest, ASiteFileDecidesAboutActionAndCouch) {
+  const std::filesystem::path site = study_.path() / "site.json";
+  std::ofstream(site) << R"({"site_file": 1, "name": "Linac 3", "action_levels": {"head": {"translation_mm": 1}},
+                             "couch": {"degrees_of_freedom": 4}})";
+  draw(
+      study_,
+      {{"TARGET",
+        {rectangle({-12, 38, -416}, 60, 60), rectangle({-12, 38, -410}, 60, 60), rectangle({-12, 38, -404}, 60, 60)}}});
+  const CommandOutcome outcome =
+      register_study(study_, {"--site", site.string(), "--anatomy", "head", "--structure", "TARGET"});
+  EXPECT_NE(outcome.exit_status, 1) << outcome.err;
+  EXPECT_EQ(result()["site"]["name"], "Linac 3");
+  if (result()["verdict"] != "rejected") {
+    EXPECT_EQ(result()["action"], "exceeds");
+    EXPECT_EQ(result()["left_over"].back()["at"], "centroid of TARGET");
+  }
+  EXPECT_FALSE(result()["views"][0]["picture"]["structures"][0]["planned"].empty());
+  EXPECT_EQ(register_study(study_, {"--overwrite", "--anatomy", "head"}).exit_status, 2);
+  EXPECT_EQ(register_study(study_, {"--overwrite", "--site", site.string(), "--anatomy", "pelvis"}).exit_status, 2);
+}
+
+TEST_F(RegisterCommandTest, ReportMakesAllFormatsAgain) {
+  register_study(study_);
+  const auto before = result();
+  const std::string folder = study_.output().string();
+  EXPECT_EQ(run_command({"report", folder}).exit_status, 1);  // nothing is overwritten unasked
+  for (const char* name : {"report.txt", "report.pdf", "report.html", "report.csv", "report.dcm", "view1.png"})
+    std::filesystem::remove(study_.output() / name);
+  const CommandOutcome outcome = run_command({"report", folder, "--overwrite"});
+  EXPECT_EQ(outcome.exit_status, 0) << outcome.err;
+  EXPECT_EQ(result(), before);
+  for (const char* name :
+       {"report.txt", "report.pdf", "report.html", "report.csv", "report.dcm", "view1.png", "spatial_registration.dcm"})
+    EXPECT_TRUE(std::filesystem::exists(study_.output() / name)) << name;
+  EXPECT_EQ(run_command({"report", study_.path().string()}).exit_status, 1);  // no result
 }
 
 TEST_F(RegisterCommandTest, AReviewedResultIsWrittenOnlyOnRequestAndMarked) {
@@ -208,7 +258,7 @@ TEST_F(RegisterCommandTest, NamesInOtherCharacterSetsAreKept) {
     if (entry.path().extension() == ".dcm") rename(entry.path());
   const CommandOutcome outcome = register_study(study_, {"--write-reg-for-review"});
   EXPECT_NE(outcome.exit_status, 1) << outcome.err;
-  EXPECT_THAT(outcome.out, HasSubstr("Müller^Jörg"));
+  EXPECT_THAT(outcome.out, HasSubstr("Müller Jörg"));
   const CommandOutcome dumped =
       run_shell("dcmdump +P 0008,0005 +P 0010,0010 " + (study_.output() / "spatial_registration.dcm").string());
   EXPECT_THAT(dumped.out, HasSubstr("[ISO_IR 192]"));

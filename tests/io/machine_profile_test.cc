@@ -242,7 +242,7 @@ TEST_F(OtherXrayTest, AreRegisteredAsRtImagesAre) {
   register_study(rt_images);
   EXPECT_THAT(read_setup_error(study_.output() / "result.json"),
               PoseNear(read_setup_error(rt_images.output() / "result.json"), 0.02, 0.02));
-  EXPECT_THAT(outcome.out, HasSubstr("Machine      profile \"Linac 3\", SHA-256"));
+  EXPECT_THAT(outcome.out, HasSubstr("Machine profile          \"Linac 3\"; SHA-256"));
   const CommandOutcome checked =
       run_shell(fmt::format("/usr/bin/python3 -m jsonschema -i {} {}/docs/result.schema.json",
                             (study_.output() / "result.json").string(), ISOSHIFT_SOURCE_DIR));

@@ -1,5 +1,5 @@
-# embed_shader(FILE): makes <build>/drr/raycast/raycast.comp.h of drr/raycast/raycast.comp, with its text as kRaycastComp.
-function(embed_shader file)
+# embed_text(FILE): makes <build>/drr/raycast/raycast.comp.h of drr/raycast/raycast.comp, with its text as kRaycastComp.
+function(embed_text file)
   file(READ ${CMAKE_CURRENT_SOURCE_DIR}/${file} text)
   set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/${file})
   get_filename_component(name ${file} NAME)
@@ -13,5 +13,5 @@ function(embed_shader file)
   endforeach()
   set(header ${CMAKE_CURRENT_BINARY_DIR}/${file}.h)
   file(CONFIGURE OUTPUT ${header} @ONLY CONTENT
-"#pragma once\n// Made from ${file}.\n\nnamespace isoshift {\ninline constexpr const char* @symbol@ = R\"glsl(@text@)glsl\";\n}\n")
+"#pragma once\n// Made from ${file}.\n\nnamespace isoshift {\ninline constexpr const char* @symbol@ = R\"text(@text@)text\";\n}\n")
 endfunction()

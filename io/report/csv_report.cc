@@ -1,0 +1,70 @@
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <vector>
+
+#include "io/report/canvas.h"
+#include "io/report/formats.h"
+
+namespace isoshift {
+namespace {
+
+// A text as a cell: quoted where RFC 4180 asks for it, and no formula for a spreadsheet.
+std::string cell(std::string text) {
+  if (!text.empty() && std::string_view("=+-@\t\r").find(text.front()) != std::string_view::npos)
+    text.insert(text.begin(), '\'');
+  if (text.find_first_of(",\"\r\n") == std::string::npos) return text;
+  std::string quoted = "\"";
+  for (const char c : text) quoted += c == '"' ? std::string("\"\"") : std::string(1, c);
+  return quoted + "\"";
+}
+
+// A number as every program reads it: without the plus sign; empty where there is none.
+std::string number(const Quantity& quantity) {
+  if (!quantity.is_number) return "";
+  return quantity.value.starts_with('+') ? quantity.value.substr(1) : quantity.value;
+}
+
+std::string joined(const std::vector<std::string>& texts) { return fmt::format("{}", fmt::join(texts, "; ")); }
+
+}  // namespace
+
+std::string csv_report(const SetupReport& report) {
+  SetupReport in_mm = report;
+  if (in_mm.site) in_mm.site->length_unit = LengthUnit::kMm;
+  const ReportPage page = report_page(in_mm);
+
+  std::vector<std::string> names, cells;
+  const auto add = [&](std::string name, std::string value) {
+    names.push_back(std::move(name));
+    cells.push_back(std::move(value));
+  };
+  add("made_on", cell(report.made_on));
+  add("patient_id", cell(printable(report.identity.patient_id)));
+  add("patient_name", cell(name_for_people(report.identity.patient_name)));
+  add("plan", cell(printable(report.plan_label)));
+  add("plan_uid", cell(report.plan_uid));
+  std::vector<std::string> views;
+  for (const SetupReport::View& view : report.views) views.push_back(printable(view.label));
+  add("views", cell(joined(views)));
+  add("verdict", std::string(to_string(page.verdict)));
+  add("reasons", cell(joined(page.reasons)));
+  add("action", std::string(to_string(page.action)));
+  add("action_reasons", cell(joined(page.action_reasons)));
+  const auto add_numbers = [&](const std::vector<Quantity>& quantities, const std::vector<std::string>& columns) {
+    for (std::size_t n = 0; n < columns.size(); ++n) {
+      add(columns[n], n < quantities.size() ? number(quantities[n]) : "");
+      if (columns[n].starts_with("error"))
+        add("two_sigma_" + columns[n], n < quantities.size() ? quantities[n].plus_minus : "");
+    }
+  };
+  add_numbers(page.couch, {"lateral_mm", "longitudinal_mm", "vertical_mm", "yaw_deg", "pitch_deg", "roll_deg"});
+  add_numbers(page.setup_error, {"error_x_mm", "error_y_mm", "error_z_mm", "error_about_x_deg", "error_about_y_deg",
+                                 "error_about_z_deg"});
+  add("overrides", fmt::format("{}", page.overrides.size()));
+  add("warnings", fmt::format("{}", page.warnings.size()));
+  add("spatial_registration_uid", cell(report.spatial_registration_uid));
+  return fmt::format("{}\r\n{}\r\n", fmt::join(names, ","), fmt::join(cells, ","));
+}
+
+}  // namespace isoshift

@@ -1,0 +1,218 @@
+#include <fmt/format.h>
+#include <openssl/evp.h>
+
+#include <cmath>
+#include <functional>
+#include <nlohmann/json.hpp>
+
+#include "io/report/drawings.h"
+#include "io/report/formats.h"
+#include "io/report/page.html.h"
+
+namespace isoshift {
+namespace {
+
+std::string escaped(std::string_view text) {
+  std::string result;
+  for (const char c : text) switch (c) {
+      case '&': result += "&amp;"; break;
+      case '<': result += "&lt;"; break;
+      case '>': result += "&gt;"; break;
+      case '"': result += "&quot;"; break;
+      case '\'': result += "&#39;"; break;
+      default: result += c;
+    }
+  return result;
+}
+
+std::string data_uri(std::string_view type, const std::string& bytes) {
+  std::string base64(4 * ((bytes.size() + 2) / 3) + 1, '\0');
+  const int size =
+      EVP_EncodeBlock(reinterpret_cast<unsigned char*>(base64.data()),
+                      reinterpret_cast<const unsigned char*>(bytes.data()), static_cast<int>(bytes.size()));
+  base64.resize(static_cast<std::size_t>(size));
+  return fmt::format("data:{};base64,{}", type, base64);
+}
+
+std::string list(const std::vector<std::string>& lines) {
+  if (lines.empty()) return "";
+  std::string html = "<ul>";
+  for (const std::string& line : lines) html += "<li>" + escaped(line) + "</li>";
+  return html + "</ul>";
+}
+
+std::string rows(const std::vector<ReportPage::Row>& list_of_rows) {
+  std::string html;
+  for (const ReportPage::Row& row : list_of_rows)
+    html += fmt::format("<tr{}><th>{}</th><td>{}</td></tr>", row.name == "Patient" ? " class=\"patient\"" : "",
+                        escaped(row.name), escaped(row.value));
+  return html;
+}
+
+// Numbers with id's such as couch-lateral, for whoever wants to find them.
+std::string quantities(const std::vector<Quantity>& list_of_quantities, const std::string& id, bool is_couch) {
+  std::string html = "<table id=\"" + id + "\">";
+  for (std::size_t n = 0; n < list_of_quantities.size(); ++n) {
+    const Quantity& quantity = list_of_quantities[n];
+    html += fmt::format(
+        "<tr{}><th>{}</th><td class=\"value\">{}</td><td>{}{}</td><td class=\"words\">{}</td></tr>",
+        is_couch && n < 3 ? " class=\"translation\"" : "", escaped(quantity.name), escaped(quantity.value),
+        quantity.is_number && !quantity.plus_minus.empty() && !is_couch ? "± " + quantity.plus_minus + " " : "",
+        quantity.is_number ? quantity.unit : "", escaped(quantity.words));
+  }
+  return html + "</table>";
+}
+
+std::string couch(const ReportPage& page) {
+  if (page.withheld)
+    return "<p class=\"withheld\">withheld</p><p>The result was rejected: there is no shift to apply.</p>";
+  return quantities(page.couch, "couch", true) +
+         fmt::format("<p class=\"dim\">{}. {}</p>", escaped(page.couch_order), escaped(page.couch_target));
+}
+
+std::string numbers(const ReportPage& page) {
+  if (page.withheld) return "";
+  std::string html = "<div><h2>Setup error: where the patient lies</h2>" +
+                     quantities(page.setup_error, "setup-error", false) +
+                     fmt::format("<p class=\"dim\">{}</p></div>", escaped(page.setup_error_length));
+  if (page.display)
+    html += fmt::format("<div><h2>{}</h2>{}</div>", escaped(page.display->title),
+                        quantities(page.display->rows, "display", false));
+  if (!page.left_over.empty()) {
+    html += fmt::format("<div><h2>{}</h2><table id=\"left-over\">", escaped(page.left_over_words));
+    for (const ReportPage::LeftOver& left : page.left_over)
+      html +=
+          fmt::format("<tr><th>{}</th><td>({}, {}, {}) {}</td><td>length {} {}</td></tr>", escaped(left.at),
+                      left.components[0], left.components[1], left.components[2], left.unit, left.length, left.unit);
+    html += "</table></div>";
+  }
+  return html;
+}
+
+std::string svg_image(double width, double height, std::string_view description,
+                      const std::function<void(Canvas&)>& draw) {
+  Canvas canvas(Canvas::Kind::kSvg, width, height);
+  draw(canvas);
+  return fmt::format("<img alt=\"{}\" width=\"{:.0f}\" height=\"{:.0f}\" src=\"{}\">", description, 1.4 * width,
+                     1.4 * height, data_uri("image/svg+xml", canvas.finish()));
+}
+
+std::string png_image(const Image<std::uint8_t>& gray, std::string_view name, std::string_view description) {
+  return fmt::format("<img class=\"{}\" alt=\"{}\" src=\"{}\">", name, description,
+                     data_uri("image/png", png_of(gray)));
+}
+
+std::string view_figure(const SetupReport::View& view, std::size_t number) {
+  const auto radio = [&](const char* group, const char* value, const char* words, bool checked) {
+    return fmt::format("<label><input type=\"radio\" name=\"{}{}\" value=\"{}\"{}> {}</label>", group, number, value,
+                       checked ? " checked" : "", words);
+  };
+  return fmt::format("<figure id=\"view{}\"><figcaption>{}</figcaption><div class=\"stills\">", number,
+                     escaped(printable(view.label))) +
+         png_image(view.picture.xray, "xray", "X-ray") +
+         png_image(view.picture.drr_planned, "planned", "DRR, patient as planned") +
+         png_image(view.picture.drr_found, "found", "DRR, patient as found") +
+         "</div><div class=\"controls\" hidden>"
+         "<label>Wipe<input type=\"range\" min=\"0\" max=\"100\" value=\"50\">"
+         "<span class=\"ends\"><span>DRR</span><span>X-ray</span></span></label>"
+         "<fieldset><legend>Show</legend>" +
+         radio("mode", "wipe", "wipe", true) + radio("mode", "both", "both in color", false) +
+         radio("mode", "difference", "difference", false) + "</fieldset><fieldset><legend>Patient</legend>" +
+         radio("patient", "planned", "before (as planned)", false) +
+         radio("patient", "found", "after (as found)", true) +
+         "<label><input type=\"checkbox\" name=\"marks\" checked> marks</label></fieldset></div></figure>";
+}
+
+using Json = nlohmann::json;
+
+Json points(const std::vector<Polygon>& polygons) {
+  Json list_of_polygons = Json::array();
+  for (const Polygon& polygon : polygons) {
+    Json one = Json::array();
+    for (const Eigen::Vector2d& point : polygon)
+      one.push_back({std::round(point.x() * 10.0) / 10.0, std::round(point.y() * 10.0) / 10.0});
+    list_of_polygons.push_back(one);
+  }
+  return list_of_polygons;
+}
+
+Json view_data(const SetupReport::View& view, std::size_t number) {
+  Json structures = Json::array();
+  for (const ViewPicture::Outline& outline : view.picture.structures)
+    structures.push_back(
+        {{"name", printable(outline.name)}, {"planned", points(outline.planned)}, {"found", points(outline.found)}});
+  const MismatchMarks marks = mismatch_marks(view);
+  return {{"number", number},
+          {"label", printable(view.label)},
+          {"isocenter", {view.picture.isocenter_px.x(), view.picture.isocenter_px.y()}},
+          {"pixels_per_mm", view.picture.pixels_per_mm},
+          {"directions", view.picture.directions},
+          {"field", points(view.picture.field)},
+          {"structures", structures},
+          {"squares", points(marks.squares)},
+          {"ways", points(marks.ways)}};
+}
+
+// JSON inside a script element: no text can end the element.
+std::string in_script(const Json& json) {
+  std::string result;
+  for (const char c : json.dump(-1, ' ', true, Json::error_handler_t::replace))
+    result += c == '<' ? std::string("\\u003c") : std::string(1, c);
+  return result;
+}
+
+std::string details(const SetupReport& report, const ReportPage& page) {
+  std::string html;
+  for (const ReportPage::Section& section : page.details) {
+    html += fmt::format("<details><summary>{}</summary><table>{}</table>", escaped(section.title), rows(section.rows));
+    if (section.title == "Search")
+      html += svg_image(520, 110, "The similarity reached against the evaluations made",
+                        [&](Canvas& canvas) { draw_convergence(canvas, 0, 0, 520, 110, report.stages); });
+    html += "</details>";
+  }
+  if (!page.left_aside.empty()) html += "<details><summary>Left aside</summary>" + list(page.left_aside) + "</details>";
+  return html;
+}
+
+void replace(std::string& html, std::string_view placeholder, const std::string& by) {
+  for (std::size_t at = html.find(placeholder); at != std::string::npos; at = html.find(placeholder, at + by.size()))
+    html.replace(at, placeholder.size(), by);
+}
+
+}  // namespace
+
+std::string html_report(const SetupReport& report, const ReportPage& page) {
+  std::string views, notes, conventions;
+  Json data = Json::array();
+  for (std::size_t n = 0; n < report.views.size(); ++n) {
+    views += view_figure(report.views[n], n + 1);
+    data.push_back(view_data(report.views[n], n + 1));
+  }
+  if (!page.warnings.empty()) notes += "<h2>Warnings</h2>" + list(page.warnings);
+  if (!page.overrides.empty()) notes += "<h2>Overrides: what a person supplied or allowed</h2>" + list(page.overrides);
+  for (const std::string& line : page.conventions) conventions += "<p>" + escaped(line) + "</p>";
+
+  // All text is escaped: none of it can look like a placeholder.
+  std::string html = kPageHtml;
+  replace(html, "<!--DISCLAIMER-->", escaped(page.disclaimer));
+  replace(html, "<!--TITLE-->", escaped(page.title));
+  replace(html, "<!--PROGRAM-->", escaped(page.program));
+  replace(html, "<!--VERDICT_CLASS-->", std::string(to_string(page.verdict)));
+  replace(html, "<!--COUCH_DRAWING-->",
+          svg_image(260, 180, "The couch, its axes and the way it has to move",
+                    [&](Canvas& canvas) { draw_couch(canvas, 0, 0, 260, 180, report, page); }));
+  replace(html, "<!--CONVENTIONS-->", conventions);
+  replace(html, "<!--COUCH-->", couch(page));
+  replace(html, "<!--NUMBERS-->", numbers(page));
+  replace(html, "<!--VIEW_DATA-->", in_script(data));
+  replace(html, "<!--VERDICT-->", escaped(page.verdict_words));
+  replace(html, "<!--REASONS-->", list(page.reasons));
+  replace(html, "<!--ACTION-->", escaped(page.action_words) + list(page.action_reasons));
+  replace(html, "<!--DETAILS-->", details(report, page));
+  replace(html, "<!--NOTES-->", notes);
+  replace(html, "<!--VIEWS-->", views);
+  replace(html, "<!--WHO-->", rows(page.who));
+  return html;
+}
+
+}  // namespace isoshift

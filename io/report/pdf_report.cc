@@ -1,0 +1,335 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "io/report/drawings.h"
+#include "io/report/formats.h"
+
+namespace isoshift {
+namespace {
+
+constexpr double kPageWidth = 595.28, kPageHeight = 841.89;  // A4, points
+constexpr double kMargin = 34.0, kWidth = kPageWidth - 2.0 * kMargin;
+constexpr double kBottom = kPageHeight - 40.0;  // below it the footer
+constexpr double kGap = 7.0;
+constexpr std::size_t kReasonsOnFirstPage = 4;
+
+Rgb color_of(Verdict verdict) {
+  switch (verdict) {
+    case Verdict::kAccepted: return color::kBlue;
+    case Verdict::kReview: return color::kOrange;
+    case Verdict::kRejected: return color::kVermilion;
+  }
+  return color::kBlack;
+}
+
+class PdfReport {
+ public:
+  PdfReport(const SetupReport& report, const ReportPage& page) : report_(report), page_(page) {
+    canvas_.describe(page.title, page.program);
+  }
+
+  std::string write() {
+    header();
+    who();
+    verdict();
+    shift();
+    numbers();
+    const std::size_t shown = pictures(0, kBottom - sign_off_height() - conventions_height() - 2.0 * kGap);
+    sign_off();
+    conventions();
+    footer();
+    canvas_.new_page();
+    y_ = kMargin;
+    if (shown < report_.views.size()) pictures(shown, kBottom);
+    details();
+    footer();
+    return canvas_.finish();
+  }
+
+ private:
+  // Text that is broken into lines at a width, from there on downward.
+  void paragraph(const std::string& text, const TextStyle& style, double indent = 0.0) {
+    TextStyle broken = style;
+    broken.width = kWidth - indent;
+    const double height = canvas_.text_height(text, broken);
+    if (y_ + height > kBottom) next_page();
+    y_ += canvas_.text(kMargin + indent, y_, text, broken);
+  }
+
+  void next_page() {
+    footer();
+    canvas_.new_page();
+    y_ = kMargin;
+  }
+
+  void footer() {
+    ++page_number_;
+    const double y = kPageHeight - 30.0;
+    canvas_.line({kMargin, y - 3.0}, {kMargin + kWidth, y - 3.0}, {.color = color::kLightGray});
+    canvas_.text(kMargin, y, page_.disclaimer, {.size = 7.5, .bold = true});
+    canvas_.text(kMargin + kWidth, y,
+                 fmt::format("{}  ·  {}  ·  page {}", page_.who.front().value, page_.program, page_number_),
+                 {.size = 7.0, .color = color::kGray, .align = TextStyle::Align::kRight});
+  }
+
+  void header() {
+    canvas_.text(kMargin, y_, page_.title, {.size = 17.0, .bold = true});
+    canvas_.text(kMargin + kWidth, y_ + 2.0, page_.program,
+                 {.size = 8.0, .color = color::kGray, .align = TextStyle::Align::kRight});
+    canvas_.text(kMargin + kWidth, y_ + 12.0, page_.disclaimer,
+                 {.size = 8.0, .bold = true, .align = TextStyle::Align::kRight});
+    y_ += 26.0;
+  }
+
+  void who() {
+    for (const ReportPage::Row& row : page_.who) {
+      const bool is_patient = row.name == "Patient";
+      canvas_.text(kMargin, y_, row.name, {.size = 8.0, .color = color::kGray});
+      y_ += canvas_.text(kMargin + 58.0, y_ - (is_patient ? 1.5 : 0.0), row.value,
+                         {.size = is_patient ? 10.5 : 8.5, .bold = is_patient, .width = kWidth - 58.0}) +
+            1.0;
+    }
+    y_ += kGap;
+  }
+
+  void verdict() {
+    constexpr double kIndent = 12.0;
+    const double begin = y_;
+    y_ += 3.0;
+    paragraph(page_.verdict_words, {.size = 12.0, .bold = true}, kIndent);
+    for (std::size_t n = 0; n < std::min(kReasonsOnFirstPage, page_.reasons.size()); ++n)
+      paragraph("· " + page_.reasons[n], {.size = 8.5}, kIndent);
+    if (page_.reasons.size() > kReasonsOnFirstPage)
+      paragraph(fmt::format("· and {} more, on the next page", page_.reasons.size() - kReasonsOnFirstPage),
+                {.size = 8.5}, kIndent);
+    paragraph(page_.action_words, {.size = 9.5, .bold = page_.action == Action::kExceeds}, kIndent);
+    for (const std::string& reason : page_.action_reasons) paragraph("· " + reason, {.size = 8.5}, kIndent);
+    y_ += 3.0;
+    canvas_.fill(kMargin, begin, 6.0, y_ - begin, color_of(page_.verdict));
+    canvas_.polygon(box(kMargin, begin, kWidth, y_ - begin), {.color = color::kLightGray});
+    y_ += kGap;
+  }
+
+  static Polygon box(double x, double y, double width, double height) {
+    return {{x, y}, {x + width, y}, {x + width, y + height}, {x, y + height}};
+  }
+
+  // The couch shift large, beside the drawing of the couch.
+  void shift() {
+    constexpr double kTextWidth = 0.64 * kWidth, kHeight = 142.0;
+    const double begin = y_;
+    canvas_.polygon(box(kMargin, begin, kWidth, kHeight), {.color = color::kBlack, .width = 1.2});
+    draw_couch(canvas_, kMargin + kTextWidth, begin + 2.0, kWidth - kTextWidth - 4.0, kHeight - 6.0, report_, page_);
+    const double x = kMargin + 8.0;
+    canvas_.text(x, begin + 5.0, "MOVE THE COUCH BY", {.size = 10.0, .bold = true});
+    if (page_.withheld) {
+      canvas_.text(x, begin + 50.0, "withheld", {.size = 26.0, .bold = true});
+      canvas_.text(x, begin + 86.0, "The result was rejected: there is no shift to apply.", {.size = 9.0});
+    } else {
+      canvas_.text(kMargin + kTextWidth, begin + 6.0, page_.couch_order,
+                   {.size = 8.0, .color = color::kGray, .align = TextStyle::Align::kRight});
+      double y = begin + 19.0;
+      for (std::size_t n = 0; n < page_.couch.size(); ++n) y += couch_line(x, y, page_.couch[n], n < 3 ? 17.0 : 11.0);
+      canvas_.text(x, y + 2.0, page_.couch_target, {.size = 8.0, .color = color::kGray});
+    }
+    y_ = begin + kHeight + kGap;
+  }
+
+  double couch_line(double x, double y, const Quantity& quantity, double size) {
+    const double baseline = 0.5 * (size - 9.0);
+    canvas_.text(x, y + 1.2 * baseline, quantity.name, {.size = 9.0});
+    if (!quantity.is_number) {
+      canvas_.text(x + 70.0, y + 1.2 * baseline, quantity.value + (quantity.words.empty() ? "" : ": " + quantity.words),
+                   {.size = 9.0, .bold = true});
+      return 1.22 * size;
+    }
+    canvas_.text(x + 130.0, y, quantity.value, {.size = size, .bold = true, .align = TextStyle::Align::kRight});
+    canvas_.text(x + 134.0, y + 1.2 * baseline, quantity.unit, {.size = 9.0});
+    canvas_.text(x + 155.0, y + 1.2 * baseline, quantity.words, {.size = 8.5, .bold = size > 12.0});
+    return 1.22 * size;
+  }
+
+  // Setup error with uncertainty; beside it what the couch's display shows and what remains.
+  void numbers() {
+    if (page_.withheld) return;
+    const double begin = y_, right = kMargin + 0.5 * kWidth + kGap;
+    canvas_.text(kMargin, y_, "Setup error: where the patient lies", {.size = 8.5, .bold = true});
+    y_ += 12.0;
+    for (const Quantity& quantity : page_.setup_error) {
+      canvas_.text(kMargin, y_, quantity.name, {.size = 8.0});
+      canvas_.text(kMargin + 72.0, y_, quantity.value,
+                   {.size = 8.0,
+                    .bold = true,
+                    .align = quantity.is_number ? TextStyle::Align::kRight : TextStyle::Align::kLeft});
+      if (quantity.is_number)
+        canvas_.text(kMargin + 75.0, y_,
+                     (quantity.plus_minus.empty() ? "" : "± " + quantity.plus_minus + " ") + quantity.unit,
+                     {.size = 8.0});
+      canvas_.text(kMargin + 124.0, y_, quantity.words, {.size = 7.0, .color = color::kGray});
+      y_ += 10.5;
+    }
+    canvas_.text(kMargin, y_, page_.setup_error_length, {.size = 7.5, .color = color::kGray});
+    const double left_end = y_ + 10.0;
+    y_ = begin;
+    if (page_.display) {
+      y_ += canvas_.text(right, y_, page_.display->title, {.size = 8.0, .bold = true, .width = 0.5 * kWidth - kGap});
+      for (const Quantity& quantity : page_.display->rows) {
+        canvas_.text(right, y_,
+                     quantity.is_number
+                         ? fmt::format("{} {} {}   {}", quantity.name, quantity.value, quantity.unit, quantity.words)
+                         : fmt::format("{} {}", quantity.name, quantity.value),
+                     {.size = 8.0});
+        y_ += 10.5;
+      }
+      y_ += 3.0;
+    }
+    if (!page_.left_over.empty()) {
+      y_ += canvas_.text(right, y_, page_.left_over_words, {.size = 8.0, .bold = true, .width = 0.5 * kWidth - kGap});
+      for (const ReportPage::LeftOver& left : page_.left_over) {
+        canvas_.text(right, y_, left.at, {.size = 8.0});
+        canvas_.text(right + 84.0, y_,
+                     fmt::format("({}, {}, {}) {}, length {}", left.components[0], left.components[1],
+                                 left.components[2], left.unit, left.length),
+                     {.size = 8.0});
+        y_ += 10.5;
+      }
+    }
+    y_ = std::max(y_, left_end) + kGap;
+  }
+
+  double view_height(const SetupReport::View& view, double width) const {
+    return 0.022 * width + 0.2 * width * view.picture.xray.rows / std::max(1, view.picture.xray.columns) + 4.0;
+  }
+
+  // The views from `first` on, one below the other as far as they fit above `limit`, narrower if all would fit then.
+  // Returns how many are drawn by now.
+  std::size_t pictures(std::size_t first, double page_limit) {
+    constexpr double kNarrowest = 0.6;
+    const double limit = page_limit - canvas_.text_height(kLegend, legend_style()) - 2.0;
+    const auto all_height = [&](double width) {
+      double height = 0.0;
+      for (std::size_t n = first; n < report_.views.size(); ++n) height += view_height(report_.views[n], width);
+      return height;
+    };
+    double fitting = kWidth;
+    while (fitting > kNarrowest * kWidth && y_ + all_height(fitting) > limit) fitting -= 0.01 * kWidth;
+    std::size_t n = first;
+    for (; n < report_.views.size(); ++n) {
+      const double height = view_height(report_.views[n], fitting);
+      if (y_ + height > limit + 0.5) {
+        if (first == 0) break;
+        next_page();
+      }
+      draw_view(canvas_, kMargin + 0.5 * (kWidth - fitting), y_, fitting, report_.views[n]);
+      y_ += height;
+    }
+    const std::string legend = n < report_.views.size() ? std::string(kLegend) + " More on the next page." : kLegend;
+    y_ += canvas_.text(kMargin, y_, legend, legend_style()) + 2.0;
+    return n;
+  }
+
+  static constexpr const char* kLegend =
+      "Both: X-ray magenta, DRR green, gray where they match. Cross: isocenter. Dashed: compared field. Orange: "
+      "structures. "
+      "Yellow squares: parts that match elsewhere.";
+  static TextStyle legend_style() { return {.size = 6.2, .color = color::kGray, .width = kWidth}; }
+
+  static double sign_off_height() { return 82.0; }
+
+  void sign_off() {
+    y_ = kBottom - sign_off_height() - conventions_height() - kGap;
+    const double begin = y_;
+    canvas_.polygon(box(kMargin, begin, kWidth, sign_off_height()), {.color = color::kGray});
+    const TextStyle small{.size = 8.0};
+    const std::array<double, 5> columns = {6.0, 78.0, 210.0, 300.0, 400.0};
+    const std::array<const char*, 5> titles = {"", "Name", "Role", "Date and time", "Signature"};
+    for (std::size_t n = 0; n < columns.size(); ++n)
+      canvas_.text(kMargin + columns[n], begin + 2.0, titles[n], {.size = 7.0, .color = color::kGray});
+    double y = begin + 11.0;
+    for (const char* role : {"Matched by", "Reviewed by", "Approved by"}) {
+      canvas_.text(kMargin + 6.0, y, role, small);
+      canvas_.line({kMargin + 76.0, y + 11.0}, {kMargin + kWidth - 6.0, y + 11.0},
+                   {.color = color::kGray, .width = 0.4});
+      y += 14.0;
+    }
+    double x = kMargin + 6.0;
+    canvas_.text(x, y, "Decision", small);
+    x += 70.0;
+    for (const char* choice : {"apply", "image again", "set up again", "override, because"}) {
+      canvas_.polygon(box(x, y + 1.0, 7.0, 7.0), {.color = color::kBlack});
+      canvas_.text(x + 10.0, y, choice, small);
+      x += 22.0 + canvas_.text_width(choice, small);
+    }
+    canvas_.line({x, y + 10.0}, {kMargin + kWidth - 6.0, y + 10.0}, {.color = color::kGray, .width = 0.4});
+    y += 13.5;
+    canvas_.text(
+        kMargin + 6.0, y,
+        "Shift applied   lateral ______  longitudinal ______  vertical ______  yaw ______  pitch ______  roll ______"
+        "   verification image ____________",
+        {.size = 7.5});
+    y_ = begin + sign_off_height() + kGap;
+  }
+
+  double conventions_height() {
+    double height = 0.0;
+    for (const std::string& line : page_.conventions) height += canvas_.text_height(line, conventions_style());
+    return height;
+  }
+  static TextStyle conventions_style() { return {.size = 6.5, .color = color::kGray, .width = kWidth}; }
+
+  void conventions() {
+    for (const std::string& line : page_.conventions) y_ += canvas_.text(kMargin, y_, line, conventions_style());
+  }
+
+  void list(const std::string& title, const std::vector<std::string>& lines) {
+    if (lines.empty()) return;
+    if (y_ + 30.0 > kBottom) next_page();
+    y_ += canvas_.text(kMargin, y_, title, {.size = 9.5, .bold = true}) + 1.0;
+    for (const std::string& line : lines) paragraph("· " + line, {.size = 7.5}, 4.0);
+    y_ += kGap;
+  }
+
+  void section(const ReportPage::Section& section) {
+    if (y_ + 30.0 > kBottom) next_page();
+    y_ += canvas_.text(kMargin, y_, section.title, {.size = 9.5, .bold = true}) + 1.0;
+    for (const ReportPage::Row& row : section.rows) {
+      const TextStyle name{.size = 7.5, .color = color::kGray, .width = 108.0};
+      const TextStyle value{.size = 7.5, .width = kWidth - 116.0};
+      const double height = std::max(canvas_.text_height(row.name, name), canvas_.text_height(row.value, value));
+      if (y_ + height > kBottom) next_page();
+      canvas_.text(kMargin + 4.0, y_, row.name, name);
+      canvas_.text(kMargin + 116.0, y_, row.value, value);
+      y_ += height + 0.5;
+    }
+    y_ += kGap;
+  }
+
+  void details() {
+    if (page_.reasons.size() > kReasonsOnFirstPage) list("Reasons for the verdict", page_.reasons);
+    list("Warnings", page_.warnings);
+    list("Overrides: what a person supplied or allowed", page_.overrides);
+    for (const ReportPage::Section& each : page_.details) {
+      section(each);
+      if (each.title == "Search") {
+        constexpr double kCurve = 95.0;
+        if (y_ + kCurve > kBottom) next_page();
+        draw_convergence(canvas_, kMargin + 4.0, y_, kWidth - 8.0, kCurve, report_.stages);
+        y_ += kCurve + kGap;
+      }
+    }
+    list("Left aside", page_.left_aside);
+  }
+
+  const SetupReport& report_;
+  const ReportPage& page_;
+  Canvas canvas_{Canvas::Kind::kPdf, kPageWidth, kPageHeight};
+  double y_ = kMargin - 6.0;
+  int page_number_ = 0;
+};
+
+}  // namespace
+
+std::string pdf_report(const SetupReport& report, const ReportPage& page) { return PdfReport(report, page).write(); }
+
+}  // namespace isoshift

@@ -1,0 +1,368 @@
+#include "io/report/report_page.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "geometry/rotation.h"
+#include "io/report/canvas.h"
+#include "io/report/rounding.h"
+
+namespace isoshift {
+namespace {
+
+constexpr const char* kNotDetermined = "not determined";
+
+// The two senses of an axis in words, for positive and negative values.
+struct Sense {
+  const char* positive;
+  const char* negative;
+};
+
+constexpr Sense kLateral = {"to the right, seen facing the gantry", "to the left, seen facing the gantry"};
+constexpr Sense kLongitudinal = {"toward the gantry", "away from the gantry"};
+constexpr Sense kVertical = {"up", "down"};
+constexpr Sense kYaw = {"counter-clockwise, seen from above", "clockwise, seen from above"};
+constexpr Sense kPitch = {"gantry end up", "gantry end down"};
+constexpr Sense kRoll = {"right side down, seen facing the gantry", "left side down, seen facing the gantry"};
+
+std::optional<double> twice(const std::optional<double>& sigma) {
+  return sigma ? std::optional(2.0 * *sigma) : std::nullopt;
+}
+
+// Whether a rounded number is 0: it then has no direction.
+bool is_zero(const std::string& number) { return number.find_first_of("123456789") == std::string::npos; }
+
+Quantity quantity(std::string name, const std::optional<double>& value, std::string unit, std::string text,
+                  std::string plus_minus, const Sense& sense) {
+  if (!value) return {.name = std::move(name), .value = kNotDetermined, .unit = std::move(unit), .is_number = false};
+  Quantity result{
+      .name = std::move(name), .value = std::move(text), .unit = std::move(unit), .plus_minus = std::move(plus_minus)};
+  if (!is_zero(result.value)) result.words = *value > 0.0 ? sense.positive : sense.negative;
+  return result;
+}
+
+Quantity length(std::string name, const std::optional<double>& mm, const std::optional<double>& sigma_mm,
+                LengthUnit unit, const Sense& sense) {
+  return quantity(std::move(name), mm, name_of(unit), mm ? rounded_length(*mm, unit, twice(sigma_mm)) : "",
+                  sigma_mm ? rounded_up_length(2.0 * *sigma_mm, unit) : "", sense);
+}
+
+std::string unsigned_length(double mm, LengthUnit unit) {
+  std::string text = rounded_length(mm, unit);
+  return text.starts_with('+') ? text.substr(1) : text;
+}
+
+Quantity angle(std::string name, double deg, const std::optional<double>& sigma_deg, const Sense& sense) {
+  return quantity(std::move(name), deg, "deg", rounded(deg, twice(sigma_deg)),
+                  sigma_deg ? rounded_up(2.0 * *sigma_deg) : "", sense);
+}
+
+std::vector<std::string> all_printable(const std::vector<std::string>& texts) {
+  std::vector<std::string> result;
+  std::ranges::transform(texts, std::back_inserter(result), &printable);
+  return result;
+}
+
+// DA for people: 2026-03-01.
+std::string day(const std::string& date) {
+  if (date.size() != 8) return date;
+  return date.substr(0, 4) + "-" + date.substr(4, 2) + "-" + date.substr(6, 2);
+}
+
+std::string joined(const std::vector<std::string>& parts, const char* separator = ", ") {
+  std::string text;
+  for (const std::string& part : parts)
+    if (!part.empty()) text += (text.empty() ? "" : separator) + part;
+  return text;
+}
+
+std::string described_view(const SetupReport::View& view) {
+  return joined({printable(view.label),
+                 view.gantry_deg ? fmt::format("gantry {:.1f} deg", *view.gantry_deg) : "by its matrix",
+                 view.is_megavoltage ? "MV" : "kV", view.acquired,
+                 view.origin.empty() ? "" : "angles " + printable(view.origin)});
+}
+
+std::vector<ReportPage::Row> who(const SetupReport& report) {
+  const Identity& patient = report.identity;
+  std::vector<ReportPage::Row> rows;
+  rows.push_back(
+      {"Patient",
+       joined({name_for_people(patient.patient_name), "ID " + printable(patient.patient_id),
+               patient.patient_birth_date.empty() ? "" : "born " + day(printable(patient.patient_birth_date)),
+               printable(patient.patient_sex)})});
+  rows.push_back({"Plan", report.plan_uid.empty()
+                              ? "none; isocenter given by hand"
+                              : joined({printable(report.plan_label), printable(report.plan_approval)})});
+  rows.push_back({"Position", fmt::format("{}, couch {:.1f} deg at imaging", report.patient_position,
+                                          deg_from_rad(report.table.yaw_rad()))});
+  for (std::size_t n = 0; n < report.views.size(); ++n)
+    rows.push_back({fmt::format("X-ray {}", n + 1), described_view(report.views[n])});
+  if (report.machine) rows.push_back({"Machine", fmt::format("profile \"{}\"", printable(report.machine->name))});
+  if (report.site) rows.push_back({"Site", printable(report.site->name)});
+  rows.push_back({"Made on", report.made_on});
+  return rows;
+}
+
+std::string action_words(const SetupReport& report, const ShownShift& shown) {
+  const std::string level = report.site && !report.site->anatomy.empty()
+                                ? fmt::format("the action level \"{}\"", printable(report.site->anatomy))
+                                : "the action level";
+  switch (shown.action) {
+    case Action::kWithin: return "The shift is within " + level;
+    case Action::kExceeds: return "The shift exceeds " + level;
+    case Action::kUnset: break;
+  }
+  if (shown.withheld) return "No action level applies: the result was rejected";
+  if (!report.site) return "No action level: no site file was given (--site FILE)";
+  return report.site->level ? "The action level cannot be judged: a component was not determined"
+                            : "No action level: the site file has none for this anatomy";
+}
+
+std::vector<Quantity> couch_rows(const ShownShift& shown, const SetupReport& report, LengthUnit unit) {
+  const auto sigma_of = [&](int axis) { return shown.sigma_deg[static_cast<std::size_t>(axis)]; };
+  std::vector<Quantity> rows = {length("Lateral", shown.couch_mm[0], shown.couch_sigma_mm[0], unit, kLateral),
+                                length("Longitudinal", shown.couch_mm[1], shown.couch_sigma_mm[1], unit, kLongitudinal),
+                                length("Vertical", shown.couch_mm[2], shown.couch_sigma_mm[2], unit, kVertical),
+                                angle("Yaw", shown.couch_deg[0], sigma_of(2), kYaw),
+                                angle("Pitch", shown.couch_deg[1], sigma_of(0), kPitch),
+                                angle("Roll", shown.couch_deg[2], sigma_of(1), kRoll)};
+  for (std::size_t n = 0; n < 3; ++n)
+    if (!shown.can_rotate[n])
+      rows[3 + n] = {
+          .name = rows[3 + n].name,
+          .value = "not applied",
+          .unit = "deg",
+          .words = fmt::format("this couch has {} degrees of freedom", static_cast<int>(report.site->couch_dof)),
+          .is_number = false};
+  return rows;
+}
+
+std::string target_words(const ShownShift& shown, const TableAngles& table) {
+  const std::array names = {"yaw", "pitch", "roll"};
+  const std::array at_imaging_deg = {deg_from_rad(wrapped_rad(table.yaw_rad())), deg_from_rad(table.pitch_rad),
+                                     deg_from_rad(table.roll_rad)};
+  std::vector<std::string> parts;
+  for (std::size_t n = 0; n < 3; ++n)
+    parts.push_back(
+        fmt::format("{} {}", names[n], rounded(shown.can_rotate[n] ? shown.couch_target_deg[n] : at_imaging_deg[n])));
+  return fmt::format("IEC table angles after the move: {} deg", joined(parts));
+}
+
+// The shift as a vendor's couch shows it: the change, and from where to where if the read-outs at imaging are known.
+ReportPage::Display display_of(const SetupReport& report, const ShownShift& shown, LengthUnit unit) {
+  const SiteFile::Scale& scale = *report.site->couch_scale;
+  ReportPage::Display display{.title = fmt::format("On the couch's display: {} scale, validated by {} on {}",
+                                                   to_string(scale.scale), printable(scale.validated_by),
+                                                   scale.validated_on)};
+  const std::array<int, 4> signs = signs_on_scale(scale.scale);
+  constexpr std::array kNames = {"Lateral", "Longitudinal", "Vertical"};
+  CouchReadOut before, after;
+  before.angle_deg = deg_from_rad(report.table.support_rad);
+  after.angle_deg = before.angle_deg + (shown.can_rotate[0] ? shown.couch_deg[0] : 0.0);
+  if (report.table_position_mm) before.position_mm = after.position_mm = *report.table_position_mm;
+  for (int axis = 0; axis < 3; ++axis)
+    after.position_mm[axis] += shown.couch_mm[static_cast<std::size_t>(axis)].value_or(0.0);
+  const CouchReadOut from = on_scale(scale.scale, before), to = on_scale(scale.scale, after);
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const auto& mm = shown.couch_mm[axis];
+    const std::optional<double> change = mm ? std::optional(signs[axis] * *mm) : std::nullopt;
+    Quantity row = length(kNames[axis], change, shown.couch_sigma_mm[axis], unit, {"", ""});
+    if (mm && report.table_position_mm) {
+      const auto n = static_cast<Eigen::Index>(axis);
+      row.words = fmt::format("from {} to {} {}", unsigned_length(from.position_mm[n], unit),
+                              unsigned_length(to.position_mm[n], unit), name_of(unit));
+    }
+    display.rows.push_back(std::move(row));
+  }
+  if (shown.can_rotate[0]) {
+    Quantity row = angle("Yaw", signs[3] * shown.couch_deg[0], shown.sigma_deg[2], {"", ""});
+    row.words = fmt::format("from {:.1f} to {:.1f} deg", from.angle_deg, to.angle_deg);
+    display.rows.push_back(std::move(row));
+  }
+  return display;
+}
+
+void put_shift(const SetupReport& report, const ShownShift& shown, LengthUnit unit, ReportPage& page) {
+  page.couch = couch_rows(shown, report, unit);
+  page.couch_order = "Translate, then rotate about the isocenter";
+  page.couch_target = target_words(shown, report.table);
+  page.setup_error = {length("x", shown.setup_error_mm[0], shown.sigma_mm[0], unit, kLateral),
+                      length("y", shown.setup_error_mm[1], shown.sigma_mm[1], unit, kLongitudinal),
+                      length("z", shown.setup_error_mm[2], shown.sigma_mm[2], unit, kVertical),
+                      angle("about x", shown.setup_error_deg[0], shown.sigma_deg[0], kPitch),
+                      angle("about y", shown.setup_error_deg[1], shown.sigma_deg[1], kRoll),
+                      angle("about z", shown.setup_error_deg[2], shown.sigma_deg[2], kYaw)};
+  if (report.unobservable_room.empty())
+    page.setup_error_length =
+        fmt::format("Length of the translation {} {}", unsigned_length(report.setup_error.translation().norm(), unit),
+                    name_of(unit));
+  if (report.site && report.site->couch_scale) page.display = display_of(report, shown, unit);
+  if (std::ranges::all_of(shown.left_over, [](const auto& left) { return left.mm.norm() < 1e-6; })) return;
+  page.left_over_words = "What remains after that, IEC 61217 fixed axes";
+  for (const ShownShift::LeftOver& left : shown.left_over) {
+    ReportPage::LeftOver row{.at = printable(left.at), .unit = name_of(unit)};
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      row.components[axis] = rounded_length(left.mm[static_cast<Eigen::Index>(axis)], unit);
+    row.length = unsigned_length(left.mm.norm(), unit);
+    page.left_over.push_back(std::move(row));
+  }
+}
+
+std::string vector_words(const Eigen::Vector3d& mm, int decimals = 1) {
+  return fmt::format("({:.{}f}, {:.{}f}, {:.{}f}) mm", mm.x(), decimals, mm.y(), decimals, mm.z(), decimals);
+}
+
+ReportPage::Section geometry_section(const SetupReport& report) {
+  ReportPage::Section section{.title = "Geometry as understood"};
+  section.rows.push_back(
+      {"Isocenter", vector_words(report.isocenter_patient_mm, 2) + ", patient coordinates of the CT"});
+  section.rows.push_back({"Table angles at imaging",
+                          fmt::format("support {:.2f}, eccentric {:.2f}, pitch {:.2f}, roll {:.2f} deg",
+                                      deg_from_rad(report.table.support_rad), deg_from_rad(report.table.eccentric_rad),
+                                      deg_from_rad(report.table.pitch_rad), deg_from_rad(report.table.roll_rad))});
+  if (report.table_position_mm)
+    section.rows.push_back({"Table position at imaging",
+                            vector_words(*report.table_position_mm) + " lateral, longitudinal, vertical, IEC 61217"});
+  for (const SetupReport::View& view : report.views)
+    section.rows.push_back({printable(view.label),
+                            fmt::format("source at {} IEC fixed; {} x {} pixels of {:.3f} mm at the isocenter",
+                                        vector_words(view.source_room_mm), view.columns, view.rows, view.pixel_mm)});
+  return section;
+}
+
+ReportPage::Section search_section(const SetupReport& report) {
+  ReportPage::Section section{.title = "Search"};
+  section.rows.push_back({"Preset", fmt::format("{}, seed {}, {}", report.preset, report.seed,
+                                                report.translation_only ? "translations only: rotations were taken as 0"
+                                                                        : "six degrees of freedom")});
+  section.rows.push_back({"Region", report.region.empty() ? "everything" : printable(joined(report.region, "; "))});
+  for (const SetupReport::Stage& stage : report.stages)
+    section.rows.push_back(
+        {"Stage " + stage.name,
+         fmt::format("{} by {}: {:.4f} after {} evaluations in {:.2f} s, {}{}", stage.similarity, stage.optimizer,
+                     stage.value, stage.evaluations, stage.seconds, stage.termination,
+                     stage.spread_mm ? fmt::format("; ends of its starts within {:.2f} mm, {:.2f} deg",
+                                                   *stage.spread_mm, stage.spread_deg.value_or(0.0))
+                                     : "")});
+  return section;
+}
+
+ReportPage::Section checks_section(const SetupReport& report) {
+  ReportPage::Section section{.title = "Checks"};
+  for (const SetupReport::View& view : report.views) {
+    std::string words = fmt::format(
+        "similarity {:.4f} as planned, {:.4f} as found; {} of {} parts with signal match elsewhere",
+        view.similarity_start, view.similarity_final, std::ranges::count_if(view.parts, &SetupReport::Part::disagrees),
+        std::ranges::count_if(view.parts, &SetupReport::Part::has_signal));
+    if (view.left_out_mm)
+      words += fmt::format("; without it the pose moves {:.2f} mm, {:.2f} deg", *view.left_out_mm,
+                           view.left_out_deg.value_or(0.0));
+    section.rows.push_back({printable(view.label), words});
+  }
+  for (const SetupReport::Alternative& alternative : report.alternatives)
+    section.rows.push_back(
+        {"If " + printable(alternative.description),
+         fmt::format("similarity {:.4f}, as it is {:.4f}", alternative.similarity, alternative.as_is)});
+  return section;
+}
+
+ReportPage::Section provenance_section(const SetupReport& report) {
+  ReportPage::Section section{.title = "Provenance"};
+  std::string settings;
+  for (const auto& [name, value] : report.renderer_settings) settings += fmt::format(", {} {}", name, value);
+  section.rows = {
+      {"Program", fmt::format("isoshift {} ({})", report.version, report.commit)},
+      {"Renderer", fmt::format("{} on {}{}; attenuation {}, threshold {:.0f} HU", report.renderer,
+                               printable(report.device), settings, report.attenuation, report.threshold_hu)},
+      {"Time", fmt::format("{:.1f} s, of which registration {:.1f} s", report.seconds_total, report.seconds_register)},
+      {"CT series", fmt::format("{}; SHA-256 {}", printable(report.ct_series_uid), report.ct_sha256)}};
+  if (!report.plan_uid.empty())
+    section.rows.push_back({"Plan", fmt::format("{}; SHA-256 {}", printable(report.plan_uid), report.plan_sha256)});
+  for (const SetupReport::View& view : report.views)
+    section.rows.push_back(
+        {printable(view.label),
+         fmt::format("{} frame {}; SHA-256 {}", printable(view.sop_instance_uid), view.frame, view.sha256)});
+  if (report.machine)
+    section.rows.push_back({"Machine profile", fmt::format("\"{}\"; SHA-256 {}", printable(report.machine->name),
+                                                           report.machine->sha256)});
+  if (report.site)
+    section.rows.push_back(
+        {"Site file", fmt::format("\"{}\"; SHA-256 {}", printable(report.site->name), report.site->sha256)});
+  section.rows.push_back({"Registration object", report.spatial_registration_uid.empty()
+                                                     ? "none was written"
+                                                     : report.spatial_registration_uid});
+  return section;
+}
+
+const char* meaning(Verdict verdict) {
+  switch (verdict) {
+    case Verdict::kAccepted: return "the checks of isoshift found nothing wrong";
+    case Verdict::kReview: return "a person must judge it, for these reasons";
+    case Verdict::kRejected: return "do not use it, for these reasons";
+  }
+  return "";
+}
+
+}  // namespace
+
+std::string upper_case(std::string_view text) {
+  std::string result(text);
+  for (char& c : result) c = static_cast<char>(std::toupper(static_cast<unsigned char>(c)));
+  return result;
+}
+
+std::string name_for_people(const std::string& person_name) {
+  const auto group = [&](std::string_view text) {
+    std::string shown;
+    for (const char c : printable(text)) shown += c == '^' ? ' ' : c;
+    std::string once;  // empty components leave no gaps
+    for (const char c : shown)
+      if (c != ' ' || (!once.empty() && once.back() != ' ')) once += c;
+    if (once.ends_with(' ')) once.pop_back();
+    return once;
+  };
+  const std::string_view all = person_name;
+  const auto first_end = all.find('=');
+  std::string name = group(all.substr(0, first_end));
+  if (first_end == std::string_view::npos) return name;
+  const std::string_view rest = all.substr(first_end + 1);
+  const std::string ideographic = group(rest.substr(0, rest.find('=')));
+  if (ideographic.empty()) return name;
+  return name.empty() ? ideographic : fmt::format("{} ({})", name, ideographic);
+}
+
+ReportPage report_page(const SetupReport& report) {
+  const ShownShift shown = shown_shift(report);
+  const LengthUnit unit = report.site ? report.site->length_unit : LengthUnit::kMm;
+  ReportPage page;
+  page.title = "Patient setup shift";
+  page.program = fmt::format("isoshift {} ({})", report.version, report.commit);
+  page.disclaimer = "Not for clinical use unless validated by the site.";
+  page.who = who(report);
+  page.verdict = report.verdict;
+  page.verdict_words = fmt::format("{}: {}", upper_case(to_string(report.verdict)), meaning(report.verdict));
+  page.reasons = all_printable(report.reasons);
+  page.action = shown.action;
+  page.action_words = action_words(report, shown);
+  page.action_reasons = shown.action_reasons;
+  page.withheld = shown.withheld;
+  if (!shown.withheld) put_shift(report, shown, unit, page);
+  page.conventions = {
+      "IEC 61217: facing the gantry, x to the right, y toward the gantry, z up; the origin is the isocenter.",
+      "Setup error: where the patient lies. Anatomy planned at p is found at R p + t, with R = Rz Rx Ry; couch: what "
+      "undoes it, "
+      "along the table top's axes at imaging. Angles of the couch are changes of its read-outs.",
+      "Rounded once, to 0.1 mm and 0.1 deg, or to 1 where two sigma exceeds 1; +/- is two sigma. result.json has full "
+      "precision."};
+  page.warnings = all_printable(report.warnings);
+  page.overrides = all_printable(report.overrides);
+  page.left_aside = all_printable(report.left_aside);
+  page.details = {geometry_section(report), search_section(report), checks_section(report), provenance_section(report)};
+  return page;
+}
+
+}  // namespace isoshift

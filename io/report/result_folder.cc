@@ -1,0 +1,84 @@
+#include "io/report/result_folder.h"
+
+#include <dcmtk/dcmdata/dcuid.h>
+#include <fmt/format.h>
+
+#include <array>
+#include <fstream>
+#include <iterator>
+#include <utility>
+
+#include "geometry/error.h"
+#include "io/encapsulated_pdf.h"
+#include "io/output_folder.h"
+#include "io/report/drawings.h"
+#include "io/report/formats.h"
+
+namespace isoshift {
+namespace {
+
+using Picture = Image<std::uint8_t> ViewPicture::*;
+constexpr std::array<std::pair<const char*, Picture>, 3> kPictures = {
+    {{"xray", &ViewPicture::xray}, {"planned", &ViewPicture::drr_planned}, {"found", &ViewPicture::drr_found}}};
+
+std::filesystem::path picture_path(const std::filesystem::path& folder, std::size_t view, const char* name) {
+  return folder / fmt::format("view{}_{}.png", view + 1, name);
+}
+
+// All pictures of a view beside each other, for people without the report.
+std::string comparison_png(const SetupReport::View& view) {
+  constexpr double kWidth = 1600.0, kMargin = 6.0;
+  const double height =
+      0.2 * kWidth * view.picture.xray.rows / view.picture.xray.columns + 0.022 * kWidth + 2.0 * kMargin;
+  Canvas canvas(Canvas::Kind::kPng, kWidth, height);
+  draw_view(canvas, kMargin, kMargin, kWidth - 2.0 * kMargin, view);
+  return canvas.finish();
+}
+
+EncapsulatedPdf document_of(const SetupReport& report, const ReportPage& page) {
+  EncapsulatedPdf document{.identity = report.identity, .title = page.title};
+  if (!report.plan_uid.empty()) document.sources.push_back({report.plan_class_uid, report.plan_uid});
+  for (const SetupReport::View& view : report.views)
+    if (document.sources.empty() || document.sources.back().sop_instance_uid != view.sop_instance_uid)
+      document.sources.push_back({view.sop_class_uid, view.sop_instance_uid});
+  if (!report.spatial_registration_uid.empty())
+    document.sources.push_back({UID_SpatialRegistrationStorage, report.spatial_registration_uid});
+  return document;
+}
+
+}  // namespace
+
+void write_result(const SetupReport& report, const std::filesystem::path& folder) {
+  const ReportPage page = report_page(report);
+  const std::string pdf = pdf_report(report, page);
+  write_text(folder / kResultFile, json_report(report));
+  write_text(folder / "report.txt", text_report(page));
+  write_text(folder / "report.csv", csv_report(report));
+  write_text(folder / "report.pdf", pdf);
+  write_text(folder / "report.html", html_report(report, page));
+  write_encapsulated_pdf(document_of(report, page), pdf, folder / "report.dcm");
+  for (std::size_t n = 0; n < report.views.size(); ++n) {
+    for (const auto& [name, picture] : kPictures)
+      write_text(picture_path(folder, n, name), png_of(report.views[n].picture.*picture));
+    write_text(folder / fmt::format("view{}.png", n + 1), comparison_png(report.views[n]));
+  }
+}
+
+SetupReport read_result(const std::filesystem::path& folder) {
+  const std::filesystem::path path = folder / kResultFile;
+  std::ifstream file(path, std::ios::binary);
+  const std::string json{std::istreambuf_iterator<char>(file), {}};
+  if (!file) throw Error(fmt::format("{}: cannot be read: this is no folder of a result", path.string()));
+  SetupReport report = report_from_json(json, path.string());
+  for (std::size_t n = 0; n < report.views.size(); ++n) {
+    ViewPicture& picture = report.views[n].picture;
+    for (const auto& [name, member] : kPictures) picture.*member = read_gray_png(picture_path(folder, n, name));
+    for (const auto& [name, member] : kPictures)
+      if ((picture.*member).columns != picture.xray.columns || (picture.*member).rows != picture.xray.rows)
+        throw Error(
+            fmt::format("{}: is not of the size of the X-ray's picture", picture_path(folder, n, name).string()));
+  }
+  return report;
+}
+
+}  // namespace isoshift

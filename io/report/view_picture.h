@@ -1,0 +1,48 @@
+#pragma once
+// One view as a person compares it: X-ray and DRRs in one gray scale, and what is marked in them.
+
+#include <Eigen/Core>
+#include <array>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "geometry/image.h"
+
+namespace isoshift {
+
+using Polygon = std::vector<Eigen::Vector2d>;  // closed, pixels of the picture
+
+struct ViewPicture {
+  struct Outline {
+    std::string name;
+    std::vector<Polygon> planned, found;  // with the patient as planned, and as found
+  };
+
+  Image<std::uint8_t> xray, drr_planned, drr_found;  // of the same size; dense is bright, dimmed outside the field
+  std::vector<Polygon> field;                        // edges of what was compared
+  std::vector<Outline> structures;
+  Eigen::Vector2d isocenter_px = Eigen::Vector2d::Zero();
+  double pixels_per_mm = 0.0;             // at the isocenter
+  std::array<std::string, 4> directions;  // of the patient, at the left, right, upper and lower edge: "L", "HA", ...
+};
+
+// The line integrals of X-ray, DRR as planned and DRR as found, all of one size, as gray values. The DRRs are brought
+// to the X-ray's scale by one straight line, fitted in the field (1 inside) at the pose found.
+void put_grays(ViewPicture& picture, const Image<float>& xray, const Image<float>& drr_planned,
+               const Image<float>& drr_found, const Image<std::uint8_t>& field);
+
+// An image of line integrals as radiographs are looked at: dense is bright.
+Image<std::uint8_t> radiograph(const Image<float>& line_integral);
+
+// The same as colors.
+Image<std::array<std::uint8_t, 3>> in_gray(const Image<std::uint8_t>& picture);
+
+// X-ray magenta, DRR green, so that what matches is gray, for color-blind eyes too.
+Image<std::array<std::uint8_t, 3>> overlay(const Image<std::uint8_t>& xray, const Image<std::uint8_t>& drr);
+
+// Letters of PS3.3 C.7.6.1.1.1 (Patient Orientation, for people: H and F, R and L, A and P) for a direction in patient
+// coordinates (LPS), the strongest first; weak ones are left out.
+std::string orientation_letters(const Eigen::Vector3d& direction_patient);
+
+}  // namespace isoshift

@@ -1,0 +1,50 @@
+#pragma once
+// What a site decided about its results: a JSON file (docs/site-file.md).
+
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "geometry/couch_scale.h"
+#include "geometry/couch_shift.h"
+
+namespace isoshift {
+
+enum class LengthUnit { kMm, kCm };
+
+// From which a person must act. At least one is set.
+struct ActionLevel {
+  std::optional<double> translation_mm;  // along any axis
+  std::optional<double> vector_mm;       // length of the translation
+  std::optional<double> rotation_deg;    // about any axis
+};
+
+struct SiteFile {
+  struct Scale {
+    CouchScale scale = CouchScale::kIec61217;
+    std::string validated_by, validated_on;  // the day as YYYY-MM-DD
+  };
+  struct Release {
+    std::string by, on;
+  };
+
+  std::filesystem::path path;
+  std::string name;
+  std::string sha256;                                             // of the file, hexadecimal
+  std::map<std::string, ActionLevel, std::less<>> action_levels;  // by anatomy; "default" where none is named
+  CouchDof couch_dof = CouchDof::kSix;
+  std::optional<Scale> couch_scale;  // shown beside IEC 61217
+  LengthUnit length_unit = LengthUnit::kMm;
+  std::optional<Release> automatic_release;  // who allowed it, and when; unset: a person releases every result
+};
+
+// Throws Error naming the file, the place in it and what is expected there.
+SiteFile read_site_file(const std::filesystem::path& path);
+
+// The level for an anatomy; without one, for "default", and nothing where the site has none of that name. Throws
+// UsageError, with the names there are, for an anatomy the site does not know.
+std::optional<ActionLevel> action_level(const SiteFile& site, std::string_view anatomy);
+
+}  // namespace isoshift
