@@ -23,11 +23,15 @@ struct ReportOptions {
 void run_report(const ReportOptions& options, Console& console) {
   SetupReport report = read_result(options.result);
   if (!options.site.empty())
-    report.site = site_in_report(read_site_file(options.site), options.anatomy);
+    report.site = site_in_report(read_site_file(options.site),
+                                 options.anatomy.empty() && report.site ? report.site->anatomy : options.anatomy);
   else if (!options.anatomy.empty())
     throw UsageError("--anatomy chooses an action level of a site file: --site FILE");
   OutputFolder output(options.output.empty() ? options.result : options.output, options.overwrite);
   write_result(report, output.path());
+  if (options.site.empty())  // nothing in it has changed
+    std::filesystem::copy_file(options.result / kResultFile, output.path() / kResultFile,
+                               std::filesystem::copy_options::overwrite_existing);
   if (const auto registration = options.result / kRegistrationFile; std::filesystem::exists(registration))
     std::filesystem::copy_file(registration, output.path() / kRegistrationFile);
   output.commit();
@@ -48,7 +52,8 @@ void add_report_command(CLI::App& app, Console& console, int&) {
       ->type_name("FOLDER");
   command->add_option("--site", options->site, "Site file to apply instead of the one applied before")
       ->type_name("FILE");
-  command->add_option("--anatomy", options->anatomy, "Whose action level of the site file applies")->type_name("NAME");
+  command->add_option("--anatomy", options->anatomy, "Whose action level of the site file applies; else that of before")
+      ->type_name("NAME");
   command->add_flag("--overwrite", options->overwrite, "Replace what is there");
   command->callback([options, &console] { run_report(*options, console); });
 }

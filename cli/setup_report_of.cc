@@ -112,7 +112,8 @@ SetupReport::Site site_in_report(const SiteFile& site, const std::string& anatom
           .level = action_level(site, anatomy),
           .couch_dof = site.couch_dof,
           .couch_scale = site.couch_scale,
-          .length_unit = site.length_unit};
+          .length_unit = site.length_unit,
+          .automatic_release = site.automatic_release};
 }
 
 SetupReport setup_report_of(const Study& study, const RegistrationFlags& flags, const RegistrationSetup& setup,

@@ -70,6 +70,7 @@ struct Canvas::Drawing {
     if (style.width) {
       pango_layout_set_width(layout.get(), static_cast<int>(*style.width * PANGO_SCALE));
       pango_layout_set_wrap(layout.get(), PANGO_WRAP_WORD_CHAR);
+      if (style.one_line) pango_layout_set_ellipsize(layout.get(), PANGO_ELLIPSIZE_END);
       pango_layout_set_alignment(layout.get(), style.align == TextStyle::Align::kCenter  ? PANGO_ALIGN_CENTER
                                                : style.align == TextStyle::Align::kRight ? PANGO_ALIGN_RIGHT
                                                                                          : PANGO_ALIGN_LEFT);
@@ -206,9 +207,17 @@ std::string Canvas::finish() {
 std::string printable(std::string_view text) {
   const std::unique_ptr<char, Deleter<void, g_free>> valid(
       g_utf8_make_valid(text.data(), static_cast<gssize>(text.size())));
-  std::string line = valid.get();
-  for (char& c : line)
-    if (static_cast<unsigned char>(c) < 0x20 || c == 0x7F) c = ' ';
+  std::string line;
+  for (const char* at = valid.get(); *at != '\0'; at = g_utf8_next_char(at)) {
+    const gunichar c = g_utf8_get_char(at);
+    // Controls (C0, DEL, C1), ends of lines and paragraphs, and what turns the direction of the text around it.
+    const bool is_control = c < 0x20 || (c >= 0x7F && c <= 0x9F) || c == 0x2028 || c == 0x2029 ||
+                            (c >= 0x202A && c <= 0x202E) || (c >= 0x2066 && c <= 0x2069);
+    if (is_control)
+      line += ' ';
+    else
+      line.append(at, static_cast<std::size_t>(g_utf8_next_char(at) - at));
+  }
   return line;
 }
 

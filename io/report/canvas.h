@@ -30,6 +30,7 @@ struct TextStyle {
   Rgb color = color::kBlack;
   Align align = Align::kLeft;   // within `width`, else about the position
   std::optional<double> width;  // lines are broken there
+  bool one_line = false;        // or cut off there, with an ellipsis
 };
 
 struct LineStyle {

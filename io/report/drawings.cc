@@ -112,13 +112,12 @@ double draw_view_tile(Canvas& canvas, double x, double y, double width, const Se
 
 double draw_view(Canvas& canvas, double x, double y, double width, const SetupReport::View& view) {
   const double gap = 0.006 * width, tile = (width - 4.0 * gap) / 5.0;
-  const TextStyle style{.size = 0.0145 * width, .width = tile};
+  const TextStyle style{.size = 0.0145 * width, .width = tile, .one_line = true};
   const double captions = 1.45 * style.size;
   double height = 0.0;
   for (std::size_t n = 0; n < kViewTiles.size(); ++n) {
     const double at = x + static_cast<double>(n) * (tile + gap);
-    const std::string name = n == 0 ? printable(view.label) + ": " : "";
-    canvas.text(at, y, name + caption_of(kViewTiles[n]), style);
+    canvas.text(at, y, caption_of(kViewTiles[n]) + (n == 0 ? " " + printable(view.label) : ""), style);
     height = draw_view_tile(canvas, at, y + captions, tile, view, kViewTiles[n]);
   }
   return captions + height;
@@ -150,28 +149,31 @@ void draw_couch(Canvas& canvas, double x, double y, double width, double height,
   };
   // The gantry, a ring behind, and the couch.
   canvas.circle(at(0, 1.0, 0), 0.78 * unit, {.color = color::kLightGray, .width = 0.16 * unit});
-  canvas.fill_polygon(std::array<Vector2d, 4>{at(-0.34, -1.35, -0.2), at(0.34, -1.35, -0.2), at(0.34, 0.75, -0.2),
-                                              at(-0.34, 0.75, -0.2)},
-                      Rgb{205, 205, 205});
-  canvas.fill_polygon(std::array<Vector2d, 4>{at(-0.34, -1.35, -0.2), at(0.34, -1.35, -0.2), at(0.34, -1.35, -0.27),
-                                              at(-0.34, -1.35, -0.27)},
-                      Rgb{170, 170, 170});
+  // What lies on the support turns with it.
+  const double yaw = report.table.yaw_rad(), cosine = std::cos(yaw), sine = std::sin(yaw);
+  const auto on_table = [&](double right, double toward, double up) {
+    return at(cosine * right - sine * toward, sine * right + cosine * toward, up);
+  };
+  const std::array<Vector2d, 4> top = {on_table(-0.34, -1.35, -0.2), on_table(0.34, -1.35, -0.2),
+                                       on_table(0.34, 0.75, -0.2), on_table(-0.34, 0.75, -0.2)};
+  const Vector2d thickness(0.0, 0.07 * unit);
+  for (std::size_t n = 0; n < top.size(); ++n)
+    canvas.fill_polygon(
+        std::array<Vector2d, 4>{top[n], top[(n + 1) % 4], top[(n + 1) % 4] + thickness, top[n] + thickness},
+        Rgb{170, 170, 170});
+  canvas.fill_polygon(top, Rgb{205, 205, 205});
   // The patient: a body, and the head where it lies.
   const double head = report.patient_position.starts_with("HF") ? 1.0 : -1.0;
-  Polygon body;
+  Polygon body, skull;
   for (int n = 0; n < 24; ++n) {
     const double angle = 2.0 * M_PI * n / 24.0;
-    body.push_back(at(0.2 * std::cos(angle), -0.35 * head + 0.62 * std::sin(angle), -0.12));
+    body.push_back(on_table(0.2 * std::cos(angle), -0.35 * head + 0.62 * std::sin(angle), -0.12));
+    skull.push_back(on_table(0.0, 0.42 * head, -0.1) + unit * 0.13 * Vector2d(std::cos(angle), std::sin(angle)));
   }
-  canvas.fill_polygon(body, Rgb{235, 224, 206});
-  canvas.polygon(body, {.color = color::kGray, .width = 0.5});
-  Polygon skull;
-  for (int n = 0; n < 24; ++n) {
-    const double angle = 2.0 * M_PI * n / 24.0;
-    skull.push_back(at(0.0, 0.42 * head, -0.1) + unit * 0.13 * Vector2d(std::cos(angle), std::sin(angle)));
+  for (const Polygon& part : {body, skull}) {
+    canvas.fill_polygon(part, Rgb{235, 224, 206});
+    canvas.polygon(part, {.color = color::kGray, .width = 0.5});
   }
-  canvas.fill_polygon(skull, Rgb{235, 224, 206});
-  canvas.polygon(skull, {.color = color::kGray, .width = 0.5});
 
   const LineStyle axis{.color = color::kGray, .width = 0.7};
   const TextStyle small{.size = 0.115 * unit + 2.0, .color = color::kGray};
@@ -184,10 +186,9 @@ void draw_couch(Canvas& canvas, double x, double y, double width, double height,
 
   if (page.withheld || page.couch.size() < 3) return;
   // Along the table top's axes at imaging; lengths of the arrows say nothing but which is longest.
-  const double yaw = report.table.yaw_rad();
   const std::array<Eigen::Vector3d, 3> directions = {rotation_z(yaw).col(0), rotation_z(yaw).col(1),
                                                      Eigen::Vector3d::UnitZ()};
-  const CouchShift shift = couch_shift_for(report.setup_error, report.table);
+  const CouchShift shift = couch_shift_for(known_setup_error(report), report.table);
   const double longest = shift.translation_mm.cwiseAbs().maxCoeff();
   for (int n = 0; n < 3; ++n) {
     const Quantity& quantity = page.couch[static_cast<std::size_t>(n)];

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cmath>
+#include <limits>
 #include <nlohmann/json.hpp>
 #include <utility>
 
@@ -48,6 +49,7 @@ Json setup_error_json(const SetupReport& report, const ShownShift& shown) {
   return {{"frame", "IEC 61217 fixed"},
           {"about", "isocenter"},
           {"translation_mm", translation},
+          {"known_translation_mm", array_of(Eigen::Vector3d(known_setup_error(report).translation()))},
           {"rotation_matrix", rows},
           {"rotation_deg",
            {{"order", "Rz*Rx*Ry"},
@@ -124,7 +126,10 @@ Json site_json(const std::optional<SetupReport::Site>& site) {
                {"action_level", nullptr},
                {"couch_degrees_of_freedom", static_cast<int>(site->couch_dof)},
                {"couch_scale", nullptr},
-               {"length_unit", site->length_unit == LengthUnit::kCm ? "cm" : "mm"}};
+               {"length_unit", site->length_unit == LengthUnit::kCm ? "cm" : "mm"},
+               {"automatic_release", nullptr}};
+  if (site->automatic_release)
+    json["automatic_release"] = {{"by", site->automatic_release->by}, {"on", site->automatic_release->on}};
   if (site->level)
     json["action_level"] = {{"translation_mm", or_null(site->level->translation_mm)},
                             {"vector_mm", or_null(site->level->vector_mm)},
@@ -284,6 +289,9 @@ std::optional<double> number_from(const Json& json) {
   return json.is_null() ? std::nullopt : std::optional(json.get<double>());
 }
 
+// What is no number is written as null.
+double or_nan(const Json& json) { return number_from(json).value_or(std::numeric_limits<double>::quiet_NaN()); }
+
 std::string text_from(const Json& json) { return json.is_null() ? "" : json.get<std::string>(); }
 
 std::vector<Polygon> polygons_from(const Json& json) {
@@ -321,8 +329,8 @@ SetupReport::View view_from(const Json& json) {
                          .columns = json.at("columns"),
                          .rows = json.at("rows"),
                          .is_megavoltage = json.at("beam") == "MV",
-                         .similarity_start = json.at("similarity_start"),
-                         .similarity_final = json.at("similarity_final"),
+                         .similarity_start = or_nan(json.at("similarity_start")),
+                         .similarity_final = or_nan(json.at("similarity_final")),
                          .left_out_mm = number_from(json.at("left_out_mm")),
                          .left_out_deg = number_from(json.at("left_out_deg")),
                          .picture = picture_from(json.at("picture"))};
@@ -352,21 +360,37 @@ SetupReport::Stage stage_from(const Json& json) {
   return stage;
 }
 
+// A word that has a meaning here.
+template <class T>
+T one_of(const std::optional<T>& meaning, const char* place) {
+  if (!meaning) throw Error(fmt::format("{} is none of those there are", place));
+  return *meaning;
+}
+
+std::optional<CouchDof> couch_dof_from(int number) {
+  for (const CouchDof dof : {CouchDof::kThree, CouchDof::kFour, CouchDof::kSix})
+    if (static_cast<int>(dof) == number) return dof;
+  return std::nullopt;
+}
+
 std::optional<SetupReport::Site> site_from(const Json& json) {
   if (json.is_null()) return std::nullopt;
-  SetupReport::Site site{.name = json.at("name"),
-                         .sha256 = json.at("sha256"),
-                         .anatomy = json.at("anatomy"),
-                         .couch_dof = static_cast<CouchDof>(json.at("couch_degrees_of_freedom").get<int>()),
-                         .length_unit = json.at("length_unit") == "cm" ? LengthUnit::kCm : LengthUnit::kMm};
+  SetupReport::Site site{
+      .name = json.at("name"),
+      .sha256 = json.at("sha256"),
+      .anatomy = json.at("anatomy"),
+      .couch_dof = one_of(couch_dof_from(json.at("couch_degrees_of_freedom")), "site: couch_degrees_of_freedom"),
+      .length_unit = json.at("length_unit") == "cm" ? LengthUnit::kCm : LengthUnit::kMm};
   if (const Json& level = json.at("action_level"); !level.is_null())
     site.level = {.translation_mm = number_from(level.at("translation_mm")),
                   .vector_mm = number_from(level.at("vector_mm")),
                   .rotation_deg = number_from(level.at("rotation_deg"))};
   if (const Json& scale = json.at("couch_scale"); !scale.is_null())
-    site.couch_scale = {.scale = couch_scale_from(scale.at("name").get<std::string>()).value(),
+    site.couch_scale = {.scale = one_of(couch_scale_from(scale.at("name").get<std::string>()), "site: couch_scale"),
                         .validated_by = scale.at("validated_by"),
                         .validated_on = scale.at("validated_on")};
+  if (const Json& release = json.at("automatic_release"); !release.is_null())
+    site.automatic_release = {.by = release.at("by"), .on = release.at("on")};
   return site;
 }
 
@@ -413,7 +437,7 @@ SetupReport report_from(const Json& json) {
   for (const Json& point : json.at("points"))
     report.points.push_back({.name = point.at("name"), .room_mm = vector_from<3>(point.at("room_mm"))});
   const Json& error = json.at("setup_error");
-  report.setup_error.translation() = known_from(error.at("translation_mm"));
+  report.setup_error.translation() = vector_from<3>(error.at("known_translation_mm"));
   for (std::size_t row = 0; row < 3; ++row)
     report.setup_error.linear().row(static_cast<Eigen::Index>(row)) =
         vector_from<3>(error.at("rotation_matrix").at(row));
@@ -459,9 +483,10 @@ SetupReport report_from(const Json& json) {
 SetupReport report_from_json(const std::string& json, const std::string& where) {
   try {
     const Json parsed = Json::parse(json);
-    if (parsed.at("schema") != 1)
-      throw Error(fmt::format("{}: schema is {}, expected 1", where, parsed.at("schema").dump()));
+    if (parsed.at("schema") != 1) throw Error(fmt::format("schema is {}, expected 1", parsed.at("schema").dump()));
     return report_from(parsed);
+  } catch (const Error& error) {
+    throw Error(fmt::format("{}: {}", where, error.what()));
   } catch (const Json::exception& error) {
     throw Error(fmt::format("{}: is no result of this program: {}", where, error.what()));
   }

@@ -35,13 +35,13 @@ class PdfReport {
     verdict();
     shift();
     numbers();
-    const std::size_t shown = pictures(0, kBottom - sign_off_height() - conventions_height() - 2.0 * kGap);
+    const std::size_t shown = pictures(0, kBottom - sign_off_height() - conventions_height() - 2.0 * kGap, false);
     sign_off();
     conventions();
     footer();
     canvas_.new_page();
     y_ = kMargin;
-    if (shown < report_.views.size()) pictures(shown, kBottom);
+    if (shown < report_.views.size()) pictures(shown, kBottom, true);
     details();
     footer();
     return canvas_.finish();
@@ -68,9 +68,15 @@ class PdfReport {
     const double y = kPageHeight - 30.0;
     canvas_.line({kMargin, y - 3.0}, {kMargin + kWidth, y - 3.0}, {.color = color::kLightGray});
     canvas_.text(kMargin, y, page_.disclaimer, {.size = 7.5, .bold = true});
-    canvas_.text(kMargin + kWidth, y,
-                 fmt::format("{}  ·  {}  ·  page {}", page_.who.front().value, page_.program, page_number_),
-                 {.size = 7.0, .color = color::kGray, .align = TextStyle::Align::kRight});
+    constexpr double kBegin = 235.0;
+    canvas_.text(kMargin + kBegin, y,
+                 fmt::format("page {}  ·  {}  ·  patient ID {}", page_number_, page_.program,
+                             printable(report_.identity.patient_id)),
+                 {.size = 7.0,
+                  .color = color::kGray,
+                  .align = TextStyle::Align::kRight,
+                  .width = kWidth - kBegin,
+                  .one_line = true});
   }
 
   void header() {
@@ -83,28 +89,36 @@ class PdfReport {
   }
 
   void who() {
-    for (const ReportPage::Row& row : page_.who) {
+    constexpr std::size_t kMost = 9;  // all are in the details
+    for (std::size_t n = 0; n < page_.who.size(); ++n) {
+      if (n >= kMost - 1 && page_.who.size() > kMost && n + 1 < page_.who.size()) continue;  // the last one says when
+      const ReportPage::Row& row = page_.who[n];
       const bool is_patient = row.name == "Patient";
       canvas_.text(kMargin, y_, row.name, {.size = 8.0, .color = color::kGray});
-      y_ += canvas_.text(kMargin + 58.0, y_ - (is_patient ? 1.5 : 0.0), row.value,
-                         {.size = is_patient ? 10.5 : 8.5, .bold = is_patient, .width = kWidth - 58.0}) +
+      y_ += canvas_.text(
+                kMargin + 58.0, y_ - (is_patient ? 1.5 : 0.0), row.value,
+                {.size = is_patient ? 10.5 : 8.5, .bold = is_patient, .width = kWidth - 58.0, .one_line = true}) +
             1.0;
     }
     y_ += kGap;
   }
 
+  // On the first page every reason has one line; the details have all of it.
   void verdict() {
     constexpr double kIndent = 12.0;
     const double begin = y_;
+    const auto line = [&](const std::string& text, double size, bool bold) {
+      y_ += canvas_.text(kMargin + kIndent, y_, text,
+                         {.size = size, .bold = bold, .width = kWidth - kIndent - 4.0, .one_line = true});
+    };
     y_ += 3.0;
-    paragraph(page_.verdict_words, {.size = 12.0, .bold = true}, kIndent);
+    line(page_.verdict_words, 12.0, true);
     for (std::size_t n = 0; n < std::min(kReasonsOnFirstPage, page_.reasons.size()); ++n)
-      paragraph("· " + page_.reasons[n], {.size = 8.5}, kIndent);
+      line("· " + page_.reasons[n], 8.5, false);
     if (page_.reasons.size() > kReasonsOnFirstPage)
-      paragraph(fmt::format("· and {} more, on the next page", page_.reasons.size() - kReasonsOnFirstPage),
-                {.size = 8.5}, kIndent);
-    paragraph(page_.action_words, {.size = 9.5, .bold = page_.action == Action::kExceeds}, kIndent);
-    for (const std::string& reason : page_.action_reasons) paragraph("· " + reason, {.size = 8.5}, kIndent);
+      line(fmt::format("· and {} more, on the next page", page_.reasons.size() - kReasonsOnFirstPage), 8.5, false);
+    line(page_.action_words, 9.5, page_.action == Action::kExceeds);
+    for (const std::string& reason : page_.action_reasons) line("· " + reason, 8.5, false);
     y_ += 3.0;
     canvas_.fill(kMargin, begin, 6.0, y_ - begin, color_of(page_.verdict));
     canvas_.polygon(box(kMargin, begin, kWidth, y_ - begin), {.color = color::kLightGray});
@@ -186,11 +200,18 @@ class PdfReport {
     }
     if (!page_.left_over.empty()) {
       y_ += canvas_.text(right, y_, page_.left_over_words, {.size = 8.0, .bold = true, .width = 0.5 * kWidth - kGap});
-      for (const ReportPage::LeftOver& left : page_.left_over) {
-        canvas_.text(right, y_, left.at, {.size = 8.0});
-        canvas_.text(right + 84.0, y_,
+      constexpr std::size_t kMost = 6;  // all are in the details
+      for (std::size_t n = 0; n < std::min(kMost, page_.left_over.size()); ++n) {
+        const ReportPage::LeftOver& left = page_.left_over[n];
+        canvas_.text(right, y_, left.at, {.size = 8.0, .width = 88.0, .one_line = true});
+        canvas_.text(right + 92.0, y_,
                      fmt::format("({}, {}, {}) {}, length {}", left.components[0], left.components[1],
                                  left.components[2], left.unit, left.length),
+                     {.size = 7.5});
+        y_ += 10.5;
+      }
+      if (page_.left_over.size() > kMost) {
+        canvas_.text(right, y_, fmt::format("and {} more, in the details", page_.left_over.size() - kMost),
                      {.size = 8.0});
         y_ += 10.5;
       }
@@ -204,7 +225,7 @@ class PdfReport {
 
   // The views from `first` on, one below the other as far as they fit above `limit`, narrower if all would fit then.
   // Returns how many are drawn by now.
-  std::size_t pictures(std::size_t first, double page_limit) {
+  std::size_t pictures(std::size_t first, double page_limit, bool may_break_page) {
     constexpr double kNarrowest = 0.6;
     const double limit = page_limit - canvas_.text_height(kLegend, legend_style()) - 2.0;
     const auto all_height = [&](double width) {
@@ -214,16 +235,18 @@ class PdfReport {
     };
     double fitting = kWidth;
     while (fitting > kNarrowest * kWidth && y_ + all_height(fitting) > limit) fitting -= 0.01 * kWidth;
+    if (y_ + all_height(fitting) > limit) fitting = kWidth;  // they do not fit either way
     std::size_t n = first;
     for (; n < report_.views.size(); ++n) {
       const double height = view_height(report_.views[n], fitting);
       if (y_ + height > limit + 0.5) {
-        if (first == 0) break;
+        if (!may_break_page) break;
         next_page();
       }
       draw_view(canvas_, kMargin + 0.5 * (kWidth - fitting), y_, fitting, report_.views[n]);
       y_ += height;
     }
+    if (n == first) return n;
     const std::string legend = n < report_.views.size() ? std::string(kLegend) + " More on the next page." : kLegend;
     y_ += canvas_.text(kMargin, y_, legend, legend_style()) + 2.0;
     return n;
@@ -306,7 +329,8 @@ class PdfReport {
   }
 
   void details() {
-    if (page_.reasons.size() > kReasonsOnFirstPage) list("Reasons for the verdict", page_.reasons);
+    list("Reasons for the verdict", page_.reasons);
+    if (page_.who.size() > 9) section({.title = "What was registered", .rows = page_.who});
     list("Warnings", page_.warnings);
     list("Overrides: what a person supplied or allowed", page_.overrides);
     for (const ReportPage::Section& each : page_.details) {

@@ -14,6 +14,7 @@ namespace isoshift {
 namespace {
 
 constexpr const char* kNotDetermined = "not determined";
+constexpr std::array<std::size_t, 3> kRotationAxis = {2, 0, 1};  // of yaw, pitch and roll
 
 // The two senses of an axis in words, for positive and negative values.
 struct Sense {
@@ -27,6 +28,18 @@ constexpr Sense kVertical = {"up", "down"};
 constexpr Sense kYaw = {"counter-clockwise, seen from above", "clockwise, seen from above"};
 constexpr Sense kPitch = {"gantry end up", "gantry end down"};
 constexpr Sense kRoll = {"right side down, seen facing the gantry", "left side down, seen facing the gantry"};
+
+// Where a step of the table top goes in the room, strongest first: "toward the gantry and to the left".
+std::string room_words(const Eigen::Vector3d& direction) {
+  constexpr double kWeak = 0.3;
+  if (std::abs(direction.z()) > kWeak) return direction.z() > 0.0 ? kVertical.positive : kVertical.negative;
+  const bool has_x = std::abs(direction.x()) > kWeak, has_y = std::abs(direction.y()) > kWeak;
+  const std::string along_y = direction.y() > 0.0 ? kLongitudinal.positive : kLongitudinal.negative;
+  if (!has_x) return along_y;
+  const Sense& lateral = kLateral;
+  const std::string along_x = direction.x() > 0.0 ? lateral.positive : lateral.negative;
+  return has_y ? fmt::format("{} and {}", along_y, along_x) : along_x;
+}
 
 std::optional<double> twice(const std::optional<double>& sigma) {
   return sigma ? std::optional(2.0 * *sigma) : std::nullopt;
@@ -58,6 +71,14 @@ std::string unsigned_length(double mm, LengthUnit unit) {
 Quantity angle(std::string name, double deg, const std::optional<double>& sigma_deg, const Sense& sense) {
   return quantity(std::move(name), deg, "deg", rounded(deg, twice(sigma_deg)),
                   sigma_deg ? rounded_up(2.0 * *sigma_deg) : "", sense);
+}
+
+Quantity taken_as_zero(const std::string& name) {
+  return {.name = name,
+          .value = "taken as 0",
+          .unit = "deg",
+          .words = "only translations were searched",
+          .is_number = false};
 }
 
 std::vector<std::string> all_printable(const std::vector<std::string>& texts) {
@@ -124,20 +145,34 @@ std::string action_words(const SetupReport& report, const ShownShift& shown) {
 
 std::vector<Quantity> couch_rows(const ShownShift& shown, const SetupReport& report, LengthUnit unit) {
   const auto sigma_of = [&](int axis) { return shown.sigma_deg[static_cast<std::size_t>(axis)]; };
+  const double yaw = report.table.yaw_rad();
   std::vector<Quantity> rows = {length("Lateral", shown.couch_mm[0], shown.couch_sigma_mm[0], unit, kLateral),
                                 length("Longitudinal", shown.couch_mm[1], shown.couch_sigma_mm[1], unit, kLongitudinal),
-                                length("Vertical", shown.couch_mm[2], shown.couch_sigma_mm[2], unit, kVertical),
-                                angle("Yaw", shown.couch_deg[0], sigma_of(2), kYaw),
-                                angle("Pitch", shown.couch_deg[1], sigma_of(0), kPitch),
-                                angle("Roll", shown.couch_deg[2], sigma_of(1), kRoll)};
-  for (std::size_t n = 0; n < 3; ++n)
-    if (!shown.can_rotate[n])
-      rows[3 + n] = {
-          .name = rows[3 + n].name,
-          .value = "not applied",
-          .unit = "deg",
-          .words = fmt::format("this couch has {} degrees of freedom", static_cast<int>(report.site->couch_dof)),
-          .is_number = false};
+                                length("Vertical", shown.couch_mm[2], shown.couch_sigma_mm[2], unit, kVertical)};
+  for (int axis = 0; axis < 3; ++axis)
+    if (Quantity& row = rows[static_cast<std::size_t>(axis)]; !row.words.empty())
+      row.words = room_words(rotation_z(yaw).col(axis) * *shown.couch_mm[static_cast<std::size_t>(axis)] /
+                             std::abs(*shown.couch_mm[static_cast<std::size_t>(axis)]));
+  // Its ends and sides have these names with the couch straight.
+  const bool is_turned = std::abs(std::sin(yaw)) > 0.3 || std::cos(yaw) < 0.0;
+  constexpr Sense kTurnedPitch = {"end up that is at the gantry at couch angle 0",
+                                  "end down that is at the gantry at couch angle 0"};
+  constexpr Sense kTurnedRoll = {"side down that is the right one at couch angle 0",
+                                 "side down that is the left one at couch angle 0"};
+  rows.push_back(angle("Yaw", shown.couch_deg[0], sigma_of(2), kYaw));
+  rows.push_back(angle("Pitch", shown.couch_deg[1], sigma_of(0), is_turned ? kTurnedPitch : kPitch));
+  rows.push_back(angle("Roll", shown.couch_deg[2], sigma_of(1), is_turned ? kTurnedRoll : kRoll));
+  for (std::size_t n = 0; n < 3; ++n) {
+    Quantity& row = rows[3 + n];
+    if (report.translation_only)
+      row = taken_as_zero(row.name);
+    else if (!shown.can_rotate[n])
+      row = {.name = row.name,
+             .value = "not applied",
+             .unit = "deg",
+             .words = fmt::format("this couch has {} degrees of freedom", static_cast<int>(report.site->couch_dof)),
+             .is_number = false};
+  }
   return rows;
 }
 
@@ -147,8 +182,10 @@ std::string target_words(const ShownShift& shown, const TableAngles& table) {
                                      deg_from_rad(table.roll_rad)};
   std::vector<std::string> parts;
   for (std::size_t n = 0; n < 3; ++n)
-    parts.push_back(
-        fmt::format("{} {}", names[n], rounded(shown.can_rotate[n] ? shown.couch_target_deg[n] : at_imaging_deg[n])));
+    parts.push_back(fmt::format("{} {}", names[n],
+                                shown.can_rotate[n]
+                                    ? rounded(shown.couch_target_deg[n], twice(shown.sigma_deg[kRotationAxis[n]]))
+                                    : rounded(at_imaging_deg[n])));
   return fmt::format("IEC table angles after the move: {} deg", joined(parts));
 }
 
@@ -160,27 +197,32 @@ ReportPage::Display display_of(const SetupReport& report, const ShownShift& show
                                                    scale.validated_on)};
   const std::array<int, 4> signs = signs_on_scale(scale.scale);
   constexpr std::array kNames = {"Lateral", "Longitudinal", "Vertical"};
+  // What a display shows has one decimal: rounded before it is counted its way.
+  const auto to_tenth = [](double value) { return std::round(10.0 * value) / 10.0; };
   CouchReadOut before, after;
-  before.angle_deg = deg_from_rad(report.table.support_rad);
-  after.angle_deg = before.angle_deg + (shown.can_rotate[0] ? shown.couch_deg[0] : 0.0);
-  if (report.table_position_mm) before.position_mm = after.position_mm = *report.table_position_mm;
+  before.angle_deg = to_tenth(deg_from_rad(report.table.support_rad));
+  after.angle_deg = to_tenth(before.angle_deg + (shown.can_rotate[0] ? shown.couch_deg[0] : 0.0));
+  if (report.table_position_mm) before.position_mm = report.table_position_mm->unaryExpr(to_tenth);
   for (int axis = 0; axis < 3; ++axis)
-    after.position_mm[axis] += shown.couch_mm[static_cast<std::size_t>(axis)].value_or(0.0);
+    after.position_mm[axis] =
+        to_tenth(before.position_mm[axis] + shown.couch_mm[static_cast<std::size_t>(axis)].value_or(0.0));
   const CouchReadOut from = on_scale(scale.scale, before), to = on_scale(scale.scale, after);
+  const auto is_precise = [](const std::optional<double>& sigma) { return !sigma || 2.0 * *sigma <= 1.0; };
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const auto& mm = shown.couch_mm[axis];
     const std::optional<double> change = mm ? std::optional(signs[axis] * *mm) : std::nullopt;
     Quantity row = length(kNames[axis], change, shown.couch_sigma_mm[axis], unit, {"", ""});
-    if (mm && report.table_position_mm) {
+    if (mm && report.table_position_mm && is_precise(shown.couch_sigma_mm[axis])) {
       const auto n = static_cast<Eigen::Index>(axis);
       row.words = fmt::format("from {} to {} {}", unsigned_length(from.position_mm[n], unit),
                               unsigned_length(to.position_mm[n], unit), name_of(unit));
     }
     display.rows.push_back(std::move(row));
   }
-  if (shown.can_rotate[0]) {
+  if (shown.can_rotate[0] && !report.translation_only) {
     Quantity row = angle("Yaw", signs[3] * shown.couch_deg[0], shown.sigma_deg[2], {"", ""});
-    row.words = fmt::format("from {:.1f} to {:.1f} deg", from.angle_deg, to.angle_deg);
+    if (is_precise(shown.sigma_deg[2]))
+      row.words = fmt::format("from {:.1f} to {:.1f} deg", from.angle_deg, to.angle_deg);
     display.rows.push_back(std::move(row));
   }
   return display;
@@ -196,10 +238,15 @@ void put_shift(const SetupReport& report, const ShownShift& shown, LengthUnit un
                       angle("about x", shown.setup_error_deg[0], shown.sigma_deg[0], kPitch),
                       angle("about y", shown.setup_error_deg[1], shown.sigma_deg[1], kRoll),
                       angle("about z", shown.setup_error_deg[2], shown.sigma_deg[2], kYaw)};
-  if (report.unobservable_room.empty())
+  if (report.translation_only)
+    for (std::size_t n = 3; n < 6; ++n) page.setup_error[n] = taken_as_zero(page.setup_error[n].name);
+  if (report.unobservable_room.empty()) {
+    std::optional<double> two_sigma_mm;
+    if (report.sigma) two_sigma_mm = 2.0 * report.sigma->translation_mm.maxCoeff();
+    const std::string text = rounded_length(report.setup_error.translation().norm(), unit, two_sigma_mm);
     page.setup_error_length =
-        fmt::format("Length of the translation {} {}", unsigned_length(report.setup_error.translation().norm(), unit),
-                    name_of(unit));
+        fmt::format("Length of the translation {} {}", text.substr(text.starts_with('+') ? 1 : 0), name_of(unit));
+  }
   if (report.site && report.site->couch_scale) page.display = display_of(report, shown, unit);
   if (std::ranges::all_of(shown.left_over, [](const auto& left) { return left.mm.norm() < 1e-6; })) return;
   page.left_over_words = "What remains after that, IEC 61217 fixed axes";
@@ -231,6 +278,14 @@ ReportPage::Section geometry_section(const SetupReport& report) {
     section.rows.push_back({printable(view.label),
                             fmt::format("source at {} IEC fixed; {} x {} pixels of {:.3f} mm at the isocenter",
                                         vector_words(view.source_room_mm), view.columns, view.rows, view.pixel_mm)});
+  return section;
+}
+
+ReportPage::Section left_over_section(const ReportPage& page) {
+  ReportPage::Section section{.title = page.left_over_words, .rows = {}};
+  for (const ReportPage::LeftOver& left : page.left_over)
+    section.rows.push_back({left.at, fmt::format("({}) {}, length {} {}", fmt::join(left.components, ", "), left.unit,
+                                                 left.length, left.unit)});
   return section;
 }
 
@@ -292,6 +347,12 @@ ReportPage::Section provenance_section(const SetupReport& report) {
   if (report.site)
     section.rows.push_back(
         {"Site file", fmt::format("\"{}\"; SHA-256 {}", printable(report.site->name), report.site->sha256)});
+  if (report.site)
+    section.rows.push_back({"Release", report.site->automatic_release
+                                           ? fmt::format("automatic for accepted results, allowed by {} on {}",
+                                                         printable(report.site->automatic_release->by),
+                                                         printable(report.site->automatic_release->on))
+                                           : "by a person"});
   section.rows.push_back({"Registration object", report.spatial_registration_uid.empty()
                                                      ? "none was written"
                                                      : report.spatial_registration_uid});
@@ -356,12 +417,14 @@ ReportPage report_page(const SetupReport& report) {
       "Setup error: where the patient lies. Anatomy planned at p is found at R p + t, with R = Rz Rx Ry; couch: what "
       "undoes it, "
       "along the table top's axes at imaging. Angles of the couch are changes of its read-outs.",
-      "Rounded once, to 0.1 mm and 0.1 deg, or to 1 where two sigma exceeds 1; +/- is two sigma. result.json has full "
-      "precision."};
+      "Shift and setup error are rounded once, to 0.1 mm and 0.1 deg, or to 1 where two sigma exceeds 1; +/- is two "
+      "sigma. "
+      "result.json has full precision."};
   page.warnings = all_printable(report.warnings);
   page.overrides = all_printable(report.overrides);
   page.left_aside = all_printable(report.left_aside);
   page.details = {geometry_section(report), search_section(report), checks_section(report), provenance_section(report)};
+  if (!page.left_over.empty()) page.details.insert(page.details.begin() + 1, left_over_section(page));
   return page;
 }
 

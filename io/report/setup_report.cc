@@ -30,7 +30,8 @@ std::array<double, 3> yaw_pitch_roll_deg(const ZxyAngles& angles) {
   return {deg_from_rad(angles.z_rad), deg_from_rad(angles.x_rad), deg_from_rad(angles.y_rad)};
 }
 
-std::vector<ShownShift::LeftOver> left_over(const SetupReport& report, const CouchShift& shift) {
+std::vector<ShownShift::LeftOver> left_over(const SetupReport& report, const Eigen::Isometry3d& setup_error,
+                                            const CouchShift& shift) {
   constexpr double kAlongPatientMm = 50.0;
   std::vector<SetupReport::Point> points = {{.name = "isocenter"}};
   if (const auto position = patient_position_from(report.patient_position)) {
@@ -42,12 +43,12 @@ std::vector<ShownShift::LeftOver> left_over(const SetupReport& report, const Cou
   points.insert(points.end(), report.points.begin(), report.points.end());
   std::vector<ShownShift::LeftOver> result;
   for (const SetupReport::Point& point : points)
-    result.push_back({point.name, left_over_mm(report.setup_error, report.table, shift, point.room_mm)});
+    result.push_back({point.name, left_over_mm(setup_error, report.table, shift, point.room_mm)});
   return result;
 }
 
 // By the setup error as it is, before any rounding.
-void judge_action(const ActionLevel& level, ShownShift& shown) {
+void judge_action(const ActionLevel& level, bool translation_only, ShownShift& shown) {
   bool is_known = true;
   const auto compare = [&](const std::string& what, std::span<const std::optional<double>> values,
                            const std::optional<double>& limit, const char* unit) {
@@ -61,12 +62,17 @@ void judge_action(const ActionLevel& level, ShownShift& shown) {
     if (!beyond.empty())
       shown.action_reasons.push_back(fmt::format("{}{}: more than {} {}", what, fmt::join(beyond, ", "), *limit, unit));
   };
-  std::optional<double> square_mm = 0.0;
-  for (const std::optional<double>& component : shown.setup_error_mm)
-    square_mm = square_mm && component ? std::optional(*square_mm + *component * *component) : std::nullopt;
-  const std::array length = {square_mm ? std::optional(std::sqrt(*square_mm)) : std::nullopt};
+  // Of the length, what is known of it is the least it can be.
+  double square_mm = 0.0;
+  bool has_all = true;
+  for (const std::optional<double>& component : shown.setup_error_mm) {
+    square_mm += component.value_or(0.0) * component.value_or(0.0);
+    has_all = has_all && component;
+  }
+  const bool is_long = level.vector_mm && std::sqrt(square_mm) > *level.vector_mm;
+  const std::array length = {has_all || is_long ? std::optional(std::sqrt(square_mm)) : std::nullopt};
   std::array<std::optional<double>, 3> rotation_deg;
-  std::ranges::copy(shown.setup_error_deg, rotation_deg.begin());
+  if (!translation_only) std::ranges::copy(shown.setup_error_deg, rotation_deg.begin());
   compare("setup error along ", shown.setup_error_mm, level.translation_mm, "mm");
   compare("length of the translation", length, level.vector_mm, "mm");
   compare("setup error about ", rotation_deg, level.rotation_deg, "deg");
@@ -84,11 +90,19 @@ std::string_view to_string(Action action) {
   return "";
 }
 
+Eigen::Isometry3d known_setup_error(const SetupReport& report) {
+  Eigen::Isometry3d known = report.setup_error;
+  for (const Eigen::Vector3d& direction : report.unobservable_room)
+    known.translation() -= direction.dot(known.translation()) * direction;
+  return known;
+}
+
 ShownShift shown_shift(const SetupReport& report) {
   ShownShift shown;
-  const CouchShift shift = couch_shift_for(report.setup_error, report.table);
-  const ZxyAngles error = zxy_from_rotation(report.setup_error.linear());
-  shown.setup_error_mm = determined(report.setup_error.translation(), report.unobservable_room);
+  const Eigen::Isometry3d setup_error = known_setup_error(report);
+  const CouchShift shift = couch_shift_for(setup_error, report.table);
+  const ZxyAngles error = zxy_from_rotation(setup_error.linear());
+  shown.setup_error_mm = determined(setup_error.translation(), report.unobservable_room);
   shown.setup_error_deg = {deg_from_rad(error.x_rad), deg_from_rad(error.y_rad), deg_from_rad(error.z_rad)};
   if (report.sigma) {
     shown.sigma_mm = determined(report.sigma->translation_mm, report.unobservable_room);
@@ -112,8 +126,9 @@ ShownShift shown_shift(const SetupReport& report) {
   const CouchDof dof = report.site ? report.site->couch_dof : CouchDof::kSix;
   shown.can_rotate = {dof != CouchDof::kThree, dof == CouchDof::kSix, dof == CouchDof::kSix};
   if (!shown.withheld && report.unobservable_room.empty())
-    shown.left_over = left_over(report, applicable(shift, report.table, dof));
-  if (!shown.withheld && report.site && report.site->level) judge_action(*report.site->level, shown);
+    shown.left_over = left_over(report, setup_error, applicable(shift, report.table, dof));
+  if (!shown.withheld && report.site && report.site->level)
+    judge_action(*report.site->level, report.translation_only, shown);
   return shown;
 }
 

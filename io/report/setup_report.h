@@ -76,6 +76,7 @@ struct SetupReport {
     CouchDof couch_dof = CouchDof::kSix;
     std::optional<SiteFile::Scale> couch_scale;
     LengthUnit length_unit = LengthUnit::kMm;
+    std::optional<SiteFile::Release> automatic_release;
   };
   // A point of the patient at which a person wants to know what is left over.
   struct Point {
@@ -153,5 +154,8 @@ struct ShownShift {
   std::vector<std::string> action_reasons;
 };
 ShownShift shown_shift(const SetupReport& report);
+
+// The setup error without what lies along directions that were not measured: no number is made from that.
+Eigen::Isometry3d known_setup_error(const SetupReport& report);
 
 }  // namespace isoshift

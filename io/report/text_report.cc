@@ -38,10 +38,6 @@ std::string shift(const ReportPage& page) {
   std::string text =
       fmt::format("\nMOVE THE COUCH BY   ({})\n{}  {}\n", page.couch_order, lines(page.couch), page.couch_target);
   if (page.display) text += fmt::format("\n  {}\n{}", page.display->title, lines(page.display->rows));
-  if (!page.left_over.empty()) text += fmt::format("\n  {}\n", page.left_over_words);
-  for (const ReportPage::LeftOver& left : page.left_over)
-    text += fmt::format("  {:<14} ({}) {}, length {} {}\n", left.at, fmt::join(left.components, ", "), left.unit,
-                        left.length, left.unit);
   text += fmt::format("\nSETUP ERROR         (where the patient lies, against the plan)\n{}", lines(page.setup_error));
   if (!page.setup_error_length.empty()) text += fmt::format("  {}\n", page.setup_error_length);
   return text;

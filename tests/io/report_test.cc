@@ -13,6 +13,7 @@
 
 #include "geometry/error.h"
 #include "io/output_folder.h"
+#include "io/report/canvas.h"
 #include "io/report/formats.h"
 #include "io/report/result_folder.h"
 #include "io/report/rounding.h"
@@ -201,7 +202,8 @@ TEST(Report, RejectedResultsShowNoShiftInAnyFormat) {
   EXPECT_EQ(json["action"], "unset");
   for (const std::string& shown : {text_of(report), text_of_pdf(report), html_of(report)}) {
     EXPECT_THAT(shown, HasSubstr("withheld"));
-    for (const char* number : {"6.6", "5.1 mm", "5.2 mm", "7.4", "12.97"}) EXPECT_THAT(shown, Not(HasSubstr(number)));
+    for (const char* number : {"6.6", "-5.1", "5.2", "7.4", "+3.9", "13.0", "-2.9", "+3.0", "347.0"})
+      EXPECT_THAT(shown, Not(HasSubstr(number)));
   }
   const auto csv = csv_of(report);
   for (const char* column :
@@ -265,9 +267,12 @@ TEST(Report, ActionSaysWhatExceedsTheLevel) {
   EXPECT_THAT(text_of(report), HasSubstr("ACTION       The shift is within the action level\n"));
   EXPECT_EQ(nlohmann::json::parse(json_report(report))["action"], "within");
 
-  // What was not determined may be anything.
+  // What was not determined may be anything; what was may be enough.
   report.unobservable_room = {Eigen::Vector3d::UnitZ()};
   EXPECT_EQ(shown_shift(report).action, Action::kUnset);
+  report.site->level->vector_mm = 8.0;
+  EXPECT_EQ(shown_shift(report).action, Action::kExceeds);
+  report.site->level->vector_mm = 10.0;
   report.site->level->translation_mm = 1.0;
   EXPECT_EQ(shown_shift(report).action, Action::kExceeds);
 }
@@ -297,6 +302,67 @@ TEST(Report, SmallCouchesSayWhatTheyApplyAndWhatRemains) {
   EXPECT_TRUE(report_page(report).left_over.empty());
 }
 
+// dicom.md 5.1: 50 mm superior with a couch of 4 degrees of freedom; feet first the patient points the other way.
+TEST(Report, WhatRemainsIsThatOfDicomMd51) {
+  SetupReport report = oblique_report(Verdict::kAccepted);
+  report.table = {};
+  report.site = small_couch();
+  report.setup_error.translation() = Eigen::Vector3d(3, -2, 1.5);
+  report.setup_error.linear() = rotation_from_zxy({rad_from_deg(1), rad_from_deg(-0.5), rad_from_deg(0.8)});
+  const Eigen::Vector3d toward_gantry(-0.006, -0.002, -0.436);
+  for (const auto& [position, sign] : {std::pair("HFS", 1.0), std::pair("FFS", -1.0)}) {
+    report.patient_position = position;
+    const auto left_over = shown_shift(report).left_over;
+    EXPECT_EQ(left_over[1].at, "50 mm superior");
+    EXPECT_LT((left_over[1].mm - sign * toward_gantry).norm(), 1e-3) << position;
+    EXPECT_LT((left_over[2].mm + sign * toward_gantry).norm(), 1e-3) << position;
+  }
+}
+
+// The table top's axes turn with the couch: at 90 degrees its lateral axis points toward the gantry.
+TEST(Report, WordsAreThoseOfTheRoomWhereverTheCouchStands) {
+  SetupReport report = oblique_report(Verdict::kAccepted);
+  report.setup_error = Eigen::Isometry3d::Identity();
+  report.setup_error.translation() = Eigen::Vector3d(5, -3, 0);  // to the right, away from the gantry
+  const auto words = [&](double couch_deg) {
+    report.table.support_rad = rad_from_deg(couch_deg);
+    const ReportPage page = report_page(report);
+    return std::pair(page.couch[0].words, page.couch[1].words);
+  };
+  EXPECT_EQ(words(0), std::pair(std::string("to the left, seen facing the gantry"), std::string("toward the gantry")));
+  EXPECT_EQ(words(90), std::pair(std::string("toward the gantry"), std::string("to the left, seen facing the gantry")));
+  EXPECT_EQ(words(270),
+            std::pair(std::string("toward the gantry"), std::string("to the left, seen facing the gantry")));
+  EXPECT_EQ(words(45).second, "toward the gantry and to the left, seen facing the gantry");
+  EXPECT_EQ(words(180),
+            std::pair(std::string("to the left, seen facing the gantry"), std::string("toward the gantry")));
+}
+
+// What was not measured is in no number, however little of it an axis holds.
+TEST(Report, NothingIsMadeOfWhatWasNotMeasured) {
+  SetupReport report = oblique_report(Verdict::kReview);
+  report.table.support_rad = rad_from_deg(2.0);
+  report.unobservable_room = {Eigen::Vector3d::UnitX()};
+  const auto longitudinal = [&](double x_mm) {
+    report.setup_error.translation().x() = x_mm;
+    return shown_shift(report).couch_mm[1].value();
+  };
+  EXPECT_NEAR(longitudinal(19.0), longitudinal(0.0), 1e-12);
+  const SetupReport read = report_from_json(json_report(report), "result.json");
+  EXPECT_NEAR(shown_shift(read).couch_mm[1].value(), longitudinal(19.0), 1e-12);
+}
+
+TEST(Report, RotationsThatWereNotSearchedAreNoNumbers) {
+  SetupReport report = oblique_report(Verdict::kAccepted);
+  report.setup_error.linear().setIdentity();
+  report.translation_only = true;
+  report.site = small_couch();
+  report.site->level = ActionLevel{.rotation_deg = 1.0};
+  EXPECT_EQ(shown_shift(report).action, Action::kUnset);
+  EXPECT_THAT(text_of(report), HasSubstr("  Yaw            taken as 0: only translations were searched\n"));
+  EXPECT_EQ(csv_of(report).at("yaw_deg"), "");
+}
+
 TEST(Report, NamesComeOutRightAndHarmless) {
   SetupReport report = oblique_report(Verdict::kAccepted);
   report.identity.patient_name = "Müller-Lüdenscheidt^Jürgen=山田^太郎=やまだ^たろう";
@@ -318,7 +384,9 @@ TEST(Report, SurvivesNamesThatAreNoText) {
   SetupReport report = oblique_report(Verdict::kAccepted);
   report.identity.patient_name = "Evil\nVERDICT      ACCEPTED\x1b[31m";
   report.views[0].label = "\xff\xfe";
-  EXPECT_THAT(text_of(report), Not(HasSubstr("\nVERDICT      ACCEPTED\x1b")));
+  for (const char* forged : {"\nVERDICT      ACCEPTED\x1b", "\nVERDICT      ACCEPTED [31m"})
+    EXPECT_THAT(text_of(report), Not(HasSubstr(forged)));
+  EXPECT_EQ(printable("a\u009Bb\u202Ec\u2028d\u2066e"), "a b c d e");
   EXPECT_NO_THROW(nlohmann::json::parse(json_report(report)));
   EXPECT_NO_THROW(html_of(report));
   EXPECT_THAT(csv_report(report), Not(HasSubstr("\nVERDICT")));
@@ -335,8 +403,8 @@ TEST(Report, FirstPageHoldsAllThatIsSigned) {
   for (const char* words : {"Example", "REVIEW", "MOVE THE COUCH BY", "Approved by", "Decision", "IEC 61217:",
                             "Not for clinical use unless validated by the site.", "and 8 more, on the next page"})
     EXPECT_THAT(first, HasSubstr(words));
-  for (const char* words : {"VIEW 4", "Geometry as understood", "Provenance", "SHA-256"})
-    EXPECT_THAT(all, HasSubstr(words));
+  for (int n = 0; n < 5; ++n) EXPECT_THAT(all, HasSubstr(fmt::format("VIEW {}", n)));
+  for (const char* words : {"Geometry as understood", "Provenance", "SHA-256"}) EXPECT_THAT(all, HasSubstr(words));
   std::size_t pages = 0, disclaimers = 0;
   for (const char c : all) pages += c == '\f';
   for (std::size_t at = all.find("Not for clinical"); at != std::string::npos;
