@@ -1,0 +1,22 @@
+#pragma once
+// Curves against a common x as SVG: text and lines, told apart in gray by their dashes.
+
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace isoshift {
+
+struct LineChart {
+  struct Curve {
+    std::string name;
+    std::vector<std::pair<double, double>> points;  // x and y, x increasing
+  };
+  std::string title, x_label, y_label;
+  std::vector<Curve> curves;
+  bool from_zero = true;  // the y axis begins at 0
+};
+
+std::string line_chart_svg(const LineChart& chart, double width = 640.0, double height = 360.0);
+
+}  // namespace isoshift

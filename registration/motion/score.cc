@@ -1,0 +1,61 @@
+#include "registration/motion/score.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "geometry/error.h"
+
+namespace isoshift {
+
+std::vector<MotionSample> resampled(std::span<const MotionSample> trace, double rate_hz) {
+  if (trace.size() < 2) throw UsageError("a trace needs at least two samples");
+  std::vector<MotionSample> even;
+  std::size_t next = 1;
+  const double begin_s = trace.front().time_s;
+  for (int n = 0;; ++n) {
+    const double time_s = begin_s + n / rate_hz;
+    if (time_s > trace.back().time_s) break;
+    while (trace[next].time_s < time_s && next + 1 < trace.size()) ++next;
+    const MotionSample &a = trace[next - 1], &b = trace[next];
+    if (!(b.time_s > a.time_s))
+      throw UsageError(fmt::format("the times of a trace do not increase: {} s after {} s", b.time_s, a.time_s));
+    const double share = (time_s - a.time_s) / (b.time_s - a.time_s);
+    even.push_back({time_s, a.position_mm + share * (b.position_mm - a.position_mm)});
+  }
+  return even;
+}
+
+PredictionScore score(PredictorKind kind, const PredictorOptions& options, std::span<const MotionSample> trace,
+                      double latency_s, const ScoreProtocol& protocol) {
+  const std::vector<MotionSample> samples = resampled(trace, protocol.rate_hz);
+  const double length_s = samples.back().time_s - samples.front().time_s;
+  const double scored_after_s =
+      samples.front().time_s + (length_s < protocol.short_trace_s ? protocol.short_training_s : protocol.training_s);
+  PredictorOptions with_latency = options;
+  with_latency.latency_s = latency_s;
+  const std::unique_ptr<Predictor> predictor = make_predictor(kind, with_latency);
+  const Eigen::Matrix3d covariance =
+      protocol.measurement_sigma_mm * protocol.measurement_sigma_mm * Eigen::Matrix3d::Identity();
+  std::vector<double> errors_mm;
+  std::size_t known = 0;
+  constexpr double kSameMomentS = 1e-6;
+  for (const MotionSample& sample : samples) {
+    for (; known < samples.size() && samples[known].time_s <= sample.time_s - latency_s + kSameMomentS; ++known)
+      predictor->add(samples[known].time_s, samples[known].position_mm, covariance);
+    if (known == 0 || sample.time_s <= scored_after_s) continue;
+    errors_mm.push_back((predictor->predict(sample.time_s).position_mm - sample.position_mm).norm());
+  }
+  PredictionScore result{.samples = errors_mm.size()};
+  if (errors_mm.empty()) return result;
+  double squares = 0.0;
+  for (const double error_mm : errors_mm) squares += error_mm * error_mm;
+  std::ranges::sort(errors_mm);
+  result.rmse_mm = std::sqrt(squares / static_cast<double>(errors_mm.size()));
+  result.p95_mm = errors_mm[static_cast<std::size_t>(0.95 * static_cast<double>(errors_mm.size() - 1))];
+  result.max_mm = errors_mm.back();
+  return result;
+}
+
+}  // namespace isoshift
