@@ -29,7 +29,7 @@ struct Candidate {
 
 std::vector<Candidate> candidates() {
   std::vector<Candidate> list;
-  for (const double noise : {250.0, 500.0, 1000.0, 2000.0, 4000.0})
+  for (const double noise : {400.0, 600.0, 900.0, 1400.0, 2000.0})
     list.push_back(
         {fmt::format("acceleration noise {:g}", noise), PredictorKind::kKalman, {.acceleration_noise = noise}});
   for (const int taps : {4, 5, 6, 8, 12})

@@ -13,6 +13,7 @@ void add_register_command(CLI::App& app, Console& console, int& exit_status);
 void add_report_command(CLI::App& app, Console& console, int& exit_status);
 void add_drr_command(CLI::App& app, Console& console, int& exit_status);
 void add_phantom_command(CLI::App& app, Console& console, int& exit_status);
+void add_track_command(CLI::App& app, Console& console, int& exit_status);
 void add_predict_command(CLI::App& app, Console& console, int& exit_status);
 void add_evaluate_command(CLI::App& app, Console& console, int& exit_status);
 void add_bench_command(CLI::App& app, Console& console, int& exit_status);

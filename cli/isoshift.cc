@@ -42,6 +42,7 @@ int run_isoshift(int argc, const char* const* argv, Console& console) {
   add_drr_command(app, console, exit_status);
   add_phantom_command(app, console, exit_status);
   add_evaluate_command(app, console, exit_status);
+  add_track_command(app, console, exit_status);
   add_predict_command(app, console, exit_status);
   add_bench_command(app, console, exit_status);
   try {

@@ -3,6 +3,7 @@
 
 #include "cli/commands.h"
 #include "geometry/error.h"
+#include "io/motion_trace.h"
 #include "io/output_folder.h"
 #include "phantom/study_writer.h"
 
@@ -13,6 +14,7 @@ struct PhantomCommandOptions {
   PhantomOptions phantom;
   std::filesystem::path output;
   std::string anatomy = "head";
+  std::filesystem::path trace;
   std::vector<double> translation_mm = {4.3, -6.1, 3.2};
   std::vector<double> rotation_deg = {1.4, -2.1, 1.8};
   bool overwrite = false;
@@ -20,7 +22,11 @@ struct PhantomCommandOptions {
 
 void run_phantom(PhantomCommandOptions options, Console& console) {
   PhantomOptions& phantom = options.phantom;
-  phantom.anatomy = options.anatomy == "head" ? PhantomOptions::Anatomy::kHead : PhantomOptions::Anatomy::kSpine;
+  using enum PhantomOptions::Anatomy;
+  phantom.anatomy = options.anatomy == "head" ? kHead : options.anatomy == "spine" ? kSpine : kThorax;
+  Notes notes;
+  if (!options.trace.empty()) phantom.breathing.trace = read_motion_trace(options.trace, notes);
+  for (const std::string& warning : notes.warnings) console.err << "warning: " << warning << "\n";
   phantom.placement.isocenter_patient_mm = Eigen::Vector3d(-12.5, 38.0, -410.0);
   phantom.placement.translation_mm = Eigen::Vector3d(options.translation_mm.data());
   phantom.placement.rotation_deg = Eigen::Vector3d(options.rotation_deg.data());
@@ -44,10 +50,12 @@ void add_phantom_command(CLI::App& app, Console& console, int&) {
   CLI::App* command = app.add_subcommand("phantom", "Make a digital phantom study whose setup error is known");
   command->footer(
       "\nExample:\n  isoshift phantom -o study --translation 5,0,-3 --rotation 1,0,2\n"
-      "  isoshift register study -o result --truth study/truth.json");
+      "  isoshift register study -o result --truth study/truth.json\n"
+      "  isoshift phantom -o breathing --anatomy thorax --breathing 30 --image-pixels 256 --voxel-mm 2 --translation "
+      "0,0,0 --rotation 0,0,0");
   command->add_option("-o,--output", options->output, "Folder to make")->required()->type_name("FOLDER");
   command->add_option("--anatomy", options->anatomy, "What the body is")
-      ->check(CLI::IsMember({"head", "spine"}))
+      ->check(CLI::IsMember({"head", "spine", "thorax"}))
       ->capture_default_str();
   command->add_option("--translation", options->translation_mm, "Setup error, mm, IEC 61217 fixed")
       ->delimiter(',')
@@ -85,6 +93,26 @@ void add_phantom_command(CLI::App& app, Console& console, int&) {
       ->capture_default_str();
   command->add_option("--photons", options->phantom.photons, "Photons per open pixel; 0 for no noise")
       ->capture_default_str();
+  command
+      ->add_option("--mv-angles", options->phantom.megavoltage_angles_deg,
+                   "Of the gantry angles, those taken with 6 MV")
+      ->delimiter(',')
+      ->type_name("DEG,...");
+  command
+      ->add_option("--breathing", options->phantom.breathing.seconds,
+                   "A thorax breathes for so long: X-rays at every moment, 4D CT, truth.csv")
+      ->type_name("S");
+  command->add_option("--rate", options->phantom.breathing.rate_hz, "Moments per second")
+      ->type_name("HZ")
+      ->capture_default_str();
+  command->add_option("--phases", options->phantom.breathing.phases, "Phases of the 4D CT")
+      ->check(CLI::Range(0, 20))
+      ->capture_default_str();
+  command
+      ->add_option(
+          "--trace", options->trace,
+          "Recorded motion for the target (t_s or Timestamp; x, y, z in patient axes, mm), from its first position")
+      ->type_name("CSV");
   command->add_option("--seed", options->phantom.seed, "Of anatomy, noise and UIDs")->capture_default_str();
   command->add_flag("--overwrite", options->overwrite, "Replace an earlier study in that folder");
   command->callback([options, &console] { run_phantom(*options, console); });

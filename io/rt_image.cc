@@ -4,7 +4,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <charconv>
+#include <chrono>
 #include <cmath>
+#include <numeric>
 
 #include "geometry/error.h"
 #include "io/decode.h"
@@ -86,6 +89,14 @@ void replace(std::optional<T>& value, const T& by, const std::string& what, cons
   value = by;
 }
 
+// Cine module (PS3.3 C.7.6.5): increments in ms, one for all frames or one for each, the first 0.
+double frame_offset_s(const DicomItem& d, int frame) {
+  const std::vector<double> increments_ms = d.numbers(DCM_FrameTimeVector);
+  if (static_cast<int>(increments_ms.size()) > frame)
+    return std::accumulate(increments_ms.begin(), increments_ms.begin() + frame + 1, 0.0) / 1000.0;
+  return frame * d.number(DCM_FrameTime).value_or(0.0) / 1000.0;
+}
+
 RtImage read_frame(const std::filesystem::path& path, const DicomItem& d, const PixelFormat& format, int frame,
                    std::vector<DicomItem> exposures) {
   const FrameAttributes attributes(d, std::move(exposures));
@@ -109,6 +120,7 @@ RtImage read_frame(const std::filesystem::path& path, const DicomItem& d, const 
   if (!image.acquisition_date) image.acquisition_date = d.text(DCM_ContentDate);
   image.acquisition_time = d.text(DCM_AcquisitionTime);
   if (!image.acquisition_time) image.acquisition_time = d.text(DCM_ContentTime);
+  image.frame_offset_s = frame_offset_s(d, frame);
   image.kvp = attributes.number(DCM_KVP);
 
   image.plane = d.text(DCM_RTImagePlane);
@@ -202,6 +214,29 @@ std::vector<RtImage> read_rt_images(const std::filesystem::path& path, Notes& no
   }
   return images;
 }
+
+std::optional<double> acquisition_seconds(const RtImage& image) {
+  if (!image.acquisition_date || !image.acquisition_time) return std::nullopt;
+  const auto digits = [](std::string_view text, std::size_t begin, std::size_t count) -> std::optional<int> {
+    int value = 0;
+    if (text.size() < begin + count) return std::nullopt;
+    const auto [end, error] = std::from_chars(text.data() + begin, text.data() + begin + count, value);
+    return error == std::errc() && end == text.data() + begin + count ? std::optional(value) : std::nullopt;
+  };
+  const std::string_view at = *image.acquisition_time;
+  const auto year = digits(*image.acquisition_date, 0, 4), month = digits(*image.acquisition_date, 4, 2),
+             day = digits(*image.acquisition_date, 6, 2), hour = digits(at, 0, 2);
+  if (!year || !month || !day || !hour) return std::nullopt;
+  const std::chrono::year_month_day date(std::chrono::year(*year), std::chrono::month(static_cast<unsigned>(*month)),
+                                         std::chrono::day(static_cast<unsigned>(*day)));
+  const double days = static_cast<double>(std::chrono::sys_days(date).time_since_epoch().count());
+  double fraction = 0.0;
+  if (at.size() > 7 && at[6] == '.') std::from_chars(at.data() + 6, at.data() + at.size(), fraction);
+  return ((days * 24 + *hour) * 60 + digits(at, 2, 2).value_or(0)) * 60 + digits(at, 4, 2).value_or(0) + fraction +
+         image.frame_offset_s;
+}
+
+std::string imager_label(const RtImage& image) { return image.label.substr(0, image.label.rfind('#')); }
 
 RtImage with_switches(RtImage image, const RtImageSwitches& switches, Notes& notes, const std::string& origin) {
   const auto by = [&](const std::string& flag) { return origin.empty() ? flag : origin + ", as by " + flag; };

@@ -47,6 +47,7 @@ struct RtImage {
   std::optional<int> beam_number;
   std::optional<std::string> acquisition_date;
   std::optional<std::string> acquisition_time;  // AcquisitionTime, else ContentTime
+  double frame_offset_s = 0.0;                  // of a later frame, from the first one
   std::optional<double> kvp;
 
   std::optional<std::string> plane;
@@ -111,6 +112,13 @@ std::vector<Finding> rt_image_findings(const RtImage& image);
 
 // The beam quality: KVP above 1000 is MV; without KVP by image type (PORTAL is MV), with a warning.
 Beam beam_of(const RtImage& image, Notes& notes);
+
+// When it was taken: seconds since an epoch, with fractions and, of frames of one file, their own times (FrameTime,
+// FrameTimeVector); nothing where date or time is absent or malformed.
+std::optional<double> acquisition_seconds(const RtImage& image);
+
+// The label without the number of its frame.
+std::string imager_label(const RtImage& image);
 
 // Table read-outs at imaging, each from the first image that has it. Warns of angles that none has, taken as 0.
 TableAngles table_angles(std::span<const RtImage> images, Notes& notes);

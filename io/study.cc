@@ -5,9 +5,8 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
-#include <chrono>
 #include <cmath>
+#include <set>
 #include <tuple>
 
 #include "geometry/error.h"
@@ -19,26 +18,6 @@ namespace {
 constexpr double kMaxTimeSpanS = 600.0;
 constexpr double kMaxTableMoveMm = 0.5;
 constexpr double kMaxTableTurnDeg = 0.1;
-
-// Seconds since an epoch from DA and TM ("20260301", "101500.25"); nothing where either is absent or malformed.
-std::optional<double> seconds_of(const RtImage& image) {
-  if (!image.acquisition_date || !image.acquisition_time) return std::nullopt;
-  const auto digits = [](std::string_view text, std::size_t begin, std::size_t count) -> std::optional<int> {
-    int value = 0;
-    if (text.size() < begin + count) return std::nullopt;
-    const auto [end, error] = std::from_chars(text.data() + begin, text.data() + begin + count, value);
-    return error == std::errc() && end == text.data() + begin + count ? std::optional(value) : std::nullopt;
-  };
-  const auto year = digits(*image.acquisition_date, 0, 4), month = digits(*image.acquisition_date, 4, 2),
-             day = digits(*image.acquisition_date, 6, 2), hour = digits(*image.acquisition_time, 0, 2);
-  if (!year || !month || !day || !hour) return std::nullopt;
-  const std::chrono::year_month_day date(std::chrono::year(*year), std::chrono::month(static_cast<unsigned>(*month)),
-                                         std::chrono::day(static_cast<unsigned>(*day)));
-  const int minute = digits(*image.acquisition_time, 2, 2).value_or(0);
-  const int second = digits(*image.acquisition_time, 4, 2).value_or(0);
-  const double days = static_cast<double>(std::chrono::sys_days(date).time_since_epoch().count());
-  return ((days * 24 + *hour) * 60 + minute) * 60 + second;
-}
 
 // Empty components at the end of a name may be written or not (PS3.5 6.2.1.1).
 std::string without_trailing_carets(std::string name) {
@@ -138,7 +117,7 @@ std::vector<Finding> session_findings(const Study& study, Notes& notes) {
                                              image.label, described(tag)));
   };
 
-  compare(DCM_AcquisitionTime, seconds_of,
+  compare(DCM_AcquisitionTime, acquisition_seconds,
           [](const RtImage& image, double at_s, const RtImage& first, double first_s) -> std::optional<Finding> {
             if (std::abs(at_s - first_s) <= kMaxTimeSpanS) return std::nullopt;
             return Finding{"time-span", fmt::format("{}: taken {:.0f} minutes from {}, expected at most 10 ({})",
@@ -225,6 +204,13 @@ void drop_repeated_images(std::vector<RtImage>& images, Notes& notes) {
   }
 }
 
+// Frames of one imager have one label but for the number behind it.
+void keep_earliest_of_each_imager(std::vector<RtImage>& images) {
+  std::ranges::stable_sort(images, {}, &acquisition_seconds);
+  std::set<std::string> seen;
+  std::erase_if(images, [&](const RtImage& image) { return !seen.insert(imager_label(image)).second; });
+}
+
 void check_labels(const RtImageSwitches& switches, const std::vector<RtImage>& images) {
   for (const auto& [label, angle_deg] : switches.gantry_angle_deg)
     if (const auto count = std::ranges::count(images, label, &RtImage::label); count != 1)
@@ -308,12 +294,13 @@ Study load_study(const StudyRequest& request, Notes& notes, const Progress& prog
     std::ranges::move(read_rt_images(path, notes), std::back_inserter(study.rt_images));
   if (study.rt_images.empty()) throw Error("no frame of the X-rays has a geometry");
   drop_repeated_images(study.rt_images, notes);
+  if (request.one_per_imager) keep_earliest_of_each_imager(study.rt_images);
   check_labels(request.switches, study.rt_images);
   for (RtImage& image : study.rt_images) {
     if (request.machine) image = with_machine(image, *request.machine, request.switches, notes);
     image = with_switches(image, request.switches, notes);
   }
-  std::ranges::stable_sort(study.rt_images, {}, [](const RtImage& image) { return seconds_of(image); });
+  std::ranges::stable_sort(study.rt_images, {}, [](const RtImage& image) { return acquisition_seconds(image); });
 
   // A patient position that only the plan has.
   std::vector<RtPlan::Beam> beams;

@@ -23,6 +23,7 @@ struct StudyRequest {
   RtImageSwitches switches;
   std::optional<MachineProfile> machine;
   Allowances allowed;
+  bool one_per_imager = false;  // of X-rays with one label only the earliest: those of a moving target come later
 };
 
 struct Study {

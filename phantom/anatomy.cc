@@ -153,4 +153,58 @@ std::vector<Shape> spine_phantom(const Vector3d& center_patient_mm, std::uint64_
   return body.take();
 }
 
+// The target lies at 0 when it is not displaced; the middle of the body 65 mm to the left of it.
+std::vector<Shape> thorax_phantom(const Vector3d& target_patient_mm, std::uint64_t seed,
+                                  const Vector3d& displacement_mm) {
+  Body body(target_patient_mm, seed);
+  constexpr double kMiddle = 65.0, kLungAir = 0.72;
+  const Material lung{.water = -kLungAir, .bone = 0.0}, in_lung{.water = kLungAir, .bone = 0.0};
+  body.add(Kind::kCylinder, {kMiddle, 10, 0}, {165, 112, 125}, kTissue);
+  for (const double side : {-1.0, 1.0})
+    body.add(Kind::kEllipsoid, {kMiddle + side * body.vary(68, 0.03), body.vary(5, 0.5), 25}, {55, 82, 105}, lung);
+  body.add(Kind::kEllipsoid, {kMiddle + 35, -25, 5}, {40, 42, 50}, in_lung);  // heart
+
+  // The diaphragm's dome goes down with the target, and vessels near the target go with it.
+  body.add(Kind::kEllipsoid, Vector3d(kMiddle - 68, 5, -95) + Vector3d(0, 0, displacement_mm.z()), {50, 70, 42},
+           in_lung);
+  body.add(Kind::kEllipsoid, Vector3d(kMiddle + 68, 5, -100) + Vector3d(0, 0, displacement_mm.z()), {48, 66, 40},
+           in_lung);
+  body.add(Kind::kEllipsoid, displacement_mm, {kTargetRadiusMm, 0.9 * kTargetRadiusMm, 0.8 * kTargetRadiusMm}, in_lung);
+  body.add(Kind::kEllipsoid, displacement_mm + Vector3d(6, 4, 5), {9, 7, 8}, in_lung);
+  for (int n = 0; n < 5; ++n) {
+    const Vector3d at = body.near({0, 0, 0}, 9.0);
+    body.add(Kind::kEllipsoid, displacement_mm + at, {1.8, 1.8, 1.8}, bone_in_tissue(0.8));
+  }
+  for (int n = 0; n < 14; ++n) {
+    const Vector3d at = body.near({-5, 5, 15}, 45.0);
+    body.add(Kind::kEllipsoid, at + body.vary(0.7, 0.3) * displacement_mm, {3, 3, body.vary(14, 0.5)}, in_lung,
+             tilt(body.vary(30, 1.0), body.vary(40, 1.0)));
+  }
+
+  for (int n = -3; n <= 3; ++n) {  // spine
+    const Vector3d at(kMiddle, 70, 28.0 * n);
+    body.add(Kind::kCylinder, at, {17, 14, 11}, bone_in_tissue(0.28));
+    body.add_grains(5, at, {13, 11, 9}, false);
+    body.add(Kind::kBox, at + Vector3d(0, 32, -6), {3, 12, 9}, bone_in_tissue(0.45), tilt(20));
+    for (const double side : {-1.0, 1.0})
+      body.add(Kind::kBox, at + Vector3d(side * 25, 18, 0), {12, 4, 5}, bone_in_tissue(0.4), tilt(0, side * 15));
+  }
+  // Ribs: pieces along ellipses that come forward and down; their front follows the breath a little.
+  constexpr int kPieces = 9;
+  for (int rib = -3; rib <= 3; ++rib)
+    for (const double side : {-1.0, 1.0})
+      for (int piece = 0; piece < kPieces; ++piece) {
+        const double share = (piece + 0.5) / kPieces;  // from the back to the front
+        const double angle = std::numbers::pi * (0.5 - 0.92 * share);
+        const Vector3d at(kMiddle + side * 138 * std::cos(angle), 8 + 92 * std::sin(angle),
+                          30.0 * rib + 20 - 45 * share);
+        const Vector3d moved(side * 0.3 * displacement_mm.y() * share, 0.6 * displacement_mm.y() * share,
+                             -0.15 * displacement_mm.z() * share);
+        const double along_deg =
+            std::atan2(92 * std::cos(angle), -side * 138 * std::sin(angle)) * 180.0 / std::numbers::pi;
+        body.add(Kind::kEllipsoid, at + moved, {26, 4, 6.5}, bone_in_tissue(0.5), tilt(0, along_deg));
+      }
+  return body.take();
+}
+
 }  // namespace isoshift

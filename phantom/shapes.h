@@ -45,4 +45,9 @@ Volume<float> ct_of_shapes(const std::vector<Shape>& shapes, const Eigen::Vector
 std::vector<Shape> head_phantom(const Eigen::Vector3d& center_patient_mm, std::uint64_t seed);
 std::vector<Shape> spine_phantom(const Eigen::Vector3d& center_patient_mm, std::uint64_t seed);
 
+// A thorax about a target in the right lung, which breathing has displaced; diaphragm and ribs move with it.
+inline constexpr double kTargetRadiusMm = 13.0;
+std::vector<Shape> thorax_phantom(const Eigen::Vector3d& target_patient_mm, std::uint64_t seed,
+                                  const Eigen::Vector3d& displacement_mm);
+
 }  // namespace isoshift

@@ -7,12 +7,13 @@
 #include <vector>
 
 #include "io/ct_series.h"
+#include "phantom/breathing.h"
 #include "phantom/xray_simulation.h"
 
 namespace isoshift {
 
 struct PhantomOptions {
-  enum class Anatomy { kHead, kSpine };
+  enum class Anatomy { kHead, kSpine, kThorax };
   Anatomy anatomy = Anatomy::kHead;
   Placement placement;                                  // how the patient lies, set-up error included
   std::vector<double> gantry_angles_deg = {0.0, 90.0};  // one X-ray each
@@ -21,15 +22,20 @@ struct PhantomOptions {
   double voxel_mm = 1.0;                                // of the CT, in plane; slices are 1.5 times as thick
   int image_pixels = 512;                               // along each edge; the panel is 410 mm wide
   double photons = 20000.0;                             // per open pixel; fewer mean more noise
+  std::vector<double> megavoltage_angles_deg;           // of those gantry angles, the ones taken with 6 MV
+  BreathingOptions breathing;                           // of a thorax
   std::uint64_t seed = 1;                               // of anatomy, noise and UIDs
 
   // Throws UsageError naming the field and its value.
   void check() const;
 };
 
-std::vector<Shape> phantom_shapes(const PhantomOptions& options);
+std::vector<Shape> phantom_shapes(const PhantomOptions& options,
+                                  const Eigen::Vector3d& target_displacement_mm = Eigen::Vector3d::Zero());
 
-// Fills an existing folder: CT/, RTIMAGE/, RTPLAN.dcm, truth.json.
+// Fills an existing folder: CT/, RTIMAGE/, RTPLAN.dcm, truth.json; of a thorax also RTSTRUCT.dcm with its target. One
+// that breathes has PHASES/00/, 01/, ..., RT Images of every imager at every moment, and truth.csv: where the target
+// was, mm from where it was planned, IEC 61217 fixed.
 void write_phantom_study(const PhantomOptions& options, const std::filesystem::path& folder, const Progress& progress);
 
 }  // namespace isoshift

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <numbers>
 #include <random>
+#include <span>
 
 #include "geometry/error.h"
 
@@ -27,6 +28,13 @@ constexpr std::array<EnergyBin, 6> kSpectrum = {{
     {0.22, 0.02059, 0.06044},  // 60 keV
     {0.16, 0.01837, 0.04280},  // 80 keV
     {0.09, 0.01707, 0.03562},  // 100 keV
+}};
+
+// 6 MV behind its flattening filter, likewise.
+constexpr std::array<EnergyBin, 3> kMegavoltage = {{
+    {0.35, 0.00707, 0.01257},  // 1 MeV
+    {0.40, 0.00494, 0.00886},  // 2 MeV
+    {0.25, 0.00340, 0.00640},  // 4 MeV
 }};
 
 constexpr double kFocalSpotMm = 0.6;
@@ -69,8 +77,8 @@ Eigen::Matrix3d couch_turn(double angle_deg) {
   return turn;
 }
 
-double primary_intensity(const std::vector<Shape>& shapes, const Eigen::Vector3d& source_patient_mm,
-                         const Eigen::Vector3d& pixel_patient_mm) {
+double primary_intensity(const std::vector<Shape>& shapes, std::span<const EnergyBin> spectrum,
+                         const Eigen::Vector3d& source_patient_mm, const Eigen::Vector3d& pixel_patient_mm) {
   double water_mm = 0.0, bone_mm = 0.0;
   for (const Shape& shape : shapes) {
     const double chord_mm = shape.chord_mm(source_patient_mm, pixel_patient_mm);
@@ -78,7 +86,7 @@ double primary_intensity(const std::vector<Shape>& shapes, const Eigen::Vector3d
     bone_mm += chord_mm * shape.added.bone;
   }
   double intensity = 0.0;
-  for (const EnergyBin& bin : kSpectrum)
+  for (const EnergyBin& bin : spectrum)
     intensity += bin.share * std::exp(-bin.water_per_mm * water_mm - bin.bone_per_mm * bone_mm);
   return intensity;
 }
@@ -175,11 +183,13 @@ Image<float> simulate_xray(const std::vector<Shape>& shapes, const Placement& pl
                                      Eigen::Vector3d(0.0, kFocalSpotMm * kSpotOffsets[n][1], 0.0));
 
   Image<float> intensity(imager.pixels, imager.pixels);
+  const std::span<const EnergyBin> spectrum =
+      imager.is_megavoltage ? std::span<const EnergyBin>(kMegavoltage) : std::span<const EnergyBin>(kSpectrum);
   tbb::parallel_for(0, imager.pixels, [&](int row) {
     for (int column = 0; column < imager.pixels; ++column) {
       double sum = 0.0;
       for (int n = 0; n < 4; ++n)
-        sum += primary_intensity(shapes, sources_patient[n],
+        sum += primary_intensity(shapes, spectrum, sources_patient[n],
                                  placement.patient_from_fixed(
                                      imager.pixel_fixed_mm(column + kPixelOffsets[n][0], row + kPixelOffsets[n][1])));
       intensity.at(column, row) = static_cast<float>(0.25 * sum);

@@ -37,6 +37,7 @@ struct Imager {
   double pixel_mm = 0.8;            // on the panel
   double receptor_angle_deg = 0.0;  // the panel's turn about the central ray, counter-clockwise seen from the source
   double scatter_share = 0.12;      // of the primary beam, reaching the panel blurred
+  bool is_megavoltage = false;      // 6 MV instead of 120 kVp
 
   Eigen::Vector3d source_fixed_mm() const;
   // Center of a pixel; column 0 at the left and row 0 at the top, seen from the source with the gantry at the top.

@@ -1,0 +1,57 @@
+#pragma once
+// X-rays of a moving target in the order in which they were taken, from files that are there or still arrive.
+
+#include <deque>
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "cli/study_options.h"
+#include "io/study.h"
+
+namespace isoshift {
+
+struct TimedXray {
+  RtImage header;
+  double time_s = 0.0;  // since an epoch
+};
+
+// What became of the files.
+struct StreamCounts {
+  std::size_t repeated = 0;  // an instance that was there before
+  std::size_t late = 0;      // taken before a moment that was processed already
+  std::size_t broken = 0;    // cannot be read, or is of another patient
+};
+
+class XrayStream {
+ public:
+  XrayStream(const StudyRequest& request, const Study& study) : request_(request), study_(study) {}
+
+  // Takes what can be read of the files; those that cannot, yet, are tried again by the next calls and given up after
+  // `tries`. Each warning is said once.
+  void offer(const std::vector<std::filesystem::path>& files, int tries, Notes& notes);
+
+  // The X-rays of the earliest moment, those of all imagers within `together_s`; nothing where none waits.
+  // `may_be_incomplete`: also where another imager's X-ray of that moment may still come.
+  std::vector<TimedXray> next_moment(double together_s, std::size_t imagers, bool may_be_incomplete);
+
+  const StreamCounts& counts() const { return counts_; }
+  std::size_t waiting() const { return waiting_.size(); }
+
+ private:
+  void take(RtImage header, Notes& notes);
+
+  StudyRequest request_;
+  const Study& study_;
+  std::deque<TimedXray> waiting_;  // by time
+  std::set<std::string> seen_instances_;
+  std::set<std::filesystem::path> taken_files_;
+  std::map<std::filesystem::path, int> failures_;
+  std::optional<double> processed_until_s_;
+  StreamCounts counts_;
+};
+
+}  // namespace isoshift

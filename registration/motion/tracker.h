@@ -1,0 +1,83 @@
+#pragma once
+// Follows a target from X-ray to X-ray: every moment is registered from where the filter expects the target, and
+// corrects the filter.
+
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "drr/renderer_pyramid.h"
+#include "registration/motion/kalman.h"
+#include "registration/motion/predictor.h"
+#include "registration/region.h"
+#include "registration/search.h"
+
+namespace isoshift {
+
+struct TrackingOptions {
+  Dof dof = Dof::kTranslation;
+  double box_mm = 12.0;               // the search box about the expected position
+  double box_rad = 0.05;              // the same for rotations
+  double first_reach_mm = 25.0;       // about the planned position, until the target is found, and after it is lost
+  double pixel_mm = 1.0;              // at the isocenter
+  double measurement_sigma_mm = 0.3;  // of a registration, per axis that is seen
+  double lost_share = 0.6;            // of the usual similarity: less is no measurement
+  double latency_s = 0.3;             // from an X-ray to the beam
+  PredictorKind predictor = PredictorKind::kRls;
+  PredictorOptions predictor_options;
+  std::uint64_t seed = 1;
+};
+
+enum class FrameStatus {
+  kMeasured,  // in all directions
+  kPartly,    // along the view's direction nothing was seen: the filter carries that
+  kBridged,   // the registration failed: the filter carries all
+};
+std::string_view to_string(FrameStatus status);
+
+// Positions are displacements of the target from where it was planned, mm, IEC 61217 fixed.
+struct TrackedFrame {
+  double time_s = 0.0;
+  FrameStatus status = FrameStatus::kBridged;
+  std::optional<Eigen::Vector3d> measured_mm;  // components along an unseen direction are the filter's
+  Eigen::Vector3d filtered_mm = Eigen::Vector3d::Zero();
+  Eigen::Vector3d predicted_mm = Eigen::Vector3d::Zero();  // for one latency later
+  Eigen::Vector3d sigma_mm = Eigen::Vector3d::Zero();      // of filtered_mm, one standard deviation
+  bool is_warm = false;                                    // the predictor has seen enough
+  double similarity = 0.0;
+  Eigen::Isometry3d actual_room_from_patient = Eigen::Isometry3d::Identity();
+};
+
+class Tracker {
+ public:
+  // Renderers and region are borrowed. The target is a point of the patient.
+  Tracker(const RendererPyramid& renderers, const ProjectedRegion& region,
+          const Eigen::Isometry3d& planned_room_from_patient, const Eigen::Vector3d& target_patient_mm,
+          TrackingOptions options);
+
+  // The views of one moment, one or more; later than all before. Throws UsageError for a time that does not advance.
+  TrackedFrame track(double time_s, std::vector<FixedImage> views);
+
+ private:
+  struct Found {
+    Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
+    double similarity = 0.0;
+    bool at_bound = false;
+  };
+  std::optional<Found> find(const FixedViews& views, const Eigen::Vector3d& expected_mm) const;
+  bool is_lost(const Found& found) const;
+
+  const RendererPyramid& renderers_;
+  const ProjectedRegion& region_;
+  Eigen::Isometry3d planned_;
+  Eigen::Vector3d target_patient_mm_;
+  TrackingOptions options_;
+  ConstantVelocityKalman filter_;
+  std::unique_ptr<Predictor> predictor_;
+  Eigen::Isometry3d rotation_about_target_ = Eigen::Isometry3d::Identity();  // of the last pose, for six DOF
+  std::vector<double> similarities_;                                         // of the last good ones
+  std::optional<double> last_time_s_;
+  int lost_in_a_row_ = 0;
+};
+
+}  // namespace isoshift
