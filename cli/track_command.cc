@@ -77,7 +77,8 @@ std::optional<Eigen::Vector3d> truth_at(const std::vector<MotionSample>& truth, 
 }
 
 struct TruthErrors {
-  Errors measured, predicted, held;  // held: the last measurement, one latency later
+  Errors measured;         // in the directions that were seen
+  Errors predicted, held;  // held: the last measurement, one latency later
 };
 
 // Over the second half of the time: the filters have learned by then.
@@ -87,7 +88,11 @@ TruthErrors beside_truth(const std::vector<TraceRow>& rows, const std::vector<Mo
   for (const TraceRow& row : rows) {
     if (row.frame.time_s < from_s) continue;
     const auto now = truth_at(truth, row.frame.time_s), later = truth_at(truth, row.frame.time_s + latency_s);
-    if (now && row.frame.measured_mm) measured.push_back((*row.frame.measured_mm - *now).norm());
+    if (now && row.frame.measured_mm) {
+      Eigen::Vector3d error_mm = *row.frame.measured_mm - *now;
+      for (const Eigen::Vector3d& direction : row.frame.unseen_room) error_mm -= direction.dot(error_mm) * direction;
+      measured.push_back(error_mm.norm());
+    }
     if (!later) continue;
     predicted.push_back((row.frame.predicted_mm - *later).norm());
     held.push_back((row.frame.measured_mm.value_or(row.frame.filtered_mm) - *later).norm());
@@ -192,9 +197,11 @@ class TrackRun {
     OutputFolder output(options_.output, options_.overwrite);
     std::vector<MotionSample> truth;
     if (!options_.truth.empty()) truth = read_motion_trace(options_.truth, notes_);
-    StudyRequest request = options_.study.request();
+    StudyOptions parts = options_.study;
+    if (!options_.follow.empty()) parts.images = {options_.follow};
+    StudyRequest request = parts.request();
     request.one_per_imager = true;
-    if (!options_.follow.empty()) wait_for_first(request);
+    if (!options_.follow.empty()) wait_for_first();
     const Study study = load_study(request, notes_, {});
     for (const std::string& warning : notes_.warnings) console_.err << "warning: " << warning << "\n";
     notes_.warnings.clear();
@@ -223,7 +230,9 @@ class TrackRun {
   }
 
   // X-rays must be there before anything can be checked: those of the first moment.
-  void wait_for_first(StudyRequest& request) {
+  void wait_for_first() {
+    if (!std::filesystem::is_directory(options_.follow))
+      throw Error(fmt::format("{}: is no folder", options_.follow.string()));
     console_.err << "waiting for X-rays in " << options_.follow.string() << "\n";
     const auto begin = Clock::now();
     for (;;) {
@@ -235,7 +244,6 @@ class TrackRun {
         throw Error(fmt::format("{}: no X-ray came", options_.follow.string()));
       std::this_thread::sleep_for(std::chrono::milliseconds(50));
     }
-    request.parts.images = {options_.follow};
   }
 
   void follow(Tracker& tracker, XrayStream& stream, const StudyRequest& request, const Study& study) {

@@ -59,7 +59,7 @@ struct PredictorOptions {
   double latency_s = 0.3;  // kRls learns to predict over this time; more is not extrapolated
 
   // kKalman: white acceleration noise, mm^2/s^3. Against a measurement noise of 0.3 mm.
-  double acceleration_noise = 500.0;
+  double acceleration_noise = 400.0;
 
   // kRls.
   int taps = 5;                // positions looked back at

@@ -48,7 +48,8 @@ Tracker::Tracker(const RendererPyramid& renderers, const ProjectedRegion& region
   predictor_ = make_predictor(options_.predictor, of_predictor);
 }
 
-std::optional<Tracker::Found> Tracker::find(const FixedViews& views, const Eigen::Vector3d& expected_mm) const {
+std::optional<Tracker::Found> Tracker::find(const FixedViews& views, const Eigen::Vector3d& expected_mm,
+                                            const std::vector<Eigen::Vector3d>& unseen) const {
   const bool is_first = similarities_.empty() || lost_in_a_row_ >= kLostMoments;
   const Stage fine{.name = "track",
                    .similarity = SimilarityKind::kGradientCorrelation,
@@ -78,10 +79,11 @@ std::optional<Tracker::Found> Tracker::find(const FixedViews& views, const Eigen
   if (!result) return std::nullopt;
   Found found{.pose = setup_error_from_parameters(result->parameters) * start,
               .similarity = result->stages.back().value};
+  // Along an unseen direction the search may end anywhere.
   constexpr double kAtBound = 0.98;
-  for (int axis = 0; axis < 3; ++axis)
-    found.at_bound =
-        found.at_bound || std::abs(result->parameters[static_cast<std::size_t>(axis)]) > kAtBound * bound_mm;
+  Eigen::Vector3d moved_mm(result->parameters.data());
+  for (const Eigen::Vector3d& direction : unseen) moved_mm -= direction.dot(moved_mm) * direction;
+  found.at_bound = moved_mm.cwiseAbs().maxCoeff() > kAtBound * bound_mm;
   return found;
 }
 
@@ -101,8 +103,8 @@ TrackedFrame Tracker::track(double time_s, std::vector<FixedImage> views) {
   Eigen::Vector3d expected_mm = Eigen::Vector3d::Zero();
   if (is_known && !is_sought) expected_mm = filter_.predict(time_s).position_mm;
 
-  TrackedFrame frame{.time_s = time_s};
-  const std::optional<Found> found = find({.images = std::move(views), .region = region_}, expected_mm);
+  TrackedFrame frame{.time_s = time_s, .unseen_room = unseen};
+  const std::optional<Found> found = find({.images = std::move(views), .region = region_}, expected_mm, unseen);
   if (found && !is_lost(*found)) {
     frame.similarity = found->similarity;
     frame.status = unseen.empty() ? FrameStatus::kMeasured : FrameStatus::kPartly;

@@ -44,6 +44,7 @@ struct TrackedFrame {
   Eigen::Vector3d predicted_mm = Eigen::Vector3d::Zero();  // for one latency later
   Eigen::Vector3d sigma_mm = Eigen::Vector3d::Zero();      // of filtered_mm, one standard deviation
   bool is_warm = false;                                    // the predictor has seen enough
+  std::vector<Eigen::Vector3d> unseen_room;                // unit directions along which the views cannot tell
   double similarity = 0.0;
   Eigen::Isometry3d actual_room_from_patient = Eigen::Isometry3d::Identity();
 };
@@ -64,7 +65,8 @@ class Tracker {
     double similarity = 0.0;
     bool at_bound = false;
   };
-  std::optional<Found> find(const FixedViews& views, const Eigen::Vector3d& expected_mm) const;
+  std::optional<Found> find(const FixedViews& views, const Eigen::Vector3d& expected_mm,
+                            const std::vector<Eigen::Vector3d>& unseen) const;
   bool is_lost(const Found& found) const;
 
   const RendererPyramid& renderers_;

@@ -1,0 +1,165 @@
+// A phantom that breathes, followed.
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <thread>
+
+#include "tests/support/small_study.h"
+
+namespace isoshift {
+namespace {
+
+using testing::HasSubstr;
+
+class TrackCommandTest : public testing::Test {
+ protected:
+  static constexpr int kMoments = 40;
+
+  static void SetUpTestSuite() {
+    folder_ = new TemporaryFolder;
+    const CommandOutcome made =
+        run_command({"phantom", "-o", study().string(), "--anatomy", "thorax", "--breathing", "8", "--voxel-mm", "2.5",
+                     "--image-pixels", "192", "--phases", "4", "--translation", "1,-2,1", "--rotation", "0,0,0"});
+    ASSERT_EQ(made.exit_status, 0) << made.err;
+  }
+  static void TearDownTestSuite() { delete folder_; }
+  static std::filesystem::path study() { return *folder_ / "study"; }
+
+  // Runs track on the study, or on what else is named, and returns track.json.
+  nlohmann::json track(const std::vector<std::string>& more, bool whole_study = true) {
+    std::vector<std::string> arguments = {"track",       "-o",     output().string(), "--overwrite",
+                                          "--structure", "Target", "--json"};
+    if (whole_study) arguments.push_back(study().string());
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    outcome_ = run_command(arguments);
+    EXPECT_EQ(outcome_.exit_status, 0) << outcome_.err;
+    return outcome_.exit_status == 0 ? nlohmann::json::parse(outcome_.out) : nlohmann::json();
+  }
+  static std::vector<std::string> parts() {
+    return {"--ct",         (study() / "CT").string(),          "--plan", (study() / "RTPLAN.dcm").string(),
+            "--structures", (study() / "RTSTRUCT.dcm").string()};
+  }
+  static std::filesystem::path xray(int imager, int moment) {
+    return study() / "RTIMAGE" / fmt::format("KV_G{:03}_{:05}.dcm", imager, moment);
+  }
+  std::filesystem::path output() const { return own_ / "track"; }
+
+  static TemporaryFolder* folder_;
+  TemporaryFolder own_;
+  CommandOutcome outcome_;
+};
+TemporaryFolder* TrackCommandTest::folder_ = nullptr;
+
+TEST_F(TrackCommandTest, FollowsTheTargetAndPredictsIt) {
+  const auto json = track({"--truth", (study() / "truth.csv").string(), "--predictor", "kalman", "--tolerance", "5"});
+  EXPECT_EQ(json["frames"], kMoments);
+  EXPECT_EQ(json["status"]["measured"], kMoments);
+  const auto& errors = json["beside_truth"];
+  EXPECT_LT(errors["measured"]["median_mm"], 0.6);  // voxels of 2.5 x 2.5 x 3.75 mm
+  EXPECT_LT(errors["predicted"]["rmse_mm"].get<double>(), 0.9 * errors["hold_last"]["rmse_mm"].get<double>());
+  EXPECT_FALSE(json["beam_holds_s"].empty());
+  for (const char* name : {"trace.csv", "track.json", "trace.svg"})
+    EXPECT_TRUE(std::filesystem::exists(output() / name));
+  // Its trace is one for predict.
+  EXPECT_EQ(run_command({"predict", (output() / "trace.csv").string(), "--train-s", "4", "--rate", "5"}).exit_status,
+            0);
+}
+
+TEST_F(TrackCommandTest, ThePhasesOfThe4dCtTeachTheModel) {
+  std::vector<std::string> more = {"--predictor", "model", "--phases"};
+  for (int phase = 0; phase < 4; ++phase) more.push_back((study() / "PHASES" / fmt::format("{:02}", phase)).string());
+  EXPECT_EQ(track(more)["predictor"], "model");
+  EXPECT_EQ(run_command({"track", study().string(), "-o", output().string(), "--phases", "x"}).exit_status, 2);
+}
+
+// One imager: its two axes as good, the third flagged and uncertain.
+TEST_F(TrackCommandTest, OneImagerSeesTwoAxes) {
+  std::vector<std::string> more = parts();
+  more.insert(more.end(), {"--truth", (study() / "truth.csv").string(), "--image"});
+  for (int n = 1; n <= kMoments; ++n) more.push_back(xray(0, n).string());
+  const auto json = track(more, false);
+  EXPECT_EQ(json["imagers"], 1);
+  EXPECT_EQ(json["status"]["partly"], kMoments);
+  EXPECT_LT(json["beside_truth"]["measured"]["median_mm"], 0.6);
+  std::ifstream trace(output() / "trace.csv");
+  std::string line;
+  for (int n = 0; n < 30; ++n) std::getline(trace, line);
+  const auto cell = [&](int column) {
+    std::size_t at = 0;
+    for (int n = 0; n < column; ++n) at = line.find(',', at) + 1;
+    return std::stod(line.substr(at));
+  };
+  EXPECT_LT(cell(10), 1.0);   // sigma along x, which gantry 0 sees
+  EXPECT_GT(cell(12), 20.0);  // and along z, which it does not
+}
+
+// Imagers that take turns: every X-ray is a moment of its own.
+TEST_F(TrackCommandTest, ImagersMayTakeTurns) {
+  std::vector<std::string> more = parts();
+  more.insert(more.end(), {"--truth", (study() / "truth.csv").string(), "--predictor", "kalman", "--image"});
+  for (int n = 1; n <= kMoments; ++n) more.push_back(xray(n % 2 == 0 ? 0 : 90, n).string());
+  const auto json = track(more, false);
+  EXPECT_EQ(json["imagers"], 2);
+  EXPECT_EQ(json["status"]["partly"], kMoments);
+  // The lateral X-rays look through 350 mm of body, and no second view helps them.
+  EXPECT_LT(json["beside_truth"]["measured"]["median_mm"], 1.2);
+}
+
+// A folder that is being filled: late, repeated and broken files do not stop it.
+TEST_F(TrackCommandTest, FollowsAFolderThatIsBeingFilled) {
+  const std::filesystem::path incoming = own_ / "incoming";
+  std::filesystem::create_directories(incoming);
+  const auto send = [&](int moment, const std::string& as = "") {
+    for (const int imager : {0, 90})
+      std::filesystem::copy_file(xray(imager, moment), incoming / fmt::format("{}{}_{}.dcm", as, imager, moment));
+  };
+  send(1);
+  std::jthread sender([&] {
+    for (int moment = 2; moment <= 20; ++moment) {
+      if (moment == 10) continue;
+      std::this_thread::sleep_for(std::chrono::milliseconds(30));
+      send(moment);
+    }
+    send(5, "again");
+    std::ofstream(incoming / "broken.dcm") << "no DICOM";
+    std::this_thread::sleep_for(std::chrono::milliseconds(1500));
+    send(10);  // too late
+  });
+  std::vector<std::string> more = parts();
+  more.insert(more.end(), {"--follow", incoming.string(), "--idle", "3", "--predictor", "kalman"});
+  const auto json = track(more, false);
+  EXPECT_EQ(json["frames"], 19);
+  EXPECT_EQ(json["files"]["repeated"], 2);
+  EXPECT_EQ(json["files"]["late"], 2);
+  EXPECT_EQ(json["files"]["broken"], 1);
+  EXPECT_THAT(outcome_.err, HasSubstr("broken.dcm"));
+  EXPECT_THAT(outcome_.err, HasSubstr("came after a later one had been processed"));
+}
+
+// The target is lost where its region shows something else: the filter bridges, and says so.
+TEST_F(TrackCommandTest, AMomentWithoutTheTargetIsBridged) {
+  std::vector<std::string> more = parts();
+  more.insert(more.end(), {"--image"});
+  for (int n = 1; n <= 12; ++n)
+    for (const int imager : {0, 90}) {
+      const std::filesystem::path copy = own_ / fmt::format("{}_{}.dcm", imager, n);
+      std::filesystem::copy_file(xray(imager, n), copy);
+      if (n == 9)  // a beam that was off
+        edit(copy, [](DicomItem d) {
+          std::vector<std::uint16_t> noise(192 * 192);
+          for (std::size_t i = 0; i < noise.size(); ++i) noise[i] = static_cast<std::uint16_t>(400 + (i * 7919) % 97);
+          d.put_pixels(noise);
+        });
+      more.push_back(copy.string());
+    }
+  const auto json = track(more, false);
+  EXPECT_EQ(json["status"]["measured"], 11);
+  EXPECT_EQ(json["status"]["bridged"].get<int>() + json["files"]["broken"].get<int>() / 2, 1);
+}
+
+}  // namespace
+}  // namespace isoshift
