@@ -66,7 +66,9 @@ Scores scores_of(const PredictOptions& options, Console& console) {
   Notes notes;
   for (const std::filesystem::path& path : options.traces) {
     traces.push_back(read_motion_trace(path, notes));
-    scores.names.push_back(path.stem().string());
+    const auto same_stem = [&](const std::filesystem::path& other) { return other.stem() == path.stem(); };
+    scores.names.push_back(std::ranges::count_if(options.traces, same_stem) == 1 ? path.stem().string()
+                                                                                 : path.string());
     if (traces.back().size() < 2) throw Error(fmt::format("{}: holds fewer than two positions", path.string()));
   }
   for (const std::string& warning : notes.warnings) console.err << "warning: " << warning << "\n";

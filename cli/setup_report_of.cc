@@ -6,6 +6,7 @@
 #include <chrono>
 
 #include "cli/view_pictures.h"
+#include "geometry/mask.h"
 #include "geometry/rotation.h"
 #include "io/sha256.h"
 #include "io/structure_mask.h"
@@ -89,18 +90,8 @@ std::vector<MarkedStructure> marked_structures(const Study& study, const RegionS
 }
 
 SetupReport::Point centroid_of(const MarkedStructure& structure, const Study& study) {
-  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-  double count = 0.0;
-  const Volume<std::uint8_t>& mask = structure.mask;
-  for (int k = 0; k < mask.size.z(); ++k)
-    for (int j = 0; j < mask.size.y(); ++j)
-      for (int i = 0; i < mask.size.x(); ++i)
-        if (mask.at(i, j, k) != 0) {
-          sum += Eigen::Vector3d(i, j, k);
-          ++count;
-        }
   return {.name = "centroid of " + structure.name,
-          .room_mm = study.planned_room_from_patient * (mask.patient_from_voxel * (sum / count).eval())};
+          .room_mm = study.planned_room_from_patient * centroid_patient_mm(structure.mask)};
 }
 
 }  // namespace

@@ -4,10 +4,8 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <atomic>
 #include <chrono>
 #include <cmath>
-#include <csignal>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <thread>
@@ -17,6 +15,7 @@
 #include "cli/study_options.h"
 #include "cli/xray_stream.h"
 #include "geometry/error.h"
+#include "geometry/mask.h"
 #include "io/motion_trace.h"
 #include "io/output_folder.h"
 #include "io/report/line_chart.h"
@@ -70,7 +69,8 @@ Errors errors_of(std::vector<double> distances_mm) {
 std::optional<Eigen::Vector3d> truth_at(const std::vector<MotionSample>& truth, double time_s) {
   const auto after = std::ranges::lower_bound(truth, time_s - 1e-6, {}, &MotionSample::time_s);
   if (after == truth.end()) return std::nullopt;
-  if (after == truth.begin() || std::abs(after->time_s - time_s) < 1e-6) return after->position_mm;
+  if (std::abs(after->time_s - time_s) < 1e-6) return after->position_mm;
+  if (after == truth.begin()) return std::nullopt;
   const MotionSample& before = *std::prev(after);
   const double share = (time_s - before.time_s) / (after->time_s - before.time_s);
   return before.position_mm + share * (after->position_mm - before.position_mm);
@@ -85,8 +85,10 @@ struct TruthErrors {
 TruthErrors beside_truth(const std::vector<TraceRow>& rows, const std::vector<MotionSample>& truth, double latency_s) {
   std::vector<double> measured, predicted, held;
   const double from_s = 0.5 * (rows.front().frame.time_s + rows.back().frame.time_s);
+  std::optional<Eigen::Vector3d> last_mm;
   for (const TraceRow& row : rows) {
-    if (row.frame.time_s < from_s) continue;
+    if (row.frame.measured_mm) last_mm = row.frame.measured_mm;
+    if (row.frame.time_s < from_s || !row.frame.is_known) continue;
     const auto now = truth_at(truth, row.frame.time_s), later = truth_at(truth, row.frame.time_s + latency_s);
     if (now && row.frame.measured_mm) {
       Eigen::Vector3d error_mm = *row.frame.measured_mm - *now;
@@ -95,21 +97,22 @@ TruthErrors beside_truth(const std::vector<TraceRow>& rows, const std::vector<Mo
     }
     if (!later) continue;
     predicted.push_back((row.frame.predicted_mm - *later).norm());
-    held.push_back((row.frame.measured_mm.value_or(row.frame.filtered_mm) - *later).norm());
+    held.push_back((*last_mm - *later).norm());
   }
   return {errors_of(measured), errors_of(predicted), errors_of(held)};
 }
 
-// When the beam would have to wait: the target, as predicted, farther from its plan than the tolerance.
+// When the beam would have to wait: the target, as predicted, farther from its plan than the tolerance, or lost. From
+// the moment that says so to the one that ends it.
 std::vector<std::pair<double, double>> holds_of(const std::vector<TraceRow>& rows, double tolerance_mm,
                                                 double latency_s) {
   std::vector<std::pair<double, double>> holds;
   bool is_holding = false;
   for (const TraceRow& row : rows) {
-    const bool must_hold = row.frame.predicted_mm.norm() > tolerance_mm;
+    const bool must_hold = !row.frame.is_known || row.frame.is_lost || row.frame.predicted_mm.norm() > tolerance_mm;
     const double at_s = row.frame.time_s + latency_s;
     if (must_hold && !is_holding) holds.emplace_back(at_s, at_s);
-    if (must_hold) holds.back().second = at_s;
+    if (must_hold || is_holding) holds.back().second = at_s;
     is_holding = must_hold;
   }
   return holds;
@@ -120,11 +123,14 @@ std::string trace_csv(const std::vector<TraceRow>& rows) {
       "t_s,measured_x_mm,measured_y_mm,measured_z_mm,filtered_x_mm,filtered_y_mm,filtered_z_mm,predicted_x_mm,"
       "predicted_y_mm,predicted_z_mm,sigma_x_mm,sigma_y_mm,sigma_z_mm,similarity,latency_s,status\n";
   const auto three = [](const Eigen::Vector3d& v) { return fmt::format("{:.4f},{:.4f},{:.4f}", v.x(), v.y(), v.z()); };
-  for (const TraceRow& row : rows)
-    csv += fmt::format("{:.6g},{},{},{},{},{:.5f},{:.4f},{}\n", row.frame.time_s,
-                       row.frame.measured_mm ? three(*row.frame.measured_mm) : ",,", three(row.frame.filtered_mm),
-                       three(row.frame.predicted_mm), three(row.frame.sigma_mm), row.frame.similarity, row.processing_s,
-                       to_string(row.frame.status));
+  for (const TraceRow& row : rows) {
+    const TrackedFrame& frame = row.frame;
+    const auto if_known = [&](const Eigen::Vector3d& v) { return frame.is_known ? three(v) : ",,"; };
+    csv += fmt::format("{:.4f},{},{},{},{},{:.5f},{:.4f},{}\n", frame.time_s,
+                       frame.measured_mm ? three(*frame.measured_mm) : ",,", if_known(frame.filtered_mm),
+                       if_known(frame.predicted_mm), if_known(frame.sigma_mm), frame.similarity, row.processing_s,
+                       to_string(frame.status));
+  }
   return csv;
 }
 
@@ -152,7 +158,7 @@ std::string chart_of(const std::vector<TraceRow>& rows, const std::vector<Motion
       true_one{.name = "true", .points = {}};
   for (const TraceRow& row : rows) {
     if (row.frame.measured_mm) measured.points.emplace_back(row.frame.time_s, (*row.frame.measured_mm)[axis]);
-    predicted.points.emplace_back(row.frame.time_s + latency_s, row.frame.predicted_mm[axis]);
+    if (row.frame.is_known) predicted.points.emplace_back(row.frame.time_s + latency_s, row.frame.predicted_mm[axis]);
   }
   for (const MotionSample& sample : truth) true_one.points.emplace_back(sample.time_s, sample.position_mm[axis]);
   chart.curves = {measured, predicted};
@@ -160,31 +166,15 @@ std::string chart_of(const std::vector<TraceRow>& rows, const std::vector<Motion
   return line_chart_svg(chart, 1000.0, 360.0);
 }
 
-Eigen::Vector3d centroid_patient(const Volume<std::uint8_t>& mask) {
-  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-  double count = 0.0;
-  for (int k = 0; k < mask.size.z(); ++k)
-    for (int j = 0; j < mask.size.y(); ++j)
-      for (int i = 0; i < mask.size.x(); ++i)
-        if (mask.at(i, j, k) != 0) {
-          sum += Eigen::Vector3d(i, j, k);
-          ++count;
-        }
-  return mask.patient_from_voxel * (sum / count).eval();
-}
-
-std::atomic<bool> stop_requested = false;
-
 std::vector<std::filesystem::path> files_in(const std::filesystem::path& folder) {
   std::vector<std::filesystem::path> files;
   for (const auto& entry : std::filesystem::recursive_directory_iterator(folder))
-    if (entry.is_regular_file()) files.push_back(entry.path());
+    if (entry.is_regular_file() && !entry.path().filename().string().starts_with('.')) files.push_back(entry.path());
   std::ranges::sort(files);
   return files;
 }
 
-// The target's displacement in each phase of a 4D CT, by matching the region of interest around it.
-// (Rigid: one translation per phase, found on DRRs of the two imagers.)
+// The target's displacement in each phase of a 4D CT: found as in X-rays, in DRRs of the phase from two sides.
 std::vector<Eigen::VectorXd> displacements_of_phases(const TrackOptions& options, const Study& study,
                                                      const RegistrationSetup& setup, const Eigen::Vector3d& target,
                                                      Notes& notes);
@@ -202,7 +192,7 @@ class TrackRun {
     StudyRequest request = parts.request();
     request.one_per_imager = true;
     if (!options_.follow.empty()) wait_for_first();
-    const Study study = load_study(request, notes_, {});
+    const Study study = first_study(request);
     for (const std::string& warning : notes_.warnings) console_.err << "warning: " << warning << "\n";
     notes_.warnings.clear();
     const RegistrationSetup setup(options_.flags, study);
@@ -214,9 +204,10 @@ class TrackRun {
     if (!options_.phases.empty())
       tracking.predictor_options.phases_mm = displacements_of_phases(options_, study, setup, target, notes_);
     Tracker tracker(setup.renderers(), *setup.options().region, study.planned_room_from_patient, target, tracking);
-    XrayStream stream(request, study);
-    follow(tracker, stream, request, study);
-    if (rows_.empty()) throw Error("no X-ray could be followed");
+    XrayStream stream(request, study, !options_.follow.empty());
+    follow(tracker, stream, request);
+    if (std::ranges::none_of(rows_, [](const TraceRow& row) { return row.frame.is_known; }))
+      throw Error(fmt::format("the target was not found in any of {} moments", rows_.size()));
     write(output, study, stream, truth, tracking);
     return kExitAccepted;
   }
@@ -226,7 +217,7 @@ class TrackRun {
     if (options_.flags.region.structures.empty()) return study.isocenter_patient_mm;
     if (!study.structures) throw Error("the study holds no RT Structure Set (--structures FILE names one)");
     const Structure& structure = structure_named(*study.structures, options_.flags.region.structures.front());
-    return centroid_patient(mask_of(structure, study.ct.hu.size, study.ct.hu.patient_from_voxel));
+    return centroid_patient_mm(mask_of(structure, study.ct.hu.size, study.ct.hu.patient_from_voxel));
   }
 
   // X-rays must be there before anything can be checked: those of the first moment.
@@ -240,14 +231,30 @@ class TrackRun {
         std::this_thread::sleep_for(std::chrono::milliseconds(500));  // those of the other imager, too
         break;
       }
-      if (stop_requested || Clock::now() - begin > std::chrono::duration<double>(std::max(60.0, options_.idle_s)))
+      if (Clock::now() - begin > std::chrono::duration<double>(std::max(60.0, options_.idle_s)))
         throw Error(fmt::format("{}: no X-ray came", options_.follow.string()));
       std::this_thread::sleep_for(std::chrono::milliseconds(50));
     }
   }
 
-  void follow(Tracker& tracker, XrayStream& stream, const StudyRequest& request, const Study& study) {
-    const std::size_t imagers = study.rt_images.size();
+  // In a folder that is being filled the first X-rays may be half written.
+  Study first_study(const StudyRequest& request) {
+    const auto begin = Clock::now();
+    for (;;) {
+      try {
+        Notes notes = notes_;
+        Study study = load_study(request, notes, {});
+        notes_ = notes;
+        return study;
+      } catch (const Error&) {
+        constexpr std::chrono::seconds kLongest(10);
+        if (options_.follow.empty() || Clock::now() - begin > kLongest) throw;
+        std::this_thread::sleep_for(std::chrono::milliseconds(200));
+      }
+    }
+  }
+
+  void follow(Tracker& tracker, XrayStream& stream, const StudyRequest& request) {
     const bool goes_on = !options_.follow.empty();
     const std::vector<std::filesystem::path> files =
         goes_on ? std::vector<std::filesystem::path>() : find_parts(request.parts).images;
@@ -259,18 +266,17 @@ class TrackRun {
     const std::size_t total = stream.waiting();
     auto last_news = Clock::now();
     for (;;) {
-      if (goes_on) stream.offer(files_in(options_.follow), 20, notes_);
+      if (goes_on) stream.offer(files_in(options_.follow), 100, notes_);
       say_warnings();
       const bool is_idle = Clock::now() - last_news > std::chrono::duration<double>(options_.idle_s);
-      const std::vector<TimedXray> moment =
-          stream.next_moment(options_.together_ms / 1000.0, imagers, !goes_on || is_idle || stop_requested);
+      const std::vector<TimedXray> moment = stream.next_moment(options_.together_ms / 1000.0, !goes_on || is_idle);
       if (!moment.empty()) {
-        process(tracker, moment);
+        process(tracker, moment, stream.begin_s().value());
         last_news = Clock::now();
         if (bar) bar->update(total - stream.waiting(), total);
         continue;
       }
-      if (!goes_on || is_idle || stop_requested) break;
+      if (!goes_on || is_idle) break;
       std::this_thread::sleep_for(std::chrono::milliseconds(20));
     }
     say_warnings();
@@ -281,28 +287,29 @@ class TrackRun {
     notes_.warnings.clear();
   }
 
-  void process(Tracker& tracker, const std::vector<TimedXray>& moment) {
+  void process(Tracker& tracker, const std::vector<TimedXray>& moment, double begin_s) {
     const auto begin = Clock::now();
     double time_s = 0.0;
     std::vector<FixedImage> views;
-    for (const TimedXray& xray : moment) {
+    for (const TimedXray& timed : moment) {
+      time_s += timed.time_s / static_cast<double>(moment.size());
       try {
-        if (!file_ || file_->path() != xray.header.path)
-          file_ = DicomFile::read(xray.header.path, DicomFile::Extent::kWhole);
+        if (timed.xray) {
+          views.push_back(prepare(*timed.xray));
+          continue;
+        }
+        if (!file_ || file_->path() != timed.header.path)
+          file_ = DicomFile::read(timed.header.path, DicomFile::Extent::kWhole);
         Notes said;  // the first X-rays' notes have been said
-        const XrayView view = xray_view(xray.header, beam_of(xray.header, said), said);
-        views.push_back(prepare(read_xray_image(*file_, xray.header, view)));
-        time_s += xray.time_s;
+        const XrayView view = xray_view(timed.header, beam_of(timed.header, said), said);
+        views.push_back(prepare(read_xray_image(*file_, timed.header, view)));
       } catch (const Error& error) {
         notes_.warnings.push_back(fmt::format("left out: {}", error.what()));
         ++unreadable_;
       }
     }
-    if (views.empty()) return;
-    time_s /= static_cast<double>(views.size());
-    if (!begin_s_) begin_s_ = time_s;
     TraceRow row{.views = views.size()};
-    row.frame = tracker.track(time_s - *begin_s_, std::move(views));
+    row.frame = tracker.track(time_s - begin_s, std::move(views));
     row.processing_s = std::chrono::duration<double>(Clock::now() - begin).count();
     rows_.push_back(std::move(row));
   }
@@ -391,7 +398,6 @@ class TrackRun {
   Notes notes_;
   std::vector<TraceRow> rows_;
   std::optional<DicomFile> file_;
-  std::optional<double> begin_s_;
   std::size_t unreadable_ = 0;
 };
 
@@ -494,6 +500,8 @@ void add_track_command(CLI::App& app, Console& console, int& exit_status) {
     options->flags.settle();
     if (!options->phases.empty() && options->predictor != "model")
       throw UsageError("--phases are for --predictor model");
+    if (!options->phases.empty() && options->phases.size() < 4)
+      throw UsageError(fmt::format("{} phases: a cycle needs at least 4", options->phases.size()));
     exit_status = TrackRun(*options, console).run();
   });
 }

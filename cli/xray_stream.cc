@@ -3,35 +3,67 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
+#include <iterator>
 
 #include "geometry/error.h"
 
 namespace isoshift {
 
-void XrayStream::take(RtImage header, Notes& notes) {
-  const std::string instance = fmt::format("{}#{}", header.sop_instance_uid, header.frame);
-  if (!seen_instances_.insert(instance).second) {
-    ++counts_.repeated;
-    return;
-  }
-  Notes applied;  // the study's own notes say what was supplied
-  if (request_.machine) header = with_machine(header, *request_.machine, request_.switches, applied);
-  header = with_switches(header, request_.switches, applied);
+// With what a person supplied and allowed, or the reason why it cannot be followed; nothing for one seen before.
+std::optional<TimedXray> XrayStream::checked(RtImage header) const {
+  if (seen_instances_.contains(fmt::format("{}#{}", header.sop_instance_uid, header.frame))) return std::nullopt;
+  const std::string where = header.path.string();
+  header.label = imager_label(header);
+  Notes said;  // the earliest X-rays' notes have been said
+  if (request_.machine) header = with_machine(header, *request_.machine, request_.switches, said);
+  header = with_switches(header, request_.switches, said);
   if (!header.patient_position) header.patient_position = std::string(to_string(study_.patient_position));
+  std::vector<Finding> findings = rt_image_findings(header);
   if (header.identity.patient_id != study_.ct.identity.patient_id)
-    throw Error(fmt::format("{}: {} differs from the CT's", header.path.string(), described(DCM_PatientID)));
+    findings.push_back(
+        {"patient-mismatch", fmt::format("{}: {} differs from the CT's", where, described(DCM_PatientID))});
+  const RtImage& first = study_.rt_images.front();
+  const auto has_moved = [&](const std::optional<double> RtImage::*read_out, double tolerance) {
+    return header.*read_out && first.*read_out && std::abs(*(header.*read_out) - *(first.*read_out)) > tolerance;
+  };
+  constexpr double kMaxMm = 0.5, kMaxDeg = 0.1;
+  if (has_moved(&RtImage::table_lateral_mm, kMaxMm) || has_moved(&RtImage::table_longitudinal_mm, kMaxMm) ||
+      has_moved(&RtImage::table_vertical_mm, kMaxMm) || has_moved(&RtImage::support_angle_deg, kMaxDeg))
+    findings.push_back({"table-moved", fmt::format("{}: the table moved since {}", where, first.path.string())});
+  settle(findings, request_.allowed, said);
   if (const auto missing = missing_attributes(header); !missing.empty())
-    throw Error(fmt::format("{}: {} is missing", header.path.string(), described(missing.front().tag)));
+    throw Error(fmt::format("{}: {} is missing", where, described(missing.front().tag)));
   const auto time_s = acquisition_seconds(header);
-  if (!time_s) throw Error(fmt::format("{}: {} is missing", header.path.string(), described(DCM_AcquisitionTime)));
-  if (processed_until_s_ && *time_s <= *processed_until_s_) {
+  if (!time_s) throw Error(fmt::format("{}: {} is missing", where, described(DCM_AcquisitionTime)));
+  TimedXray timed{.header = std::move(header), .time_s = *time_s, .xray = std::nullopt};
+  if (reads_pixels_) {
+    const DicomFile file = DicomFile::read(timed.header.path, DicomFile::Extent::kWhole);
+    timed.xray = read_xray_image(file, timed.header, xray_view(timed.header, beam_of(timed.header, said), said));
+  }
+  return timed;
+}
+
+void XrayStream::take(TimedXray timed, Notes& notes) {
+  seen_instances_.insert(fmt::format("{}#{}", timed.header.sop_instance_uid, timed.header.frame));
+  imagers_.insert(timed.header.label);
+  const std::string where = timed.header.path.string();
+  if (processed_until_s_ && timed.time_s <= *processed_until_s_) {
     ++counts_.late;
-    notes.warnings.push_back(
-        fmt::format("{}: came after a later one had been processed, and was left out", header.path.string()));
+    notes.warnings.push_back(fmt::format("{}: came after a later one had been processed, and was left out", where));
     return;
   }
-  const auto place = std::ranges::upper_bound(waiting_, *time_s, {}, &TimedXray::time_s);
-  waiting_.insert(place, {.header = std::move(header), .time_s = *time_s});
+  const auto same_moment = [&](const TimedXray& other) {
+    return other.time_s == timed.time_s && other.header.label == timed.header.label;
+  };
+  if (std::ranges::any_of(waiting_, same_moment)) {
+    ++counts_.broken;
+    notes.warnings.push_back(fmt::format("{}: left out: another X-ray of {} has the same {}", where, timed.header.label,
+                                         described(DCM_AcquisitionTime)));
+    return;
+  }
+  if (!begin_s_ || timed.time_s < *begin_s_) begin_s_ = processed_until_s_ ? begin_s_ : timed.time_s;
+  waiting_.insert(std::ranges::upper_bound(waiting_, timed.time_s, {}, &TimedXray::time_s), std::move(timed));
 }
 
 void XrayStream::offer(const std::vector<std::filesystem::path>& files, int tries, Notes& notes) {
@@ -39,8 +71,16 @@ void XrayStream::offer(const std::vector<std::filesystem::path>& files, int trie
     if (taken_files_.contains(file)) continue;
     try {
       Notes unimportant;
-      for (RtImage& header : read_rt_images(file, unimportant)) take(std::move(header), notes);
+      std::vector<TimedXray> of_file;
+      for (RtImage& header : read_rt_images(file, unimportant)) {
+        if (auto timed = checked(std::move(header)))
+          of_file.push_back(std::move(*timed));
+        else
+          ++counts_.repeated;
+      }
+      for (TimedXray& timed : of_file) take(std::move(timed), notes);
     } catch (const Error& error) {
+      if (!std::filesystem::exists(file)) continue;  // renamed meanwhile
       if (++failures_[file] < tries) continue;
       ++counts_.broken;
       notes.warnings.push_back(fmt::format("left out: {}", error.what()));
@@ -50,18 +90,17 @@ void XrayStream::offer(const std::vector<std::filesystem::path>& files, int trie
   }
 }
 
-std::vector<TimedXray> XrayStream::next_moment(double together_s, std::size_t imagers, bool may_be_incomplete) {
+std::vector<TimedXray> XrayStream::next_moment(double together_s, bool may_be_incomplete) {
   if (waiting_.empty()) return {};
-  std::vector<TimedXray> moment;
   std::set<std::string> labels;
+  std::size_t count = 0;
   const double begin_s = waiting_.front().time_s;
-  for (const TimedXray& xray : waiting_) {
-    if (xray.time_s > begin_s + together_s || !labels.insert(imager_label(xray.header)).second) break;
-    moment.push_back(xray);
-  }
-  const bool later_waits = moment.size() < waiting_.size();
-  if (moment.size() < imagers && !later_waits && !may_be_incomplete) return {};
-  waiting_.erase(waiting_.begin(), waiting_.begin() + static_cast<std::ptrdiff_t>(moment.size()));
+  for (; count < waiting_.size(); ++count)
+    if (waiting_[count].time_s > begin_s + together_s || !labels.insert(waiting_[count].header.label).second) break;
+  if (count < imagers_.size() && count == waiting_.size() && !may_be_incomplete) return {};
+  std::vector<TimedXray> moment(std::make_move_iterator(waiting_.begin()),
+                                std::make_move_iterator(waiting_.begin() + static_cast<std::ptrdiff_t>(count)));
+  waiting_.erase(waiting_.begin(), waiting_.begin() + static_cast<std::ptrdiff_t>(count));
   processed_until_s_ = moment.back().time_s;
   return moment;
 }

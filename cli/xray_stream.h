@@ -16,7 +16,8 @@ namespace isoshift {
 
 struct TimedXray {
   RtImage header;
-  double time_s = 0.0;  // since an epoch
+  double time_s = 0.0;            // since an epoch
+  std::optional<XrayImage> xray;  // of files that still arrive: read at once, so that none is half written
 };
 
 // What became of the files.
@@ -28,7 +29,9 @@ struct StreamCounts {
 
 class XrayStream {
  public:
-  XrayStream(const StudyRequest& request, const Study& study) : request_(request), study_(study) {}
+  // `reads_pixels`: at once, for files that still arrive.
+  XrayStream(const StudyRequest& request, const Study& study, bool reads_pixels)
+      : request_(request), study_(study), reads_pixels_(reads_pixels) {}
 
   // Takes what can be read of the files; those that cannot, yet, are tried again by the next calls and given up after
   // `tries`. Each warning is said once.
@@ -36,21 +39,26 @@ class XrayStream {
 
   // The X-rays of the earliest moment, those of all imagers within `together_s`; nothing where none waits.
   // `may_be_incomplete`: also where another imager's X-ray of that moment may still come.
-  std::vector<TimedXray> next_moment(double together_s, std::size_t imagers, bool may_be_incomplete);
+  std::vector<TimedXray> next_moment(double together_s, bool may_be_incomplete);
 
+  // When the first X-ray of all was taken.
+  std::optional<double> begin_s() const { return begin_s_; }
   const StreamCounts& counts() const { return counts_; }
   std::size_t waiting() const { return waiting_.size(); }
 
  private:
-  void take(RtImage header, Notes& notes);
+  std::optional<TimedXray> checked(RtImage header) const;
+  void take(TimedXray xray, Notes& notes);
 
   StudyRequest request_;
   const Study& study_;
+  bool reads_pixels_;
+  std::set<std::string> imagers_;
   std::deque<TimedXray> waiting_;  // by time
   std::set<std::string> seen_instances_;
   std::set<std::filesystem::path> taken_files_;
   std::map<std::filesystem::path, int> failures_;
-  std::optional<double> processed_until_s_;
+  std::optional<double> begin_s_, processed_until_s_;
   StreamCounts counts_;
 };
 

@@ -95,4 +95,17 @@ Volume<std::uint8_t> dilated(const Volume<std::uint8_t>& mask, double margin_mm)
   return result;
 }
 
+Eigen::Vector3d centroid_patient_mm(const Volume<std::uint8_t>& mask) {
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  double count = 0.0;
+  for (int k = 0; k < mask.size.z(); ++k)
+    for (int j = 0; j < mask.size.y(); ++j)
+      for (int i = 0; i < mask.size.x(); ++i)
+        if (mask.at(i, j, k) != 0) {
+          sum += Eigen::Vector3d(i, j, k);
+          ++count;
+        }
+  return mask.patient_from_voxel * (sum / count).eval();
+}
+
 }  // namespace isoshift

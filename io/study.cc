@@ -209,6 +209,7 @@ void keep_earliest_of_each_imager(std::vector<RtImage>& images) {
   std::ranges::stable_sort(images, {}, &acquisition_seconds);
   std::set<std::string> seen;
   std::erase_if(images, [&](const RtImage& image) { return !seen.insert(imager_label(image)).second; });
+  for (RtImage& image : images) image.label = imager_label(image);
 }
 
 void check_labels(const RtImageSwitches& switches, const std::vector<RtImage>& images) {

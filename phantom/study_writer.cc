@@ -388,7 +388,7 @@ void write_breathing(const PhantomOptions& options, const StudyUids& study, Uids
     moment.displacement_mm = motion.displacement_mm(moment.time_s);
     const Eigen::Vector3d moved_mm =
         placement.fixed_from_patient(planned_mm + moment.displacement_mm) - as_planned.fixed_from_patient(planned_mm);
-    truth += fmt::format("{:.6g},{:.6f},{:.6f},{:.6f}\n", moment.time_s, moved_mm.x(), moved_mm.y(), moved_mm.z());
+    truth += fmt::format("{:.4f},{:.6f},{:.6f},{:.6f}\n", moment.time_s, moved_mm.x(), moved_mm.y(), moved_mm.z());
     for (std::size_t imager = 0; imager < imagers; ++imager) {
       moment.noise_seed = (options.seed * 1000 + imager) * 1'000'003 + static_cast<std::uint64_t>(n);
       write_xray(

@@ -9,13 +9,13 @@
 #include <memory>
 
 #include "geometry/error.h"
+#include "io/report/ticks.h"
 
 namespace isoshift {
 namespace {
 
 constexpr double kWidth = 560.0, kHeight = 340.0;
 constexpr double kLeft = 62.0, kRight = 18.0, kTop = 40.0, kBottom = 52.0;
-constexpr int kTicks = 6;  // about so many per axis
 
 enum class Anchor { kStart, kMiddle, kEnd };
 
@@ -25,15 +25,6 @@ void write_at(cairo_t* context, double x, double y, const std::string& text, Anc
   const double share = anchor == Anchor::kStart ? 0.0 : anchor == Anchor::kMiddle ? 0.5 : 1.0;
   cairo_move_to(context, x - share * extents.x_advance, y);
   cairo_show_text(context, text.c_str());
-}
-
-// 1, 2 or 5 times a power of ten: the step of about kTicks ticks.
-double tick_step(double range) {
-  const double rough = range / kTicks;
-  const double power = std::pow(10.0, std::floor(std::log10(rough)));
-  for (const double factor : {1.0, 2.0, 5.0})
-    if (factor * power >= rough) return factor * power;
-  return 10.0 * power;
 }
 
 // From numbers to places on the page.

@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "io/report/canvas.h"
+#include "io/report/ticks.h"
 
 namespace isoshift {
 namespace {
@@ -15,15 +16,6 @@ using Eigen::Vector2d;
 
 constexpr double kLeftPt = 56.0, kRightPt = 16.0, kTopPt = 46.0, kBottomPt = 44.0;  // margins
 constexpr int kTicks = 6;                                                           // about so many per axis
-
-// 1, 2 or 5 times a power of ten: the step of about kTicks ticks.
-double tick_step(double range) {
-  const double rough = range / kTicks;
-  const double power = std::pow(10.0, std::floor(std::log10(rough)));
-  for (const double factor : {1.0, 2.0, 5.0})
-    if (factor * power >= rough) return factor * power;
-  return 10.0 * power;
-}
 
 constexpr std::array kStyles = {
     LineStyle{.color = color::kBlack, .width = 1.6}, LineStyle{.color = color::kVermilion, .width = 1.6},

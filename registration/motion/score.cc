@@ -34,7 +34,8 @@ PredictionScore score(PredictorKind kind, const PredictorOptions& options, std::
   const double scored_after_s =
       samples.front().time_s + (length_s < protocol.short_trace_s ? protocol.short_training_s : protocol.training_s);
   PredictorOptions with_latency = options;
-  with_latency.latency_s = latency_s;
+  // The youngest sample known is on the grid: that far it has to predict.
+  with_latency.latency_s = std::ceil(latency_s * protocol.rate_hz - 1e-6) / protocol.rate_hz;
   const std::unique_ptr<Predictor> predictor = make_predictor(kind, with_latency);
   const Eigen::Matrix3d covariance =
       protocol.measurement_sigma_mm * protocol.measurement_sigma_mm * Eigen::Matrix3d::Identity();

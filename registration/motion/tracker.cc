@@ -16,7 +16,9 @@ namespace {
 constexpr double kUnseenVarianceMm2 = 1e6;
 constexpr std::size_t kUsual = 25;  // so many good similarities say what is usual
 constexpr int kLostMoments = 5;     // in a row: the target is looked for anew
-constexpr double kFilterAcceleration = 500.0;
+constexpr double kFilterAcceleration = 400.0;
+constexpr double kLeastSimilarity = 0.2;  // of gradient correlation: what chance reaches is a tenth of that
+constexpr double kLongestCoastS = 1.0;    // after the last measurement the filter's speed counts no longer than this
 
 double median(std::vector<double> values) {
   std::ranges::nth_element(values, values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2));
@@ -69,7 +71,10 @@ std::optional<Tracker::Found> Tracker::find(const FixedViews& views, const Eigen
   if (is_first) stages.push_back(wide);
   stages.push_back(fine);
   const double bound_mm = is_first ? options_.first_reach_mm + options_.box_mm : options_.box_mm;
-  const Eigen::Isometry3d start = Eigen::Translation3d(expected_mm) * rotation_about_target_ * planned_;
+  const Eigen::Vector3d target_mm = planned_ * target_patient_mm_;
+  const Eigen::Isometry3d start = Eigen::Translation3d(target_mm + expected_mm) *
+                                  Eigen::Isometry3d(Eigen::Quaterniond(rotation_)) * Eigen::Translation3d(-target_mm) *
+                                  planned_;
   const auto result = search_if_possible(renderers_, views, start,
                                          {.stages = stages,
                                           .dof = options_.dof,
@@ -84,11 +89,17 @@ std::optional<Tracker::Found> Tracker::find(const FixedViews& views, const Eigen
   Eigen::Vector3d moved_mm(result->parameters.data());
   for (const Eigen::Vector3d& direction : unseen) moved_mm -= direction.dot(moved_mm) * direction;
   found.at_bound = moved_mm.cwiseAbs().maxCoeff() > kAtBound * bound_mm;
+  for (std::size_t n = 3; n < result->parameters.size(); ++n)
+    found.at_bound = found.at_bound || std::abs(result->parameters[n]) > kAtBound * options_.box_rad * kLeverMm;
   return found;
 }
 
-bool Tracker::is_lost(const Found& found) const {
-  return found.at_bound || (!similarities_.empty() && found.similarity < options_.lost_share * median(similarities_));
+bool Tracker::is_lost(const Found& found, const std::vector<Eigen::Vector3d>& unseen) const {
+  Eigen::Vector3d from_plan_mm = found.pose * target_patient_mm_ - planned_ * target_patient_mm_;
+  for (const Eigen::Vector3d& direction : unseen) from_plan_mm -= direction.dot(from_plan_mm) * direction;
+  const double least = similarities_.empty() ? kLeastSimilarity
+                                             : std::max(kLeastSimilarity, options_.lost_share * median(similarities_));
+  return found.at_bound || found.similarity < least || from_plan_mm.norm() > options_.first_reach_mm + options_.box_mm;
 }
 
 TrackedFrame Tracker::track(double time_s, std::vector<FixedImage> views) {
@@ -97,15 +108,18 @@ TrackedFrame Tracker::track(double time_s, std::vector<FixedImage> views) {
   last_time_s_ = time_s;
   std::vector<XrayView> cameras;
   for (const FixedImage& view : views) cameras.push_back(view.view);
-  const std::vector<Eigen::Vector3d> unseen = unobservable_directions(cameras);
-  const bool is_known = !similarities_.empty();
-  const bool is_sought = lost_in_a_row_ >= kLostMoments;
+  const std::vector<Eigen::Vector3d> unseen =
+      cameras.empty() ? std::vector<Eigen::Vector3d>() : unobservable_directions(cameras);
   Eigen::Vector3d expected_mm = Eigen::Vector3d::Zero();
-  if (is_known && !is_sought) expected_mm = filter_.predict(time_s).position_mm;
+  if (lost_in_a_row_ >= kLostMoments)
+    rotation_.setIdentity();  // looked for anew, about the plan
+  else if (last_measured_s_)
+    expected_mm = filter_.predict(std::min(time_s, *last_measured_s_ + kLongestCoastS)).position_mm;
 
   TrackedFrame frame{.time_s = time_s, .unseen_room = unseen};
-  const std::optional<Found> found = find({.images = std::move(views), .region = region_}, expected_mm, unseen);
-  if (found && !is_lost(*found)) {
+  std::optional<Found> found;
+  if (!views.empty()) found = find({.images = std::move(views), .region = region_}, expected_mm, unseen);
+  if (found && !is_lost(*found, unseen)) {
     frame.similarity = found->similarity;
     frame.status = unseen.empty() ? FrameStatus::kMeasured : FrameStatus::kPartly;
     frame.actual_room_from_patient = found->pose;
@@ -122,7 +136,8 @@ TrackedFrame Tracker::track(double time_s, std::vector<FixedImage> views) {
       measured_mm += direction.dot(now.position_mm - measured_mm) * direction;
     frame.measured_mm = measured_mm;
     predictor_->add(time_s, unseen.empty() ? Eigen::VectorXd(measured_mm) : now.position_mm, covariance);
-    if (options_.dof == Dof::kRigid) rotation_about_target_.linear() = (found->pose * planned_.inverse()).linear();
+    if (options_.dof == Dof::kRigid) rotation_ = (found->pose * planned_.inverse()).linear();
+    last_measured_s_ = time_s;
     similarities_.push_back(found->similarity);
     if (similarities_.size() > kUsual) similarities_.erase(similarities_.begin());
     lost_in_a_row_ = 0;
@@ -130,12 +145,14 @@ TrackedFrame Tracker::track(double time_s, std::vector<FixedImage> views) {
     if (found) frame.similarity = found->similarity;
     ++lost_in_a_row_;
   }
-  if (similarities_.empty()) return frame;  // never found yet
-  const Prediction now = filter_.predict(time_s);
-  frame.filtered_mm = now.position_mm;
-  frame.sigma_mm = now.sigma_mm.value();
+  frame.is_lost = lost_in_a_row_ >= kLostMoments;
+  if (!last_measured_s_) return frame;
+  frame.is_known = true;
+  const double coast_until_s = *last_measured_s_ + kLongestCoastS;
+  frame.filtered_mm = filter_.predict(std::min(time_s, coast_until_s)).position_mm;
+  frame.sigma_mm = filter_.predict(time_s).sigma_mm.value();
   frame.is_warm = predictor_->is_warm();
-  frame.predicted_mm = predictor_->predict(time_s + options_.latency_s).position_mm;
+  frame.predicted_mm = predictor_->predict(std::min(time_s + options_.latency_s, coast_until_s)).position_mm;
   return frame;
 }
 

@@ -39,6 +39,8 @@ std::string_view to_string(FrameStatus status);
 struct TrackedFrame {
   double time_s = 0.0;
   FrameStatus status = FrameStatus::kBridged;
+  bool is_known = false;                       // the target has been found by now; else no number below is one
+  bool is_lost = false;                        // for several moments
   std::optional<Eigen::Vector3d> measured_mm;  // components along an unseen direction are the filter's
   Eigen::Vector3d filtered_mm = Eigen::Vector3d::Zero();
   Eigen::Vector3d predicted_mm = Eigen::Vector3d::Zero();  // for one latency later
@@ -56,7 +58,8 @@ class Tracker {
           const Eigen::Isometry3d& planned_room_from_patient, const Eigen::Vector3d& target_patient_mm,
           TrackingOptions options);
 
-  // The views of one moment, one or more; later than all before. Throws UsageError for a time that does not advance.
+  // The views of one moment, later than all before; none: they could not be used, and the moment is bridged. Throws
+  // UsageError for a time that does not advance.
   TrackedFrame track(double time_s, std::vector<FixedImage> views);
 
  private:
@@ -67,7 +70,7 @@ class Tracker {
   };
   std::optional<Found> find(const FixedViews& views, const Eigen::Vector3d& expected_mm,
                             const std::vector<Eigen::Vector3d>& unseen) const;
-  bool is_lost(const Found& found) const;
+  bool is_lost(const Found& found, const std::vector<Eigen::Vector3d>& unseen) const;
 
   const RendererPyramid& renderers_;
   const ProjectedRegion& region_;
@@ -76,9 +79,9 @@ class Tracker {
   TrackingOptions options_;
   ConstantVelocityKalman filter_;
   std::unique_ptr<Predictor> predictor_;
-  Eigen::Isometry3d rotation_about_target_ = Eigen::Isometry3d::Identity();  // of the last pose, for six DOF
-  std::vector<double> similarities_;                                         // of the last good ones
-  std::optional<double> last_time_s_;
+  Eigen::Matrix3d rotation_ = Eigen::Matrix3d::Identity();  // of the last pose, for six DOF
+  std::vector<double> similarities_;                        // of the last good ones
+  std::optional<double> last_time_s_, last_measured_s_;
   int lost_in_a_row_ = 0;
 };
 

@@ -5,7 +5,9 @@
 #include <gtest/gtest.h>
 
 #include <fstream>
+#include <iterator>
 #include <nlohmann/json.hpp>
+#include <set>
 #include <thread>
 
 #include "tests/support/small_study.h"
@@ -74,6 +76,10 @@ TEST_F(TrackCommandTest, ThePhasesOfThe4dCtTeachTheModel) {
   for (int phase = 0; phase < 4; ++phase) more.push_back((study() / "PHASES" / fmt::format("{:02}", phase)).string());
   EXPECT_EQ(track(more)["predictor"], "model");
   EXPECT_EQ(run_command({"track", study().string(), "-o", output().string(), "--phases", "x"}).exit_status, 2);
+  EXPECT_EQ(run_command(
+                {"track", study().string(), "-o", output().string(), "--predictor", "model", "--phases", "x", "y", "z"})
+                .exit_status,
+            2);
 }
 
 // One imager: its two axes as good, the third flagged and uncertain.
@@ -125,6 +131,14 @@ TEST_F(TrackCommandTest, FollowsAFolderThatIsBeingFilled) {
       send(moment);
     }
     send(5, "again");
+    for (const int imager : {0, 90}) {  // written in two parts
+      std::ifstream whole(xray(imager, 21), std::ios::binary);
+      const std::string bytes{std::istreambuf_iterator<char>(whole), {}};
+      std::ofstream part(incoming / fmt::format("{}_21.dcm", imager), std::ios::binary);
+      part << bytes.substr(0, bytes.size() / 2) << std::flush;
+      std::this_thread::sleep_for(std::chrono::milliseconds(200));
+      part << bytes.substr(bytes.size() / 2);
+    }
     std::ofstream(incoming / "broken.dcm") << "no DICOM";
     std::this_thread::sleep_for(std::chrono::milliseconds(1500));
     send(10);  // too late
@@ -132,7 +146,8 @@ TEST_F(TrackCommandTest, FollowsAFolderThatIsBeingFilled) {
   std::vector<std::string> more = parts();
   more.insert(more.end(), {"--follow", incoming.string(), "--idle", "3", "--predictor", "kalman"});
   const auto json = track(more, false);
-  EXPECT_EQ(json["frames"], 19);
+  EXPECT_EQ(json["frames"], 20);
+  EXPECT_EQ(json["status"]["measured"], 20);
   EXPECT_EQ(json["files"]["repeated"], 2);
   EXPECT_EQ(json["files"]["late"], 2);
   EXPECT_EQ(json["files"]["broken"], 1);
@@ -140,25 +155,56 @@ TEST_F(TrackCommandTest, FollowsAFolderThatIsBeingFilled) {
   EXPECT_THAT(outcome_.err, HasSubstr("came after a later one had been processed"));
 }
 
-// The target is lost where its region shows something else: the filter bridges, and says so.
-TEST_F(TrackCommandTest, AMomentWithoutTheTargetIsBridged) {
-  std::vector<std::string> more = parts();
-  more.insert(more.end(), {"--image"});
-  for (int n = 1; n <= 12; ++n)
-    for (const int imager : {0, 90}) {
-      const std::filesystem::path copy = own_ / fmt::format("{}_{}.dcm", imager, n);
-      std::filesystem::copy_file(xray(imager, n), copy);
-      if (n == 9)  // a beam that was off
-        edit(copy, [](DicomItem d) {
-          std::vector<std::uint16_t> noise(192 * 192);
-          for (std::size_t i = 0; i < noise.size(); ++i) noise[i] = static_cast<std::uint16_t>(400 + (i * 7919) % 97);
-          d.put_pixels(noise);
-        });
-      more.push_back(copy.string());
-    }
-  const auto json = track(more, false);
+// Some moments of the study, in which the X-rays of `spoiled` show nothing.
+class SpoiledTrackTest : public TrackCommandTest {
+ protected:
+  std::vector<std::string> moments(int count, const std::set<int>& spoiled) {
+    std::vector<std::string> more = parts();
+    more.insert(more.end(), {"--tolerance", "1", "--truth", (study() / "truth.csv").string(), "--image"});
+    for (int n = 1; n <= count; ++n)
+      for (const int imager : {0, 90}) {
+        const std::filesystem::path copy = own_ / fmt::format("{}_{}.dcm", imager, n);
+        std::filesystem::copy_file(xray(imager, n), copy);
+        if (spoiled.contains(n))
+          edit(copy, [](DicomItem d) {
+            std::vector<std::uint16_t> noise(192 * 192);
+            for (std::size_t i = 0; i < noise.size(); ++i) noise[i] = static_cast<std::uint16_t>(400 + (i * 7919) % 97);
+            d.put_pixels(noise);
+          });
+        more.push_back(copy.string());
+      }
+    return more;
+  }
+};
+
+TEST_F(SpoiledTrackTest, AMomentWithoutTheTargetIsBridged) {
+  const auto json = track(moments(12, {9}), false);
   EXPECT_EQ(json["status"]["measured"], 11);
-  EXPECT_EQ(json["status"]["bridged"].get<int>() + json["files"]["broken"].get<int>() / 2, 1);
+  EXPECT_EQ(json["status"]["bridged"], 1);
+}
+
+// What is no target sets no standard, and until one is found nothing is said to be known.
+TEST_F(SpoiledTrackTest, ABadBeginningIsNotTakenForTheTarget) {
+  const auto json = track(moments(12, {1, 2}), false);
+  EXPECT_EQ(json["status"]["measured"], 10);
+  EXPECT_EQ(json["status"]["bridged"], 2);
+  EXPECT_LT(json["beside_truth"]["measured"]["median_mm"], 0.6);  // the first moment is still the beginning of time
+  EXPECT_NEAR(json["beam_holds_s"][0][0], 0.3, 1e-6);             // unknown: the beam waits
+  std::ifstream trace(output() / "trace.csv");
+  std::string line;
+  std::getline(trace, line);
+  std::getline(trace, line);
+  EXPECT_TRUE(line.starts_with("0.0000,,,,,,,,,,,,,")) << line;
+}
+
+TEST_F(SpoiledTrackTest, ATargetThatIsNeverFoundIsAnError) {
+  std::vector<std::string> arguments = {"track", "-o", output().string(), "--structure", "Target"};
+  const std::vector<std::string> more = moments(3, {1, 2, 3});
+  arguments.insert(arguments.end(), more.begin(), more.end());
+  const CommandOutcome outcome = run_command(arguments);
+  EXPECT_EQ(outcome.exit_status, 1);
+  EXPECT_THAT(outcome.err, HasSubstr("the target was not found in any of 3 moments"));
+  EXPECT_FALSE(std::filesystem::exists(output()));
 }
 
 }  // namespace

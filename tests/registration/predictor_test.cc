@@ -232,5 +232,13 @@ TEST(Score, OfARampIsTheWayOfOneLatency) {
   EXPECT_NEAR(resampled(ramp, 10.0)[7].position_mm.y(), 1.4, 1e-9);
 }
 
+// A latency between two samples is predicted from the one before: as far as that is.
+TEST(Score, LatenciesOffTheGridAreLearnedAsFarAsTheyReach) {
+  std::vector<MotionSample> sine;
+  for (int n = 0; n <= 1500; ++n) sine.push_back({0.1 * n, Eigen::Vector3d(0.0, 5.0 * std::sin(0.15 * n), 0.0)});
+  for (const double latency_s : {0.3, 0.31, 0.45})
+    EXPECT_LT(score(PredictorKind::kRls, {}, sine, latency_s, {}).rmse_mm, 0.05) << latency_s;
+}
+
 }  // namespace
 }  // namespace isoshift
