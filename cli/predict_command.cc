@@ -52,6 +52,7 @@ struct Scores {
 
 std::vector<PredictorKind> kinds_of(const std::vector<std::string>& names) {
   std::vector<PredictorKind> kinds;
+  kinds.reserve(names.size());
   for (const std::string& name : names) kinds.push_back(predictor_kind_from(name).value());
   if (kinds.empty()) kinds.assign(kPredictorKinds.begin(), kPredictorKinds.end());
   return kinds;
@@ -166,6 +167,7 @@ void add_predict_command(CLI::App& app, Console& console, int&) {
       "Every sample after the training is predicted from those one latency older.");
   command->add_option("trace", options->traces, "Recorded traces")->required()->type_name("CSV...");
   std::vector<std::string> names;
+  names.reserve(kPredictorKinds.size());
   for (const PredictorKind kind : kPredictorKinds) names.emplace_back(to_string(kind));
   command->add_option("--method", options->methods, "Only these; may be repeated")->check(CLI::IsMember(names));
   command->add_option("--latency", options->latencies_ms, "Over which to predict")

@@ -462,6 +462,7 @@ void add_track_command(CLI::App& app, Console& console, int& exit_status) {
       ->check(CLI::Range(0.1, 3600.0))
       ->capture_default_str();
   std::vector<std::string> names;
+  names.reserve(kPredictorKinds.size());
   for (const PredictorKind kind : kPredictorKinds) names.emplace_back(to_string(kind));
   command->add_option("--predictor", options->predictor, "How the target is predicted")
       ->check(CLI::IsMember(names))

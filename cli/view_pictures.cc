@@ -38,6 +38,7 @@ std::vector<ViewPicture> view_pictures(const Study& study, Renderer& renderer,
                                        const std::vector<MarkedStructure>& structures,
                                        const Eigen::Isometry3d& actual_room_from_patient) {
   std::vector<ProjectedRegion> regions;
+  regions.reserve(structures.size());
   for (const MarkedStructure& structure : structures)
     regions.emplace_back(RegionOfInterest{.volume = structure.mask, .left_out = {}, .cut_ends = {}});
   const std::array poses = {study.planned_room_from_patient, actual_room_from_patient};

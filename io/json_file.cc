@@ -19,10 +19,10 @@ JsonFile read_json_file(const std::filesystem::path& path) {
   if (!file) throw Error(fmt::format("{}: cannot be read", path.string()));
   std::vector<std::set<std::string>> keys;  // of the objects that are open
   const auto check_keys = [&](int, nlohmann::json::parse_event_t event, const nlohmann::json& parsed) {
-    using enum nlohmann::json::parse_event_t;
-    if (event == object_start) keys.emplace_back();
-    if (event == object_end) keys.pop_back();
-    if (event == key && !keys.back().insert(parsed.get<std::string>()).second)
+    using Event = nlohmann::json::parse_event_t;
+    if (event == Event::object_start) keys.emplace_back();
+    if (event == Event::object_end) keys.pop_back();
+    if (event == Event::key && !keys.back().insert(parsed.get<std::string>()).second)
       throw Error(fmt::format("{}: says {} twice", path.string(), parsed.get<std::string>()));
     return true;
   };

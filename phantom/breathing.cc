@@ -19,8 +19,11 @@ double inhaled(double phase) { return 1.0 - std::pow(std::cos(std::numbers::pi *
 Breathing::Breathing(BreathingOptions options, std::uint64_t seed) : options_(std::move(options)) {
   std::mt19937_64 random(seed);
   std::uniform_real_distribution<double> vary(-1.0, 1.0);
-  for (double begin_s = 0.0; begin_s <= options_.seconds; begin_s += breaths_.back().length_s)
+  double begin_s = 0.0;
+  while (begin_s <= options_.seconds) {
     breaths_.push_back({begin_s, kPeriodS * (1.0 + 0.12 * vary(random)), 1.0 + 0.15 * vary(random)});
+    begin_s += breaths_.back().length_s;
+  }
 }
 
 Eigen::Vector3d Breathing::displacement_mm(double time_s) const {

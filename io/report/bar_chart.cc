@@ -36,7 +36,7 @@ struct Axes {
 
 void draw_axes(cairo_t* context, const Axes& axes, const BarChart& chart) {
   cairo_set_font_size(context, 11.0);
-  for (double tick = 0.0, step = tick_step(axes.y_max); tick <= axes.y_max * 1.0001; tick += step) {
+  for (const double tick : ticks(0.0, axes.y_max)) {
     cairo_set_source_rgb(context, 0.88, 0.88, 0.88);
     cairo_move_to(context, kLeft, axes.y(tick));
     cairo_line_to(context, kWidth - kRight, axes.y(tick));
@@ -44,8 +44,7 @@ void draw_axes(cairo_t* context, const Axes& axes, const BarChart& chart) {
     cairo_set_source_rgb(context, 0.0, 0.0, 0.0);
     write_at(context, kLeft - 6.0, axes.y(tick) + 4.0, fmt::format("{:.6g}", tick), Anchor::kEnd);
   }
-  const double step = tick_step(axes.x_max - axes.x_min);
-  for (double tick = std::ceil(axes.x_min / step) * step; tick <= axes.x_max + 1e-4 * step; tick += step)
+  for (const double tick : ticks(axes.x_min, axes.x_max))
     write_at(context, axes.x(tick), kHeight - kBottom + 16.0, fmt::format("{:.6g}", tick), Anchor::kMiddle);
   cairo_set_font_size(context, 12.0);
   write_at(context, 0.5 * (kLeft + kWidth - kRight), kHeight - 14.0, chart.x_label, Anchor::kMiddle);

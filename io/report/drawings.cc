@@ -128,10 +128,10 @@ std::string captioned_png(const std::vector<CaptionedPicture>& pictures, int per
   const int rows = (static_cast<int>(pictures.size()) + per_row - 1) / per_row;
   Canvas canvas(Canvas::Kind::kPng, per_row * (kTile + kGap) - kGap, rows * (kTile + kCaption + kGap) - kGap);
   for (std::size_t n = 0; n < pictures.size(); ++n) {
-    const auto column = static_cast<double>(n % static_cast<std::size_t>(per_row));
-    const auto row = static_cast<double>(n / static_cast<std::size_t>(per_row));
+    const std::size_t column = n % static_cast<std::size_t>(per_row), row = n / static_cast<std::size_t>(per_row);
     const Image<Rgb>& picture = pictures[n].picture;
-    const double x = column * (kTile + kGap), y = row * (kTile + kCaption + kGap);
+    const double x = static_cast<double>(column) * (kTile + kGap);
+    const double y = static_cast<double>(row) * (kTile + kCaption + kGap);
     const double zoom = kTile / std::max(picture.columns, picture.rows);
     canvas.text(x + 6.0, y + 2.0, pictures[n].caption, {.size = 13.0});
     canvas.image(x, y + kCaption, zoom * picture.columns, zoom * picture.rows, picture);

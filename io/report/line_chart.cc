@@ -15,7 +15,6 @@ namespace {
 using Eigen::Vector2d;
 
 constexpr double kLeftPt = 56.0, kRightPt = 16.0, kTopPt = 46.0, kBottomPt = 44.0;  // margins
-constexpr int kTicks = 6;                                                           // about so many per axis
 
 constexpr std::array kStyles = {
     LineStyle{.color = color::kBlack, .width = 1.6}, LineStyle{.color = color::kVermilion, .width = 1.6},
@@ -43,13 +42,11 @@ std::string line_chart_svg(const LineChart& chart, double width, double height) 
   canvas.fill(0, 0, width, height, color::kWhite);
   using enum TextStyle::Align;
   canvas.text(kLeftPt, 4.0, chart.title, {.size = 13.0, .bold = true});
-  for (double y = std::ceil(y_min / tick_step(y_max - y_min)) * tick_step(y_max - y_min); y <= y_max;
-       y += tick_step(y_max - y_min)) {
+  for (const double y : ticks(y_min, y_max)) {
     canvas.line(place(x_min, y), place(x_max, y), {.color = color::kLightGray});
     canvas.text(kLeftPt - 6.0, place(x_min, y).y() - 7.0, fmt::format("{:.6g}", y), {.size = 10.0, .align = kRight});
   }
-  for (double x = std::ceil(x_min / tick_step(x_max - x_min)) * tick_step(x_max - x_min); x <= x_max;
-       x += tick_step(x_max - x_min))
+  for (const double x : ticks(x_min, x_max))
     canvas.text(place(x, y_min).x(), height - kBottomPt + 4.0, fmt::format("{:.6g}", x),
                 {.size = 10.0, .align = kCenter});
   canvas.text(0.5 * (kLeftPt + width - kRightPt), height - 20.0, chart.x_label, {.size = 11.0, .align = kCenter});

@@ -34,10 +34,9 @@ std::string room_words(const Eigen::Vector3d& direction) {
   constexpr double kWeak = 0.3;
   if (std::abs(direction.z()) > kWeak) return direction.z() > 0.0 ? kVertical.positive : kVertical.negative;
   const bool has_x = std::abs(direction.x()) > kWeak, has_y = std::abs(direction.y()) > kWeak;
-  const std::string along_y = direction.y() > 0.0 ? kLongitudinal.positive : kLongitudinal.negative;
+  const char* along_y = direction.y() > 0.0 ? kLongitudinal.positive : kLongitudinal.negative;
   if (!has_x) return along_y;
-  const Sense& lateral = kLateral;
-  const std::string along_x = direction.x() > 0.0 ? lateral.positive : lateral.negative;
+  const char* along_x = direction.x() > 0.0 ? kLateral.positive : kLateral.negative;
   return has_y ? fmt::format("{} and {}", along_y, along_x) : along_x;
 }
 

@@ -42,6 +42,7 @@ std::vector<ShownShift::LeftOver> left_over(const SetupReport& report, const Eig
   }
   points.insert(points.end(), report.points.begin(), report.points.end());
   std::vector<ShownShift::LeftOver> result;
+  result.reserve(points.size());
   for (const SetupReport::Point& point : points)
     result.push_back({point.name, left_over_mm(setup_error, report.table, shift, point.room_mm)});
   return result;

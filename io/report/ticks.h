@@ -2,17 +2,22 @@
 // Where the ticks of a chart's axis stand.
 
 #include <cmath>
+#include <vector>
 
 namespace isoshift {
 
-// 1, 2 or 5 times a power of ten, so that about six steps make the range.
-inline double tick_step(double range) {
-  constexpr int kTicks = 6;
-  const double rough = range / kTicks;
-  const double power = std::pow(10.0, std::floor(std::log10(rough)));
-  for (const double factor : {1.0, 2.0, 5.0})
-    if (factor * power >= rough) return factor * power;
-  return 10.0 * power;
+// Multiples of 1, 2 or 5 times a power of ten from `low` to `high`: about seven.
+inline std::vector<double> ticks(double low, double high) {
+  constexpr double kSteps = 6.0, kRounding = 1e-4;
+  const double rough = (high - low) / kSteps, power = std::pow(10.0, std::floor(std::log10(rough)));
+  double step = 10.0 * power;
+  for (const double factor : {5.0, 2.0, 1.0})
+    if (factor * power >= rough) step = factor * power;
+  std::vector<double> result;
+  const int first = static_cast<int>(std::ceil(low / step - kRounding));
+  const int last = static_cast<int>(std::floor(high / step + kRounding));
+  for (int n = first; n <= last; ++n) result.push_back(n * step);
+  return result;
 }
 
 }  // namespace isoshift

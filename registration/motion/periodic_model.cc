@@ -48,6 +48,7 @@ std::vector<double> even_phases(std::size_t count) {
 
 std::vector<double> phases_of(const std::vector<double>& times_s, double period_s) {
   std::vector<double> phases_rad;
+  phases_rad.reserve(times_s.size());
   for (const double time_s : times_s) phases_rad.push_back(kTurn * time_s / period_s);
   return phases_rad;
 }

@@ -107,6 +107,7 @@ TrackedFrame Tracker::track(double time_s, std::vector<FixedImage> views) {
     throw UsageError(fmt::format("an X-ray of {} s after one of {} s", time_s, *last_time_s_));
   last_time_s_ = time_s;
   std::vector<XrayView> cameras;
+  cameras.reserve(views.size());
   for (const FixedImage& view : views) cameras.push_back(view.view);
   const std::vector<Eigen::Vector3d> unseen =
       cameras.empty() ? std::vector<Eigen::Vector3d>() : unobservable_directions(cameras);
