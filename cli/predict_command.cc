@@ -166,10 +166,8 @@ void add_predict_command(CLI::App& app, Console& console, int&) {
       "A trace is CSV with the columns t_s (or Timestamp, ms) and x, y, z in mm; trace.csv of track is one.\n"
       "Every sample after the training is predicted from those one latency older.");
   command->add_option("trace", options->traces, "Recorded traces")->required()->type_name("CSV...");
-  std::vector<std::string> names;
-  names.reserve(kPredictorKinds.size());
-  for (const PredictorKind kind : kPredictorKinds) names.emplace_back(to_string(kind));
-  command->add_option("--method", options->methods, "Only these; may be repeated")->check(CLI::IsMember(names));
+  command->add_option("--method", options->methods, "Only these; may be repeated")
+      ->check(CLI::IsMember(predictor_names()));
   command->add_option("--latency", options->latencies_ms, "Over which to predict")
       ->delimiter(',')
       ->type_name("MS,...")

@@ -70,11 +70,7 @@ int run_register(const RegisterOptions& given, Console& console) {
   std::optional<Eigen::Isometry3d> truth;
   if (!options.truth.empty()) truth = read_setup_error(options.truth);
 
-  std::optional<SetupReport::Site> site;
-  if (!options.site.empty())
-    site = site_in_report(read_site_file(options.site), options.anatomy);
-  else if (!options.anatomy.empty())
-    throw UsageError("--anatomy chooses an action level of a site file: --site FILE");
+  std::optional<SetupReport::Site> site = chosen_site(options.site, options.anatomy);
 
   Notes notes;
   const Study study = load(options.study, notes, console);

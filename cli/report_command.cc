@@ -22,11 +22,7 @@ struct ReportOptions {
 
 void run_report(const ReportOptions& options, Console& console) {
   SetupReport report = read_result(options.result);
-  if (!options.site.empty())
-    report.site = site_in_report(read_site_file(options.site),
-                                 options.anatomy.empty() && report.site ? report.site->anatomy : options.anatomy);
-  else if (!options.anatomy.empty())
-    throw UsageError("--anatomy chooses an action level of a site file: --site FILE");
+  report.site = chosen_site(options.site, options.anatomy, report.site);
   OutputFolder output(options.output.empty() ? options.result : options.output, options.overwrite);
   write_result(report, output.path());
   if (options.site.empty())  // nothing in it has changed

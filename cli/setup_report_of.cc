@@ -6,6 +6,7 @@
 #include <chrono>
 
 #include "cli/view_pictures.h"
+#include "geometry/error.h"
 #include "geometry/mask.h"
 #include "geometry/rotation.h"
 #include "io/sha256.h"
@@ -96,15 +97,21 @@ SetupReport::Point centroid_of(const MarkedStructure& structure, const Study& st
 
 }  // namespace
 
-SetupReport::Site site_in_report(const SiteFile& site, const std::string& anatomy) {
-  return {.name = site.name,
-          .sha256 = site.sha256,
-          .anatomy = anatomy,
-          .level = action_level(site, anatomy),
-          .couch_dof = site.couch_dof,
-          .couch_scale = site.couch_scale,
-          .length_unit = site.length_unit,
-          .automatic_release = site.automatic_release};
+std::optional<SetupReport::Site> chosen_site(const std::filesystem::path& file, const std::string& anatomy,
+                                             std::optional<SetupReport::Site> before) {
+  if (file.empty() && !anatomy.empty())
+    throw UsageError("--anatomy chooses an action level of a site file: --site FILE");
+  if (file.empty()) return before;
+  const SiteFile site = read_site_file(file);
+  const std::string& whose = anatomy.empty() && before ? before->anatomy : anatomy;
+  return SetupReport::Site{.name = site.name,
+                           .sha256 = site.sha256,
+                           .anatomy = whose,
+                           .level = action_level(site, whose),
+                           .couch_dof = site.couch_dof,
+                           .couch_scale = site.couch_scale,
+                           .length_unit = site.length_unit,
+                           .automatic_release = site.automatic_release};
 }
 
 SetupReport setup_report_of(const Study& study, const RegistrationFlags& flags, const RegistrationSetup& setup,

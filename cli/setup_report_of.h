@@ -1,6 +1,8 @@
 #pragma once
 // From a study and what registration found to the report of it.
 
+#include <filesystem>
+#include <optional>
 #include <string>
 
 #include "cli/registration_setup.h"
@@ -11,9 +13,11 @@
 
 namespace isoshift {
 
-// The site's decisions about results of this anatomy ("" for its default). Throws UsageError for one the site does not
-// know.
-SetupReport::Site site_in_report(const SiteFile& site, const std::string& anatomy);
+// --site FILE and --anatomy NAME: the site's decisions about results of this anatomy ("" for its default); `before`
+// where no file is named, whose anatomy also holds where none is. Throws UsageError for an anatomy the site does not
+// know, and for one without a file.
+std::optional<SetupReport::Site> chosen_site(const std::filesystem::path& file, const std::string& anatomy,
+                                             std::optional<SetupReport::Site> before = std::nullopt);
 
 // All but notes, times of loading and what is written; with the pictures of the views, rendered anew.
 SetupReport setup_report_of(const Study& study, const RegistrationFlags& flags, const RegistrationSetup& setup,

@@ -20,6 +20,7 @@
 #include "io/output_folder.h"
 #include "io/report/line_chart.h"
 #include "io/structure_mask.h"
+#include "registration/motion/score.h"
 #include "registration/motion/tracker.h"
 
 namespace isoshift {
@@ -45,40 +46,11 @@ struct TrackOptions {
 struct TraceRow {
   TrackedFrame frame;
   double processing_s = 0.0;
-  std::size_t views = 0;
 };
-
-struct Errors {
-  double median_mm = 0.0, rmse_mm = 0.0, p95_mm = 0.0;
-  std::size_t count = 0;
-};
-
-Errors errors_of(std::vector<double> distances_mm) {
-  Errors errors{.count = distances_mm.size()};
-  if (distances_mm.empty()) return errors;
-  std::ranges::sort(distances_mm);
-  double squares = 0.0;
-  for (const double distance_mm : distances_mm) squares += distance_mm * distance_mm;
-  errors.median_mm = distances_mm[distances_mm.size() / 2];
-  errors.rmse_mm = std::sqrt(squares / static_cast<double>(distances_mm.size()));
-  errors.p95_mm = distances_mm[static_cast<std::size_t>(0.95 * static_cast<double>(distances_mm.size() - 1))];
-  return errors;
-}
-
-// Where the target truly was at a moment; nothing outside the recording.
-std::optional<Eigen::Vector3d> truth_at(const std::vector<MotionSample>& truth, double time_s) {
-  const auto after = std::ranges::lower_bound(truth, time_s - 1e-6, {}, &MotionSample::time_s);
-  if (after == truth.end()) return std::nullopt;
-  if (std::abs(after->time_s - time_s) < 1e-6) return after->position_mm;
-  if (after == truth.begin()) return std::nullopt;
-  const MotionSample& before = *std::prev(after);
-  const double share = (time_s - before.time_s) / (after->time_s - before.time_s);
-  return before.position_mm + share * (after->position_mm - before.position_mm);
-}
 
 struct TruthErrors {
-  Errors measured;         // in the directions that were seen
-  Errors predicted, held;  // held: the last measurement, one latency later
+  PredictionScore measured;         // in the directions that were seen
+  PredictionScore predicted, held;  // held: the last measurement, one latency later
 };
 
 // Over the second half of the time: the filters have learned by then.
@@ -89,7 +61,7 @@ TruthErrors beside_truth(const std::vector<TraceRow>& rows, const std::vector<Mo
   for (const TraceRow& row : rows) {
     if (row.frame.measured_mm) last_mm = row.frame.measured_mm;
     if (row.frame.time_s < from_s || !row.frame.is_known) continue;
-    const auto now = truth_at(truth, row.frame.time_s), later = truth_at(truth, row.frame.time_s + latency_s);
+    const auto now = position_at(truth, row.frame.time_s), later = position_at(truth, row.frame.time_s + latency_s);
     if (now && row.frame.measured_mm) {
       Eigen::Vector3d error_mm = *row.frame.measured_mm - *now;
       for (const Eigen::Vector3d& direction : row.frame.unseen_room) error_mm -= direction.dot(error_mm) * direction;
@@ -99,7 +71,7 @@ TruthErrors beside_truth(const std::vector<TraceRow>& rows, const std::vector<Mo
     predicted.push_back((row.frame.predicted_mm - *later).norm());
     held.push_back((*last_mm - *later).norm());
   }
-  return {errors_of(measured), errors_of(predicted), errors_of(held)};
+  return {score_of(std::move(measured)), score_of(std::move(predicted)), score_of(std::move(held))};
 }
 
 // When the beam would have to wait: the target, as predicted, farther from its plan than the tolerance, or lost. From
@@ -134,11 +106,11 @@ std::string trace_csv(const std::vector<TraceRow>& rows) {
   return csv;
 }
 
-Json errors_json(const Errors& errors) {
+Json errors_json(const PredictionScore& errors) {
   return {{"median_mm", errors.median_mm},
           {"rmse_mm", errors.rmse_mm},
           {"p95_mm", errors.p95_mm},
-          {"samples", errors.count}};
+          {"samples", errors.samples}};
 }
 
 std::string chart_of(const std::vector<TraceRow>& rows, const std::vector<MotionSample>& truth, double latency_s) {
@@ -177,7 +149,42 @@ std::vector<std::filesystem::path> files_in(const std::filesystem::path& folder)
 // The target's displacement in each phase of a 4D CT: found as in X-rays, in DRRs of the phase from two sides.
 std::vector<Eigen::VectorXd> displacements_of_phases(const TrackOptions& options, const Study& study,
                                                      const RegistrationSetup& setup, const Eigen::Vector3d& target,
-                                                     Notes& notes);
+                                                     const Allowances& allowed, Notes& notes) {
+  std::vector<Eigen::VectorXd> displacements;
+  for (const std::filesystem::path& folder : options.phases) {
+    const std::vector<std::filesystem::path> files = files_in(folder);
+    const CtSeries phase = read_ct_series(files, allowed, notes, {});
+    if (phase.frame_of_reference_uid != study.ct.frame_of_reference_uid)
+      throw Error(
+          fmt::format("{}: {} is not that of the planning CT", folder.string(), described(DCM_FrameOfReferenceUID)));
+    // As two X-rays at right angles would show the phase.
+    const RendererPyramid of_phase(options.flags.rendering.kind(), phase.hu, options.flags.rendering.model(),
+                                   beams_of(study), options.flags.rendering.options());
+    std::vector<FixedImage> views;
+    for (const double gantry_deg : {0.0, 90.0}) {
+      const XrayView view = make_xray_view({.sad_mm = 1000.0,
+                                            .gantry_angle_rad = rad_from_deg(gantry_deg),
+                                            .receptor_translation_mm = {0.0, 0.0, -500.0},
+                                            .column_spacing_mm = 1.2,
+                                            .row_spacing_mm = 1.2,
+                                            .position_mm = {-153.0, 153.0},
+                                            .columns = 256,
+                                            .rows = 256},
+                                           study.xrays.front().view.beam);
+      const RenderResult drr = of_phase.finest().render(
+          std::span(&view, 1), std::span(&study.planned_room_from_patient, 1), PixelSet::all());
+      FixedImage image{.view = view,
+                       .line_integral = image_of(view, drr.line_integrals(0, 0)),
+                       .field = Image<std::uint8_t>(view.columns, view.rows, 1)};
+      views.push_back(std::move(image));
+    }
+    Tracker once(setup.renderers(), *setup.options().region, study.planned_room_from_patient, target, {});
+    const TrackedFrame found = once.track(0.0, std::move(views));
+    if (!found.measured_mm) throw Error(fmt::format("{}: the target was not found in this phase", folder.string()));
+    displacements.emplace_back(*found.measured_mm);
+  }
+  return displacements;
+}
 
 class TrackRun {
  public:
@@ -193,8 +200,7 @@ class TrackRun {
     request.one_per_imager = true;
     if (!options_.follow.empty()) wait_for_first();
     const Study study = first_study(request);
-    for (const std::string& warning : notes_.warnings) console_.err << "warning: " << warning << "\n";
-    notes_.warnings.clear();
+    say_warnings();
     const RegistrationSetup setup(options_.flags, study);
     const Eigen::Vector3d target = target_of(study);
     TrackingOptions tracking = options_.tracking;
@@ -202,7 +208,8 @@ class TrackRun {
     tracking.predictor = predictor_kind_from(options_.predictor).value();
     tracking.dof = options_.six_dof ? Dof::kRigid : Dof::kTranslation;
     if (!options_.phases.empty())
-      tracking.predictor_options.phases_mm = displacements_of_phases(options_, study, setup, target, notes_);
+      tracking.predictor_options.phases_mm =
+          displacements_of_phases(options_, study, setup, target, request.allowed, notes_);
     Tracker tracker(setup.renderers(), *setup.options().region, study.planned_room_from_patient, target, tracking);
     XrayStream stream(request, study, !options_.follow.empty());
     follow(tracker, stream, request);
@@ -308,7 +315,7 @@ class TrackRun {
         ++unreadable_;
       }
     }
-    TraceRow row{.views = views.size()};
+    TraceRow row;
     row.frame = tracker.track(time_s - begin_s, std::move(views));
     row.processing_s = std::chrono::duration<double>(Clock::now() - begin).count();
     rows_.push_back(std::move(row));
@@ -401,45 +408,6 @@ class TrackRun {
   std::size_t unreadable_ = 0;
 };
 
-std::vector<Eigen::VectorXd> displacements_of_phases(const TrackOptions& options, const Study& study,
-                                                     const RegistrationSetup& setup, const Eigen::Vector3d& target,
-                                                     Notes& notes) {
-  std::vector<Eigen::VectorXd> displacements;
-  for (const std::filesystem::path& folder : options.phases) {
-    const std::vector<std::filesystem::path> files = files_in(folder);
-    const CtSeries phase = read_ct_series(files, options.study.request().allowed, notes, {});
-    if (phase.frame_of_reference_uid != study.ct.frame_of_reference_uid)
-      throw Error(
-          fmt::format("{}: {} is not that of the planning CT", folder.string(), described(DCM_FrameOfReferenceUID)));
-    // As two X-rays at right angles would show the phase.
-    const RendererPyramid of_phase(options.flags.rendering.kind(), phase.hu, options.flags.rendering.model(),
-                                   beams_of(study), options.flags.rendering.options());
-    std::vector<FixedImage> views;
-    for (const double gantry_deg : {0.0, 90.0}) {
-      const XrayView view = make_xray_view({.sad_mm = 1000.0,
-                                            .gantry_angle_rad = rad_from_deg(gantry_deg),
-                                            .receptor_translation_mm = {0.0, 0.0, -500.0},
-                                            .column_spacing_mm = 1.2,
-                                            .row_spacing_mm = 1.2,
-                                            .position_mm = {-153.0, 153.0},
-                                            .columns = 256,
-                                            .rows = 256},
-                                           study.xrays.front().view.beam);
-      const RenderResult drr = of_phase.finest().render(
-          std::span(&view, 1), std::span(&study.planned_room_from_patient, 1), PixelSet::all());
-      FixedImage image{.view = view,
-                       .line_integral = image_of(view, drr.line_integrals(0, 0)),
-                       .field = Image<std::uint8_t>(view.columns, view.rows, 1)};
-      views.push_back(std::move(image));
-    }
-    Tracker once(setup.renderers(), *setup.options().region, study.planned_room_from_patient, target, {});
-    const TrackedFrame found = once.track(0.0, std::move(views));
-    if (!found.measured_mm) throw Error(fmt::format("{}: the target was not found in this phase", folder.string()));
-    displacements.emplace_back(*found.measured_mm);
-  }
-  return displacements;
-}
-
 }  // namespace
 
 void add_track_command(CLI::App& app, Console& console, int& exit_status) {
@@ -461,11 +429,8 @@ void add_track_command(CLI::App& app, Console& console, int& exit_status) {
       ->type_name("S")
       ->check(CLI::Range(0.1, 3600.0))
       ->capture_default_str();
-  std::vector<std::string> names;
-  names.reserve(kPredictorKinds.size());
-  for (const PredictorKind kind : kPredictorKinds) names.emplace_back(to_string(kind));
   command->add_option("--predictor", options->predictor, "How the target is predicted")
-      ->check(CLI::IsMember(names))
+      ->check(CLI::IsMember(predictor_names()))
       ->capture_default_str();
   command->add_option("--phases", options->phases, "Folders of the phases of a 4D CT, in order, for --predictor model")
       ->type_name("FOLDER...");

@@ -2,6 +2,8 @@
 // Where a target was at a moment.
 
 #include <Eigen/Core>
+#include <optional>
+#include <span>
 
 namespace isoshift {
 
@@ -9,5 +11,8 @@ struct MotionSample {
   double time_s = 0.0;
   Eigen::Vector3d position_mm = Eigen::Vector3d::Zero();
 };
+
+// Between the samples around a moment, linearly; nothing outside the trace. Precondition: times increase.
+std::optional<Eigen::Vector3d> position_at(std::span<const MotionSample> trace, double time_s);
 
 }  // namespace isoshift

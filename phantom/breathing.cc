@@ -32,10 +32,7 @@ Eigen::Vector3d Breathing::displacement_mm(double time_s) const {
     const std::vector<MotionSample>& trace = options_.trace;
     const double length_s = trace.back().time_s - trace.front().time_s;
     const double at_s = trace.front().time_s + std::fmod(time_s, length_s);
-    const auto after = std::ranges::upper_bound(trace, at_s, {}, &MotionSample::time_s);
-    const MotionSample &a = *std::prev(after), &b = after == trace.end() ? trace.back() : *after;
-    const double share = b.time_s > a.time_s ? (at_s - a.time_s) / (b.time_s - a.time_s) : 0.0;
-    return a.position_mm + share * (b.position_mm - a.position_mm) - trace.front().position_mm;
+    return position_at(trace, at_s).value_or(trace.back().position_mm) - trace.front().position_mm;
   }
   if (breaths_.empty()) return Eigen::Vector3d::Zero();
   const auto next = std::ranges::upper_bound(breaths_, time_s, {}, &Breath::begin_s);

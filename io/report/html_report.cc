@@ -8,6 +8,7 @@
 #include "io/report/drawings.h"
 #include "io/report/formats.h"
 #include "io/report/page.html.h"
+#include "io/report/polygons_json.h"
 
 namespace isoshift {
 namespace {
@@ -123,34 +124,24 @@ std::string view_figure(const SetupReport::View& view, std::size_t number) {
          "<label><input type=\"checkbox\" name=\"marks\" checked> marks</label></fieldset></div></figure>";
 }
 
-using Json = nlohmann::json;
-
-Json points(const std::vector<Polygon>& polygons) {
-  Json list_of_polygons = Json::array();
-  for (const Polygon& polygon : polygons) {
-    Json one = Json::array();
-    for (const Eigen::Vector2d& point : polygon)
-      one.push_back({std::round(point.x() * 10.0) / 10.0, std::round(point.y() * 10.0) / 10.0});
-    list_of_polygons.push_back(one);
-  }
-  return list_of_polygons;
-}
+using Json = nlohmann::ordered_json;
 
 Json view_data(const SetupReport::View& view, std::size_t number) {
   Json structures = Json::array();
   for (const ViewPicture::Outline& outline : view.picture.structures)
-    structures.push_back(
-        {{"name", printable(outline.name)}, {"planned", points(outline.planned)}, {"found", points(outline.found)}});
+    structures.push_back({{"name", printable(outline.name)},
+                          {"planned", polygons_json(outline.planned)},
+                          {"found", polygons_json(outline.found)}});
   const MismatchMarks marks = mismatch_marks(view);
   return {{"number", number},
           {"label", printable(view.label)},
           {"isocenter", {view.picture.isocenter_px.x(), view.picture.isocenter_px.y()}},
           {"pixels_per_mm", view.picture.pixels_per_mm},
           {"directions", view.picture.directions},
-          {"field", points(view.picture.field)},
+          {"field", polygons_json(view.picture.field)},
           {"structures", structures},
-          {"squares", points(marks.squares)},
-          {"ways", points(marks.ways)}};
+          {"squares", polygons_json(marks.squares)},
+          {"ways", polygons_json(marks.ways)}};
 }
 
 // JSON inside a script element: no text can end the element.

@@ -9,6 +9,7 @@
 #include "geometry/error.h"
 #include "geometry/rotation.h"
 #include "io/report/formats.h"
+#include "io/report/polygons_json.h"
 
 namespace isoshift {
 namespace {
@@ -93,17 +94,6 @@ Json stage_json(const SetupReport::Stage& stage) {
                {"best", stage.best}};
   for (const auto& [name, value] : stage.parameters) json["parameters"][name] = value;
   return json;
-}
-
-Json polygons_json(const std::vector<Polygon>& polygons) {
-  Json list = Json::array();
-  for (const Polygon& polygon : polygons) {
-    Json points = Json::array();
-    for (const Eigen::Vector2d& point : polygon)
-      points.push_back({std::round(point.x() * 10.0) / 10.0, std::round(point.y() * 10.0) / 10.0});
-    list.push_back(points);
-  }
-  return list;
 }
 
 Json picture_json(const ViewPicture& picture) {

@@ -102,7 +102,7 @@ std::string joined(const std::vector<std::string>& parts, const char* separator 
 std::string described_view(const SetupReport::View& view) {
   return joined({printable(view.label),
                  view.gantry_deg ? fmt::format("gantry {:.1f} deg", *view.gantry_deg) : "by its matrix",
-                 view.is_megavoltage ? "MV" : "kV", view.acquired,
+                 view.is_megavoltage ? "MV" : "kV", printable(view.acquired),
                  view.origin.empty() ? "" : "angles " + printable(view.origin)});
 }
 

@@ -54,6 +54,13 @@ std::optional<PredictorKind> predictor_kind_from(std::string_view name) {
   return found == kPredictorKinds.end() ? std::nullopt : std::optional(*found);
 }
 
+std::vector<std::string> predictor_names() {
+  std::vector<std::string> names(kPredictorKinds.size());
+  std::ranges::transform(kPredictorKinds, names.begin(),
+                         [](PredictorKind kind) { return std::string(to_string(kind)); });
+  return names;
+}
+
 std::unique_ptr<Predictor> make_predictor(PredictorKind kind, const PredictorOptions& options) {
   switch (kind) {
     case PredictorKind::kHoldLast: return std::make_unique<HoldLast>();

@@ -10,6 +10,7 @@
 #include <array>
 #include <memory>
 #include <optional>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -53,6 +54,7 @@ inline constexpr std::array kPredictorKinds = {PredictorKind::kHoldLast, Predict
                                                PredictorKind::kModel};
 std::string_view to_string(PredictorKind kind);
 std::optional<PredictorKind> predictor_kind_from(std::string_view name);
+std::vector<std::string> predictor_names();  // all of them
 
 // The constants were chosen leaving one session out each time (docs/motion.md).
 struct PredictorOptions {

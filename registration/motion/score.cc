@@ -27,6 +27,19 @@ std::vector<MotionSample> resampled(std::span<const MotionSample> trace, double 
   return even;
 }
 
+PredictionScore score_of(std::vector<double> errors_mm) {
+  PredictionScore result{.samples = errors_mm.size()};
+  if (errors_mm.empty()) return result;
+  std::ranges::sort(errors_mm);
+  double squares = 0.0;
+  for (const double error_mm : errors_mm) squares += error_mm * error_mm;
+  result.median_mm = errors_mm[errors_mm.size() / 2];
+  result.rmse_mm = std::sqrt(squares / static_cast<double>(errors_mm.size()));
+  result.p95_mm = errors_mm[static_cast<std::size_t>(0.95 * static_cast<double>(errors_mm.size() - 1))];
+  result.max_mm = errors_mm.back();
+  return result;
+}
+
 PredictionScore score(PredictorKind kind, const PredictorOptions& options, std::span<const MotionSample> trace,
                       double latency_s, const ScoreProtocol& protocol) {
   const std::vector<MotionSample> samples = resampled(trace, protocol.rate_hz);
@@ -48,15 +61,7 @@ PredictionScore score(PredictorKind kind, const PredictorOptions& options, std::
     if (known == 0 || sample.time_s <= scored_after_s) continue;
     errors_mm.push_back((predictor->predict(sample.time_s).position_mm - sample.position_mm).norm());
   }
-  PredictionScore result{.samples = errors_mm.size()};
-  if (errors_mm.empty()) return result;
-  double squares = 0.0;
-  for (const double error_mm : errors_mm) squares += error_mm * error_mm;
-  std::ranges::sort(errors_mm);
-  result.rmse_mm = std::sqrt(squares / static_cast<double>(errors_mm.size()));
-  result.p95_mm = errors_mm[static_cast<std::size_t>(0.95 * static_cast<double>(errors_mm.size() - 1))];
-  result.max_mm = errors_mm.back();
-  return result;
+  return score_of(std::move(errors_mm));
 }
 
 }  // namespace isoshift

@@ -17,10 +17,12 @@ struct ScoreProtocol {
   double measurement_sigma_mm = 0.3;  // what the filters are told of the samples
 };
 
+// Of 3D distances, such as those between prediction and sample; 0 where there are none.
 struct PredictionScore {
-  double rmse_mm = 0.0, p95_mm = 0.0, max_mm = 0.0;  // of the 3D distance between prediction and sample
-  std::size_t samples = 0;                           // scored
+  double median_mm = 0.0, rmse_mm = 0.0, p95_mm = 0.0, max_mm = 0.0;
+  std::size_t samples = 0;
 };
+PredictionScore score_of(std::vector<double> errors_mm);
 
 // On an even grid. Throws UsageError for fewer than two samples or times that do not increase.
 std::vector<MotionSample> resampled(std::span<const MotionSample> trace, double rate_hz);

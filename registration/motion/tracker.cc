@@ -123,7 +123,6 @@ TrackedFrame Tracker::track(double time_s, std::vector<FixedImage> views) {
   if (found && !is_lost(*found, unseen)) {
     frame.similarity = found->similarity;
     frame.status = unseen.empty() ? FrameStatus::kMeasured : FrameStatus::kPartly;
-    frame.actual_room_from_patient = found->pose;
     Eigen::Vector3d measured_mm = found->pose * target_patient_mm_ - planned_ * target_patient_mm_;
     Eigen::Matrix3d covariance =
         options_.measurement_sigma_mm * options_.measurement_sigma_mm * Eigen::Matrix3d::Identity();

@@ -48,7 +48,6 @@ struct TrackedFrame {
   bool is_warm = false;                                    // the predictor has seen enough
   std::vector<Eigen::Vector3d> unseen_room;                // unit directions along which the views cannot tell
   double similarity = 0.0;
-  Eigen::Isometry3d actual_room_from_patient = Eigen::Isometry3d::Identity();
 };
 
 class Tracker {
