@@ -6,13 +6,14 @@
 #include <thread>
 
 #include "cli/commands.h"
+#include "cli/graceful_end.h"
 #include "io/decoder_process.h"
 #include "io/output_folder.h"
 
 namespace {
 
-// SIGINT and SIGTERM end the program without leaving half a result behind: a thread of its own waits for them, since
-// hardly anything may be done in a handler.
+// SIGINT and SIGTERM end the program without leaving half a result behind, or ask its work to end (cli/graceful_end.h):
+// a thread of its own waits for them, since hardly anything may be done in a handler.
 void end_cleanly_on_signals() {
   static sigset_t signals;
   sigemptyset(&signals);
@@ -21,7 +22,9 @@ void end_cleanly_on_signals() {
   pthread_sigmask(SIG_BLOCK, &signals, nullptr);  // inherited by every thread made later
   std::thread([] {
     int signal = 0;
-    sigwait(&signals, &signal);
+    do {
+      sigwait(&signals, &signal);
+    } while (isoshift::ask_for_end());
     isoshift::abandon_outputs();
     ::_exit(128 + signal);
   }).detach();

@@ -1,7 +1,5 @@
 #include "cli/registration_setup.h"
 
-#include "cli/study_options.h"
-
 namespace isoshift {
 
 void RegistrationFlags::settle() {
@@ -16,9 +14,9 @@ void add_registration_flags(CLI::App& command, RegistrationFlags& flags) {
   add_rendering_options(command, flags.rendering);
 }
 
-RegistrationSetup::RegistrationSetup(const RegistrationFlags& flags, const Study& study)
+RegistrationSetup::RegistrationSetup(const RegistrationFlags& flags, const Study& study, std::span<const Beam> beams)
     : region_(region_of(flags.region, study, flags.rendering.threshold_hu)),
-      renderers_(flags.rendering.kind(), region_.rendered_ct, flags.rendering.model(), beams_of(study),
+      renderers_(flags.rendering.kind(), region_.rendered_ct, flags.rendering.model(), beams,
                  flags.rendering.options()),
       options_(flags.search.registration()) {
   options_.region = &region_.projected;

@@ -4,6 +4,7 @@
 #include "cli/region_switches.h"
 #include "cli/rendering_options.h"
 #include "cli/search_switches.h"
+#include "cli/study_options.h"
 #include "drr/renderer_pyramid.h"
 
 namespace isoshift {
@@ -21,7 +22,10 @@ void add_registration_flags(CLI::App& command, RegistrationFlags& flags);
 // The options refer to the region: neither can be moved.
 class RegistrationSetup {
  public:
-  RegistrationSetup(const RegistrationFlags& flags, const Study& study);
+  RegistrationSetup(const RegistrationFlags& flags, const Study& study)
+      : RegistrationSetup(flags, study, beams_of(study)) {}
+  // For views of other beam qualities than the study's, too.
+  RegistrationSetup(const RegistrationFlags& flags, const Study& study, std::span<const Beam> beams);
   RegistrationSetup(const RegistrationSetup&) = delete;
   RegistrationSetup& operator=(const RegistrationSetup&) = delete;
 

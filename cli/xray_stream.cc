@@ -3,10 +3,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 #include <iterator>
 
 #include "geometry/error.h"
+#include "io/session.h"
 
 namespace isoshift {
 
@@ -20,17 +20,8 @@ std::optional<TimedXray> XrayStream::checked(RtImage header) const {
   header = with_switches(header, request_.switches, said);
   if (!header.patient_position) header.patient_position = std::string(to_string(study_.patient_position));
   std::vector<Finding> findings = rt_image_findings(header);
-  if (header.identity.patient_id != study_.ct.identity.patient_id)
-    findings.push_back(
-        {"patient-mismatch", fmt::format("{}: {} differs from the CT's", where, described(DCM_PatientID))});
-  const RtImage& first = study_.rt_images.front();
-  const auto has_moved = [&](const std::optional<double> RtImage::*read_out, double tolerance) {
-    return header.*read_out && first.*read_out && std::abs(*(header.*read_out) - *(first.*read_out)) > tolerance;
-  };
-  constexpr double kMaxMm = 0.5, kMaxDeg = 0.1;
-  if (has_moved(&RtImage::table_lateral_mm, kMaxMm) || has_moved(&RtImage::table_longitudinal_mm, kMaxMm) ||
-      has_moved(&RtImage::table_vertical_mm, kMaxMm) || has_moved(&RtImage::support_angle_deg, kMaxDeg))
-    findings.push_back({"table-moved", fmt::format("{}: the table moved since {}", where, first.path.string())});
+  std::ranges::move(patient_findings(study_.ct.identity, header.identity, where), std::back_inserter(findings));
+  std::ranges::move(table_findings(header, study_.rt_images.front()), std::back_inserter(findings));
   settle(findings, request_.allowed, said);
   if (const auto missing = missing_attributes(header); !missing.empty())
     throw Error(fmt::format("{}: {} is missing", where, described(missing.front().tag)));
@@ -50,6 +41,7 @@ void XrayStream::take(TimedXray timed, Notes& notes) {
   const std::string where = timed.header.path.string();
   if (processed_until_s_ && timed.time_s <= *processed_until_s_) {
     ++counts_.late;
+    late_s_.push_back(timed.time_s);
     notes.warnings.push_back(fmt::format("{}: came after a later one had been processed, and was left out", where));
     return;
   }
@@ -68,7 +60,7 @@ void XrayStream::take(TimedXray timed, Notes& notes) {
 
 void XrayStream::offer(const std::vector<std::filesystem::path>& files, int tries, Notes& notes) {
   for (const std::filesystem::path& file : files) {
-    if (taken_files_.contains(file)) continue;
+    if (done_files_.contains(file.native())) continue;
     try {
       Notes unimportant;
       std::vector<TimedXray> of_file;
@@ -86,7 +78,7 @@ void XrayStream::offer(const std::vector<std::filesystem::path>& files, int trie
       notes.warnings.push_back(fmt::format("left out: {}", error.what()));
     }
     failures_.erase(file);
-    taken_files_.insert(file);
+    done_files_.insert(file.native());
   }
 }
 

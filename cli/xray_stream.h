@@ -7,6 +7,7 @@
 #include <optional>
 #include <set>
 #include <string>
+#include <unordered_set>
 #include <vector>
 
 #include "cli/study_options.h"
@@ -20,7 +21,7 @@ struct TimedXray {
   std::optional<XrayImage> xray;  // of files that still arrive: read at once, so that none is half written
 };
 
-// What became of the files.
+// What became of the files that are not followed.
 struct StreamCounts {
   std::size_t repeated = 0;  // an instance that was there before
   std::size_t late = 0;      // taken before a moment that was processed already
@@ -33,8 +34,8 @@ class XrayStream {
   XrayStream(const StudyRequest& request, const Study& study, bool reads_pixels)
       : request_(request), study_(study), reads_pixels_(reads_pixels) {}
 
-  // Takes what can be read of the files; those that cannot, yet, are tried again by the next calls and given up after
-  // `tries`. Each warning is said once.
+  // Takes what can be read of the files that are not done; those that cannot, yet, are tried again by the next calls
+  // and given up after `tries`. Each warning is said once.
   void offer(const std::vector<std::filesystem::path>& files, int tries, Notes& notes);
 
   // The X-rays of the earliest moment, those of all imagers within `together_s`; nothing where none waits.
@@ -44,7 +45,10 @@ class XrayStream {
   // When the first X-ray of all was taken.
   std::optional<double> begin_s() const { return begin_s_; }
   const StreamCounts& counts() const { return counts_; }
+  const std::vector<double>& late_s() const { return late_s_; }  // when those were taken
   std::size_t waiting() const { return waiting_.size(); }
+  std::size_t imagers() const { return imagers_.size(); }
+  const std::unordered_set<std::string>& done_files() const { return done_files_; }  // offering them again does nothing
 
  private:
   std::optional<TimedXray> checked(RtImage header) const;
@@ -55,11 +59,12 @@ class XrayStream {
   bool reads_pixels_;
   std::set<std::string> imagers_;
   std::deque<TimedXray> waiting_;  // by time
-  std::set<std::string> seen_instances_;
-  std::set<std::filesystem::path> taken_files_;
+  std::unordered_set<std::string> seen_instances_;
+  std::unordered_set<std::string> done_files_;
   std::map<std::filesystem::path, int> failures_;
   std::optional<double> begin_s_, processed_until_s_;
   StreamCounts counts_;
+  std::vector<double> late_s_;
 };
 
 }  // namespace isoshift

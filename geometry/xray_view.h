@@ -2,12 +2,14 @@
 // One X-ray exposure as a pinhole camera in room coordinates.
 
 #include <Eigen/Geometry>
+#include <array>
 #include <optional>
 
 namespace isoshift {
 
 // Radiation quality; it chooses the attenuation curve of the DRR (docs/algorithms.md).
 enum class Beam { kKilovoltage, kMegavoltage };
+inline constexpr std::array kBeams = {Beam::kKilovoltage, Beam::kMegavoltage};
 
 // From the source to the center of a pixel on the receptor, both in mm in the room.
 struct Ray {

@@ -11,44 +11,19 @@
 
 #include "geometry/error.h"
 #include "io/decode.h"
+#include "io/session.h"
 
 namespace isoshift {
 namespace {
 
-constexpr double kMaxTimeSpanS = 600.0;
-constexpr double kMaxTableMoveMm = 0.5;
-constexpr double kMaxTableTurnDeg = 0.1;
-
-// Empty components at the end of a name may be written or not (PS3.5 6.2.1.1).
-std::string without_trailing_carets(std::string name) {
-  name.erase(name.find_last_not_of("^ ") + 1);
-  return name;
-}
-
-// One patient throughout: an ID is there and the same, and so are name and birth date where both files have them.
 std::vector<Finding> patient_findings(const Study& study) {
-  const Identity& ct = study.ct.identity;
   std::vector<Finding> findings;
-  const auto compare = [&](const Identity& other, const std::string& where) {
-    const auto differ = [&](const std::string Identity::*member, const DcmTagKey& tag, bool may_be_empty) {
-      const bool is_empty = (other.*member).empty() || (ct.*member).empty();
-      if (without_trailing_carets(other.*member) == without_trailing_carets(ct.*member) && (may_be_empty || !is_empty))
-        return;
-      if (may_be_empty && is_empty) return;
-      findings.push_back({"patient-mismatch",
-                          is_empty ? fmt::format("{}: {} is empty in this file or in the CT: whose they are is unknown",
-                                                 where, described(tag))
-                                   : fmt::format("{}: {} differs from the CT's: the inputs are of different patients",
-                                                 where, described(tag))});
-    };
-    differ(&Identity::patient_id, DCM_PatientID, false);
-    differ(&Identity::patient_id_issuer, DCM_IssuerOfPatientID, true);
-    differ(&Identity::patient_name, DCM_PatientName, true);
-    differ(&Identity::patient_birth_date, DCM_PatientBirthDate, true);
+  const auto compare = [&](const Identity& identity, const std::filesystem::path& path) {
+    std::ranges::move(patient_findings(study.ct.identity, identity, path.string()), std::back_inserter(findings));
   };
-  if (study.plan) compare(study.plan->identity, study.plan->path.string());
-  if (study.structures) compare(study.structures->identity, study.structures->path.string());
-  for (const RtImage& image : study.rt_images) compare(image.identity, image.path.string());
+  if (study.plan) compare(study.plan->identity, study.plan->path);
+  if (study.structures) compare(study.structures->identity, study.structures->path);
+  for (const RtImage& image : study.rt_images) compare(image.identity, image.path);
   return findings;
 }
 
@@ -97,69 +72,6 @@ std::vector<Finding> structure_findings(const Study& study, Notes& notes) {
   return {{"for-mismatch", fmt::format("{}: {} of {} is not that of the CT, so they do not apply to it",
                                        study.structures->path.string(), described(DCM_ReferencedFrameOfReferenceUID),
                                        fmt::join(elsewhere, ", "))}};
-}
-
-// The views must be of one moment and one table position. Each is compared with the first view that says; one that does
-// not say is warned of where others do.
-std::vector<Finding> session_findings(const Study& study, Notes& notes) {
-  std::vector<Finding> findings;
-  const auto compare = [&](const DcmTagKey& tag, auto&& value_of, auto&& finding_of) {
-    const RtImage* reference = nullptr;
-    for (const RtImage& image : study.rt_images) {
-      if (!value_of(image)) continue;
-      if (reference == nullptr) reference = &image;
-      if (auto finding = finding_of(image, *value_of(image), *reference, *value_of(*reference)))
-        findings.push_back(std::move(*finding));
-    }
-    for (const RtImage& image : study.rt_images)
-      if (!value_of(image) && study.rt_images.size() > 1)
-        notes.warnings.push_back(fmt::format("{}: {} is missing, so it could not be compared with the other views",
-                                             image.label, described(tag)));
-  };
-
-  compare(DCM_AcquisitionTime, acquisition_seconds,
-          [](const RtImage& image, double at_s, const RtImage& first, double first_s) -> std::optional<Finding> {
-            if (std::abs(at_s - first_s) <= kMaxTimeSpanS) return std::nullopt;
-            return Finding{"time-span", fmt::format("{}: taken {:.0f} minutes from {}, expected at most 10 ({})",
-                                                    image.path.string(), std::abs(at_s - first_s) / 60.0,
-                                                    first.path.string(), described(DCM_AcquisitionTime))};
-          });
-  // Read-outs of the table, where any view has them.
-  using ReadOut = const std::optional<double> RtImage::*;
-  const auto compare_read_out = [&](ReadOut read_out, const DcmTagKey& tag, auto&& finding_of) {
-    const auto value_of = [&](const RtImage& image) { return image.*read_out; };
-    if (std::ranges::any_of(study.rt_images, [&](const RtImage& image) { return value_of(image).has_value(); }))
-      compare(tag, value_of, finding_of);
-  };
-  const auto compare_position = [&](ReadOut position, const DcmTagKey& tag) {
-    compare_read_out(
-        position, tag,
-        [&](const RtImage& image, double at_mm, const RtImage& first, double first_mm) -> std::optional<Finding> {
-          if (std::abs(at_mm - first_mm) <= kMaxTableMoveMm) return std::nullopt;
-          return Finding{"table-moved",
-                         fmt::format("{}: the table moved by {:.1f} mm since {} ({})", image.path.string(),
-                                     at_mm - first_mm, first.path.string(), described(tag))};
-        });
-  };
-  compare_position(&RtImage::table_lateral_mm, DCM_TableTopLateralPosition);
-  compare_position(&RtImage::table_longitudinal_mm, DCM_TableTopLongitudinalPosition);
-  compare_position(&RtImage::table_vertical_mm, DCM_TableTopVerticalPosition);
-  const auto compare_angle = [&](ReadOut angle, const DcmTagKey& tag) {
-    compare_read_out(
-        angle, tag,
-        [&](const RtImage& image, double at_deg, const RtImage& first, double first_deg) -> std::optional<Finding> {
-          const double turned_deg = deg_from_rad(wrapped_rad(rad_from_deg(at_deg - first_deg)));
-          if (std::abs(turned_deg) <= kMaxTableTurnDeg) return std::nullopt;
-          return Finding{"table-moved",
-                         fmt::format("{}: the table turned by {:.1f} degrees since {} ({})", image.path.string(),
-                                     turned_deg, first.path.string(), described(tag))};
-        });
-  };
-  compare_angle(&RtImage::support_angle_deg, DCM_PatientSupportAngle);
-  compare_angle(&RtImage::eccentric_angle_deg, DCM_TableTopEccentricAngle);
-  compare_angle(&RtImage::table_pitch_deg, DCM_TableTopPitchAngle);
-  compare_angle(&RtImage::table_roll_deg, DCM_TableTopRollAngle);
-  return findings;
 }
 
 void check_one_patient_position(const Study& study) {
@@ -288,6 +200,7 @@ Study load_study(const StudyRequest& request, Notes& notes, const Progress& prog
   const StudyParts parts = find_parts(named);
   Study study;
   study.machine = request.machine;
+  study.image_files = parts.images;
   notes.left_aside = parts.left_aside;
   if (parts.plan) study.plan = read_rt_plan(*parts.plan);
   if (parts.structures) study.structures = read_rt_structures(*parts.structures);
@@ -334,7 +247,7 @@ Study load_study(const StudyRequest& request, Notes& notes, const Progress& prog
   findings = patient_findings(study);
   std::ranges::move(plan_findings(study, notes), std::back_inserter(findings));
   std::ranges::move(structure_findings(study, notes), std::back_inserter(findings));
-  std::ranges::move(session_findings(study, notes), std::back_inserter(findings));
+  std::ranges::move(session_findings(study.rt_images, notes), std::back_inserter(findings));
   settle(findings, request.allowed, notes);
   check_one_patient_position(study);
 

@@ -30,6 +30,7 @@ struct Study {
   CtSeries ct;
   std::optional<RtPlan> plan;
   std::optional<RtStructures> structures;
+  std::vector<std::filesystem::path> image_files;  // of all X-rays that belong to it, those left out for others too
   std::vector<RtImage> rt_images;  // headers with machine profile and switches applied, in order of acquisition
   std::vector<XrayImage> xrays;    // the same images, ready for registration
   std::optional<MachineProfile> machine;

@@ -13,24 +13,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-std::vector<fs::path> files_below(const std::vector<fs::path>& paths) {
-  std::set<fs::path> files;
-  for (const fs::path& path : paths) {
-    std::error_code error;
-    const auto status = fs::status(path, error);
-    if (!fs::exists(status)) throw Error(fmt::format("{}: no such file or folder", path.string()));
-    if (!fs::is_directory(status)) {
-      files.insert(path);
-      continue;
-    }
-    for (auto entry = fs::recursive_directory_iterator(path, error); !error && entry != fs::end(entry);
-         entry.increment(error))
-      if (entry->is_regular_file() && !entry->path().filename().string().starts_with('.')) files.insert(entry->path());
-    if (error) throw Error(fmt::format("{}: cannot be searched: {}", path.string(), error.message()));
-  }
-  return {files.begin(), files.end()};
-}
-
 std::string first_reference(const DicomItem& dataset, const DcmTagKey& sequence) {
   for (const DicomItem& item : dataset.items(sequence)) return item.text(DCM_ReferencedSOPInstanceUID).value_or("");
   return "";
@@ -212,6 +194,29 @@ void take_named_structures(const fs::path& named, const std::vector<StudyFiles::
 }
 
 }  // namespace
+
+std::vector<fs::path> files_below(const std::vector<fs::path>& paths, const std::unordered_set<std::string>& but) {
+  std::vector<fs::path> files;
+  const auto add = [&](const fs::path& file) {
+    if (!but.contains(file.native())) files.push_back(file);
+  };
+  for (const fs::path& path : paths) {
+    std::error_code error;
+    const auto status = fs::status(path, error);
+    if (!fs::exists(status)) throw Error(fmt::format("{}: no such file or folder", path.string()));
+    if (!fs::is_directory(status)) {
+      add(path);
+      continue;
+    }
+    for (auto entry = fs::recursive_directory_iterator(path, error); !error && entry != fs::end(entry);
+         entry.increment(error))
+      if (!entry->path().filename().native().starts_with('.') && entry->is_regular_file()) add(entry->path());
+    if (error) throw Error(fmt::format("{}: cannot be searched: {}", path.string(), error.message()));
+  }
+  std::ranges::sort(files);
+  files.erase(std::ranges::unique(files).begin(), files.end());
+  return files;
+}
 
 StudyFiles scan_study(const std::vector<fs::path>& paths) {
   StudyFiles files;

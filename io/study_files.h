@@ -6,6 +6,7 @@
 #include <optional>
 #include <set>
 #include <string>
+#include <unordered_set>
 #include <vector>
 
 namespace isoshift {
@@ -43,8 +44,13 @@ struct StudyFiles {
   std::vector<std::string> unreadable;  // why files that begin as DICOM, or cannot be opened, cannot be read
 };
 
+// All files below `paths` (files or folders) but those named and hidden ones (with a leading dot), in the order of
+// their names. Throws Error for a path that is not there or cannot be searched.
+std::vector<std::filesystem::path> files_below(const std::vector<std::filesystem::path>& paths,
+                                               const std::unordered_set<std::string>& but = {});
+
 // Reads the headers of all files below `paths` (files or folders), in the order of their names. A file that is no DICOM
-// is left aside; hidden files (named with a leading dot) are not looked at.
+// is left aside.
 StudyFiles scan_study(const std::vector<std::filesystem::path>& paths);
 
 // The parts of one registration.

@@ -11,9 +11,8 @@ namespace {
 constexpr double kPeriodS = 4.0;
 const Eigen::Vector3d kInhaledMm(1.2, -3.0, -12.0);
 
-// From 0 to 1 and back, longer inhaled than exhaled: the powers of Lujan et al., Med Phys 26, 1999, upside down, as in
-// a patient who holds the breath a little at its end.
-double inhaled(double phase) { return 1.0 - std::pow(std::cos(std::numbers::pi * phase), 4); }
+// From 0 to 1 and back, longer exhaled than inhaled, as Lujan et al., Med Phys 26, 1999, write it with n = 2.
+double inhaled(double phase) { return std::pow(std::sin(std::numbers::pi * phase), 4); }
 
 }  // namespace
 

@@ -9,7 +9,9 @@
 #include <nlohmann/json.hpp>
 #include <set>
 #include <thread>
+#include <utility>
 
+#include "cli/graceful_end.h"
 #include "tests/support/small_study.h"
 
 namespace isoshift {
@@ -24,7 +26,7 @@ class TrackCommandTest : public testing::Test {
   static void SetUpTestSuite() {
     folder_ = new TemporaryFolder;
     const CommandOutcome made =
-        run_command({"phantom", "-o", study().string(), "--anatomy", "thorax", "--breathing", "8", "--voxel-mm", "2.5",
+        run_command({"phantom", "-o", study().string(), "--anatomy", "thorax", "--breathing", "8", "--voxel-mm", "2",
                      "--image-pixels", "192", "--phases", "4", "--translation", "1,-2,1", "--rotation", "0,0,0"});
     ASSERT_EQ(made.exit_status, 0) << made.err;
   }
@@ -61,9 +63,10 @@ TEST_F(TrackCommandTest, FollowsTheTargetAndPredictsIt) {
   EXPECT_EQ(json["frames"], kMoments);
   EXPECT_EQ(json["status"]["measured"], kMoments);
   const auto& errors = json["beside_truth"];
-  EXPECT_LT(errors["measured"]["median_mm"], 0.6);  // voxels of 2.5 x 2.5 x 3.75 mm
+  EXPECT_LT(errors["measured"]["median_mm"], 0.6);  // voxels of 2 x 2 x 3 mm
   EXPECT_LT(errors["predicted"]["rmse_mm"].get<double>(), 0.9 * errors["hold_last"]["rmse_mm"].get<double>());
   EXPECT_FALSE(json["beam_holds_s"].empty());
+  EXPECT_NEAR(json["predictor_warm_from_s"], 0.2, 1e-6);  // two measurements
   for (const char* name : {"trace.csv", "track.json", "trace.svg"})
     EXPECT_TRUE(std::filesystem::exists(output() / name));
   // Its trace is one for predict.
@@ -74,7 +77,14 @@ TEST_F(TrackCommandTest, FollowsTheTargetAndPredictsIt) {
 TEST_F(TrackCommandTest, ThePhasesOfThe4dCtTeachTheModel) {
   std::vector<std::string> more = {"--predictor", "model", "--phases"};
   for (int phase = 0; phase < 4; ++phase) more.push_back((study() / "PHASES" / fmt::format("{:02}", phase)).string());
-  EXPECT_EQ(track(more)["predictor"], "model");
+  const auto json = track(more);
+  EXPECT_EQ(json["predictor"], "model");
+  EXPECT_TRUE(json["predictor_warm_from_s"].is_null());  // 8 s do not tell phase and period
+  EXPECT_THAT(outcome_.out, HasSubstr("phases_mm"));
+  const Eigen::Vector3d inhaled_mm(1.2, -12.0, 3.0);  // toward the feet and to the front
+  for (const auto& [phase, share] : {std::pair(0, 0.0), std::pair(1, 0.25), std::pair(2, 1.0), std::pair(3, 0.25)})
+    for (int axis = 0; axis < 3; ++axis)
+      EXPECT_NEAR(json["phases_mm"][phase][axis], share * inhaled_mm[axis], 0.5) << phase << ", " << axis;
   EXPECT_EQ(run_command({"track", study().string(), "-o", output().string(), "--phases", "x"}).exit_status, 2);
   EXPECT_EQ(run_command(
                 {"track", study().string(), "-o", output().string(), "--predictor", "model", "--phases", "x", "y", "z"})
@@ -153,6 +163,40 @@ TEST_F(TrackCommandTest, FollowsAFolderThatIsBeingFilled) {
   EXPECT_EQ(json["files"]["broken"], 1);
   EXPECT_THAT(outcome_.err, HasSubstr("broken.dcm"));
   EXPECT_THAT(outcome_.err, HasSubstr("came after a later one had been processed"));
+  std::ifstream trace(output() / "trace.csv");
+  const std::string rows{std::istreambuf_iterator<char>(trace), {}};
+  EXPECT_THAT(rows, HasSubstr("\n1.8000,,,,,,,,,,,,,,,late\n1.8000,,,,,,,,,,,,,,,late\n2.0000,"));
+}
+
+// The second imager begins in the middle, and is one of megavoltage. Whoever ends the run has its results.
+TEST_F(TrackCommandTest, AnImagerMayBeginLaterAndARunBeEnded) {
+  const std::filesystem::path both = own_ / "both", incoming = own_ / "incoming";
+  const CommandOutcome made = run_command({"phantom", "-o", both.string(), "--anatomy", "thorax", "--breathing", "2",
+                                           "--voxel-mm", "2", "--image-pixels", "192", "--phases", "0", "--translation",
+                                           "0,0,0", "--rotation", "0,0,0", "--mv-angles", "90"});
+  ASSERT_EQ(made.exit_status, 0) << made.err;
+  std::filesystem::create_directories(incoming);
+  const auto send = [&](const std::string& name) {
+    std::filesystem::copy_file(both / "RTIMAGE" / name, incoming / name);
+  };
+  send("KV_G000_00001.dcm");
+  std::jthread sender([&] {
+    std::this_thread::sleep_for(std::chrono::milliseconds(1500));
+    for (int moment = 2; moment <= 10; ++moment) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(100));
+      send(fmt::format("KV_G000_{:05}.dcm", moment));
+      if (moment > 4) send(fmt::format("KV_G090_{:05}.dcm", moment));
+    }
+    std::this_thread::sleep_for(std::chrono::milliseconds(1500));
+    EXPECT_TRUE(ask_for_end());
+  });
+  const auto json = track({"--ct", (both / "CT").string(), "--plan", (both / "RTPLAN.dcm").string(), "--structures",
+                           (both / "RTSTRUCT.dcm").string(), "--follow", incoming.string(), "--idle", "600"},
+                          false);
+  EXPECT_EQ(json["imagers"], 2);
+  EXPECT_GE(json["status"]["measured"], 5);  // the last moments
+  EXPECT_GE(json["status"]["partly"], 4);
+  EXPECT_EQ(json["files"]["broken"], 0);
 }
 
 // Some moments of the study, in which the X-rays of `spoiled` show nothing.
