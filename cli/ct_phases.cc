@@ -40,7 +40,7 @@ std::vector<Eigen::VectorXd> displacements_of_phases(const std::vector<std::file
   std::vector<Eigen::VectorXd> displacements;
   for (const std::filesystem::path& folder : folders) {
     const CtSeries ct = read_ct_series(files_below({folder}), allowed, notes, {});
-    if (ct.frame_of_reference_uid != study.ct.frame_of_reference_uid)
+    if (ct.frame_of_reference_uid != study.ct->frame_of_reference_uid)
       throw Error(
           fmt::format("{}: {} is not that of the planning CT", folder.string(), described(DCM_FrameOfReferenceUID)));
     const RendererPyramid phase(rendering.kind(), ct.hu, rendering.model(), beams_of(study), rendering.options());

@@ -38,8 +38,8 @@ void run_drr(const DrrOptions& options, Console& console) {
   Notes notes;
   options.rendering.check();
   const Study study = load(options.study, notes, console);
-  const auto renderer = make_renderer(options.rendering.kind(), study.ct.hu, options.rendering.model(), beams_of(study),
-                                      options.rendering.options());
+  const auto renderer = make_renderer(options.rendering.kind(), study.ct->hu, options.rendering.model(),
+                                      beams_of(study), options.rendering.options());
   const std::array pose = {setup_error * study.planned_room_from_patient};
   for (const std::string& warning : notes.warnings) console.err << "warning: " << warning << "\n";
 

@@ -72,7 +72,7 @@ Json configuration_of(const RegistrationFlags& flags, const std::string& intensi
   }
   const AttenuationModel model = flags.rendering.model();
   return {{"program", fmt::format("isoshift {} ({})", kVersion, kCommit)},
-          {"ct_series", study.ct.series_instance_uid},
+          {"ct_series", study.ct->series_instance_uid},
           {"images", images},
           {"truth", rows_of(truth)},
           {"planned_room_from_patient", rows_of(study.planned_room_from_patient)},
@@ -220,7 +220,8 @@ int run_evaluate(EvaluateOptions options, Console& console) {
 
   Notes notes;
   const Study study = load(options.study, notes, console);
-  const RegistrationSetup setup(options.flags, study);
+  RendererStore renderers;
+  const RegistrationSetup setup(options.flags, study, beams_of(study), renderers);
   EvaluationFolder folder(options.output, configuration_of(options.flags, options.study.intensity, study,
                                                            setup.renderers().finest(), truth, protocol));
   {

@@ -140,9 +140,9 @@ void run_inspect(const std::vector<std::filesystem::path>& paths, const std::opt
                  Console& console) {
   const StudyFiles files = scan_study(paths);
   std::optional<std::string> planned_position;
-  for (const auto& [path, uid, frame, structures] : files.plans) {
-    console.out << describe_plan(path);
-    const RtPlan plan = read_rt_plan(path);
+  for (const StudyFiles::Plan& found : files.plans) {
+    console.out << describe_plan(found.file);
+    const RtPlan plan = read_rt_plan(found.file);
     planned_position = common_patient_position(plan, plan.beams);
   }
   for (const StudyFiles::Ct& ct : files.cts) console.out << describe_ct(ct.series_instance_uid, ct.files, console);

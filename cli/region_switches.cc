@@ -23,7 +23,7 @@ const Structure& structure_of(const Study& study, const std::string& name) {
 }
 
 Volume<std::uint8_t> mask_in_ct(const Study& study, const std::string& name) {
-  return mask_of(structure_of(study, name), study.ct.hu.size, study.ct.hu.patient_from_voxel);
+  return mask_of(structure_of(study, name), study.ct->hu.size, study.ct->hu.patient_from_voxel);
 }
 
 void unite(Volume<std::uint8_t>& mask, const Volume<std::uint8_t>& other) {
@@ -31,7 +31,7 @@ void unite(Volume<std::uint8_t>& mask, const Volume<std::uint8_t>& other) {
 }
 
 Volume<std::uint8_t> sphere(const Study& study, double radius_mm) {
-  const Volume<float>& ct = study.ct.hu;
+  const Volume<float>& ct = study.ct->hu;
   Volume<std::uint8_t> mask(ct.size, ct.patient_from_voxel);
   for (int k = 0; k < ct.size.z(); ++k)
     for (int j = 0; j < ct.size.y(); ++j)
@@ -79,7 +79,7 @@ RegionOfStudy region_of(const RegionSwitches& switches, const Study& study, doub
   if (switches.around_isocenter_mm && !(*switches.around_isocenter_mm > 0.0))
     throw UsageError(fmt::format("--around-isocenter {}: expected more than 0 mm", *switches.around_isocenter_mm));
   RegionOfInterest region;
-  RegionOfStudy result{.rendered_ct = study.ct.hu};
+  RegionOfStudy result;
   if (switches.around_isocenter_mm) region.volume = sphere(study, *switches.around_isocenter_mm);
   for (const std::string& name : switches.structures) {
     const Volume<std::uint8_t> mask = dilated(mask_in_ct(study, name), switches.margin_mm);
@@ -88,11 +88,11 @@ RegionOfStudy region_of(const RegionSwitches& switches, const Study& study, doub
     else
       region.volume = mask;
   }
-  if (region.volume) result.rendered_ct = only_inside(result.rendered_ct, dilated(*region.volume, kRenderedBeyondMm));
-  region.cut_ends = beyond_the_ct(study.ct.hu, threshold_hu);
+  if (region.volume) result.rendered_ct = only_inside(study.ct->hu, dilated(*region.volume, kRenderedBeyondMm));
+  region.cut_ends = beyond_the_ct(study.ct->hu, threshold_hu);
   for (const std::string& name : switches.excluded) {
     const Volume<std::uint8_t> mask = mask_in_ct(study, name);
-    result.rendered_ct = without(result.rendered_ct, mask);
+    result.rendered_ct = without(result.rendered_ct.value_or(study.ct->hu), mask);
     // A couch lies behind everything: its pixels stay, only its voxels go.
     if (structure_of(study, name).interpreted_type != "SUPPORT")
       region.left_out.push_back(dilated(mask, switches.margin_mm));

@@ -28,7 +28,8 @@ void add_region_switches(CLI::App& command, RegionSwitches& switches);
 
 // The CT as it is rendered, and what of the views is compared.
 struct RegionOfStudy {
-  Volume<float> rendered_ct;  // without what lies outside the volume of interest and without excluded structures
+  // Without what lies outside the volume of interest and without excluded structures; unset: the whole CT.
+  std::optional<Volume<float>> rendered_ct;
   ProjectedRegion projected;
 };
 // Throws UsageError for a radius that is not positive, and Error for a structure the study lacks.

@@ -27,15 +27,6 @@ class Stopwatch {
   std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();
 };
 
-int exit_status_of(Verdict verdict) {
-  switch (verdict) {
-    case Verdict::kAccepted: return kExitAccepted;
-    case Verdict::kReview: return kExitReview;
-    case Verdict::kRejected: return kExitRejected;
-  }
-  return kExitFailed;
-}
-
 // Accepted results are written; those for review, and those with a direction that nobody measured, only on request.
 bool may_write_registration(const RegisterOptions& options, const RegistrationResult& result) {
   if (!result.unobservable_room.empty() && !options.accept_unobservable) return false;
@@ -62,19 +53,23 @@ SpatialRegistrationOptions registration_options(RegistrationSource source, Verdi
 
 }  // namespace
 
-int run_register(const RegisterOptions& given, Console& console) {
-  RegisterOptions options = given;
-  options.flags.settle();
+int exit_status_of(Verdict verdict) {
+  switch (verdict) {
+    case Verdict::kAccepted: return kExitAccepted;
+    case Verdict::kReview: return kExitReview;
+    case Verdict::kRejected: return kExitRejected;
+  }
+  return kExitFailed;
+}
+
+SetupReport register_study(const RegisterOptions& options, SharedWork& shared, Console& console) {
   const Stopwatch total;
   OutputFolder output(options.output, options.overwrite);
-  std::optional<Eigen::Isometry3d> truth;
-  if (!options.truth.empty()) truth = read_setup_error(options.truth);
-
   std::optional<SetupReport::Site> site = chosen_site(options.site, options.anatomy);
 
   Notes notes;
-  const Study study = load(options.study, notes, console);
-  const RegistrationSetup setup(options.flags, study);
+  const Study study = load(options.study, notes, console, shared.cts);
+  const RegistrationSetup setup(options.flags, study, beams_of(study), shared.renderers);
   const double seconds_load = total.seconds();
   RegistrationResult result;
   {
@@ -96,14 +91,48 @@ int run_register(const RegisterOptions& given, Console& console) {
   report.seconds_total = total.seconds();
   write_result(report, output.path());
   output.commit();
+  return report;
+}
 
+namespace {
+
+int run_register(RegisterOptions options, const std::filesystem::path& truth_file, bool as_json, Console& console) {
+  options.flags.settle();
+  std::optional<Eigen::Isometry3d> truth;
+  if (!truth_file.empty()) truth = read_setup_error(truth_file);
+  SharedWork none;
+  const SetupReport report = register_study(options, none, console);
   for (const std::string& warning : report.warnings) console.err << "warning: " << warning << "\n";
-  console.out << (options.json ? json_report(report) : text_report(report_page(report)));
-  if (!options.json) {
+  console.out << (as_json ? json_report(report) : text_report(report_page(report)));
+  if (!as_json) {
     if (truth) console.out << "\n" << compared_with_truth(report.setup_error, *truth);
-    console.out << fmt::format("\nWritten to {}\n", output.destination().string());
+    console.out << fmt::format("\nWritten to {}\n",
+                               std::filesystem::absolute(options.output).lexically_normal().string());
   }
-  return exit_status_of(result.verdict);
+  return exit_status_of(report.verdict);
+}
+
+}  // namespace
+
+void add_result_options(CLI::App& command, RegisterOptions& options) {
+  command
+      .add_option("--site", options.site,
+                  "Site file: action levels, the couch's degrees of freedom and scale (docs/site-file.md)")
+      ->type_name("FILE");
+  command.add_option("--anatomy", options.anatomy, "Whose action level of the site file applies")->type_name("NAME");
+  command.add_flag("--write-reg-for-review", options.write_reg_for_review,
+                   "Write the registration object for a result that needs review, too, marked as not accepted");
+  command.add_flag("--accept-unobservable", options.accept_unobservable,
+                   "Write it with no setup error along directions that the views cannot measure, too");
+  command
+      .add_option_function<std::string>(
+          "--source-for",
+          [&options](const std::string& name) {
+            options.source = name == "treatment" ? RegistrationSource::kTreatment : RegistrationSource::kIecFixed;
+          },
+          "Axes that the registration object takes to the CT: the patient's as planned, or the room's")
+      ->check(CLI::IsMember({"treatment", "iec-fixed"}))
+      ->default_str("treatment");
 }
 
 void add_register_command(CLI::App& app, Console& console, int& exit_status) {
@@ -115,32 +144,19 @@ void add_register_command(CLI::App& app, Console& console, int& exit_status) {
       "Writes the report (report.pdf, .html, .txt, .csv, and .dcm: Encapsulated PDF), result.json, pictures per view\n"
       "and, for an accepted result, spatial_registration.dcm.\n"
       "Exit status: 0 accepted, 1 failed, 2 usage, 3 review, 4 rejected.");
+  auto truth = std::make_shared<std::filesystem::path>();
+  auto as_json = std::make_shared<bool>(false);
   add_study_options(*command, options->study);
   command->add_option("-o,--output", options->output, "Folder for the results")->required()->type_name("FOLDER");
-  command->add_option("--truth", options->truth, "truth.json of a phantom study: print the result beside it")
+  command->add_option("--truth", *truth, "truth.json of a phantom study: print the result beside it")
       ->type_name("FILE");
-  command
-      ->add_option("--site", options->site,
-                   "Site file: action levels, the couch's degrees of freedom and scale (docs/site-file.md)")
-      ->type_name("FILE");
-  command->add_option("--anatomy", options->anatomy, "Whose action level of the site file applies")->type_name("NAME");
-  command->add_flag("--write-reg-for-review", options->write_reg_for_review,
-                    "Write the registration object for a result that needs review, too, marked as not accepted");
-  command->add_flag("--accept-unobservable", options->accept_unobservable,
-                    "Write it with no setup error along directions that the views cannot measure, too");
-  command
-      ->add_option_function<std::string>(
-          "--source-for",
-          [options](const std::string& name) {
-            options->source = name == "treatment" ? RegistrationSource::kTreatment : RegistrationSource::kIecFixed;
-          },
-          "Axes that the registration object takes to the CT: the patient's as planned, or the room's")
-      ->check(CLI::IsMember({"treatment", "iec-fixed"}))
-      ->default_str("treatment");
+  add_result_options(*command, *options);
   command->add_flag("--overwrite", options->overwrite, "Replace an earlier output in that folder");
-  command->add_flag("--json", options->json, "Print result.json instead of the report");
+  command->add_flag("--json", *as_json, "Print result.json instead of the report");
   add_registration_flags(*command, options->flags);
-  command->callback([options, &console, &exit_status] { exit_status = run_register(*options, console); });
+  command->callback([options, truth, as_json, &console, &exit_status] {
+    exit_status = run_register(*options, *truth, *as_json, console);
+  });
 }
 
 }  // namespace isoshift

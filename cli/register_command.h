@@ -8,6 +8,7 @@
 #include "cli/console.h"
 #include "cli/registration_setup.h"
 #include "cli/study_options.h"
+#include "io/report/setup_report.h"
 #include "io/spatial_registration.h"
 
 namespace isoshift {
@@ -16,17 +17,28 @@ struct RegisterOptions {
   StudyOptions study;
   RegistrationFlags flags;
   std::filesystem::path output;
-  std::filesystem::path truth;  // empty: unknown
-  std::filesystem::path site;   // empty: no site file
+  std::filesystem::path site;  // empty: no site file
   std::string anatomy;
   bool overwrite = false;
-  bool json = false;
   bool write_reg_for_review = false;
   bool accept_unobservable = false;
   RegistrationSource source = RegistrationSource::kTreatment;
 };
 
-// Returns the exit status that the verdict asks for.
-int run_register(const RegisterOptions& options, Console& console);
+// What registrations of one process share where they can.
+struct SharedWork {
+  CtStore cts;
+  RendererStore renderers;
+};
+
+// Registers a study and writes the folder of its result, whole or not at all. The flags must have been
+// settled.
+SetupReport register_study(const RegisterOptions& options, SharedWork& shared, Console& console);
+
+// The flags beside those of the study and of registration that decide what is written.
+void add_result_options(CLI::App& command, RegisterOptions& options);
+
+// The exit status that a verdict asks for.
+int exit_status_of(Verdict verdict);
 
 }  // namespace isoshift

@@ -14,12 +14,30 @@ void add_registration_flags(CLI::App& command, RegistrationFlags& flags) {
   add_rendering_options(command, flags.rendering);
 }
 
-RegistrationSetup::RegistrationSetup(const RegistrationFlags& flags, const Study& study, std::span<const Beam> beams)
-    : region_(region_of(flags.region, study, flags.rendering.threshold_hu)),
-      renderers_(flags.rendering.kind(), region_.rendered_ct, flags.rendering.model(), beams,
-                 flags.rendering.options()),
-      options_(flags.search.registration()) {
-  options_.region = &region_.projected;
+std::shared_ptr<const RendererPyramid> RendererStore::get(const RenderingOptions& rendering,
+                                                          const std::shared_ptr<const CtSeries>& ct,
+                                                          const std::vector<Beam>& beams) {
+  if (!last_ || ct != ct_ || beams != beams_) {
+    last_.reset();  // never two in memory
+    last_ = std::make_shared<const RendererPyramid>(rendering.kind(), ct->hu, rendering.model(), beams,
+                                                    rendering.options());
+    ct_ = ct;
+    beams_ = beams;
+  }
+  return last_;
+}
+
+RegistrationSetup::RegistrationSetup(const RegistrationFlags& flags, const Study& study, const std::vector<Beam>& beams,
+                                     RendererStore& store)
+    : options_(flags.search.registration()) {
+  RegionOfStudy region = region_of(flags.region, study, flags.rendering.threshold_hu);
+  if (region.rendered_ct)
+    renderers_ = std::make_shared<const RendererPyramid>(flags.rendering.kind(), *region.rendered_ct,
+                                                         flags.rendering.model(), beams, flags.rendering.options());
+  else
+    renderers_ = store.get(flags.rendering, study.ct, beams);
+  region_ = std::move(region.projected);
+  options_.region = &region_;
   options_.rectangles = flags.region.rectangles_of(study);
 }
 

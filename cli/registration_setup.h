@@ -1,6 +1,9 @@
 #pragma once
 // From flags and a study to what register_views() takes: the same for every command that registers.
 
+#include <memory>
+#include <vector>
+
 #include "cli/region_switches.h"
 #include "cli/rendering_options.h"
 #include "cli/search_switches.h"
@@ -19,22 +22,32 @@ struct RegistrationFlags {
 };
 void add_registration_flags(CLI::App& command, RegistrationFlags& flags);
 
+// The renderers of the last whole CT, for registrations that share it.
+class RendererStore {
+ public:
+  std::shared_ptr<const RendererPyramid> get(const RenderingOptions& rendering,
+                                             const std::shared_ptr<const CtSeries>& ct, const std::vector<Beam>& beams);
+
+ private:
+  std::shared_ptr<const CtSeries> ct_;
+  std::vector<Beam> beams_;
+  std::shared_ptr<const RendererPyramid> last_;
+};
+
 // The options refer to the region: neither can be moved.
 class RegistrationSetup {
  public:
-  RegistrationSetup(const RegistrationFlags& flags, const Study& study)
-      : RegistrationSetup(flags, study, beams_of(study)) {}
-  // For views of other beam qualities than the study's, too.
-  RegistrationSetup(const RegistrationFlags& flags, const Study& study, std::span<const Beam> beams);
+  RegistrationSetup(const RegistrationFlags& flags, const Study& study, const std::vector<Beam>& beams,
+                    RendererStore& store);
   RegistrationSetup(const RegistrationSetup&) = delete;
   RegistrationSetup& operator=(const RegistrationSetup&) = delete;
 
-  const RendererPyramid& renderers() const { return renderers_; }
+  const RendererPyramid& renderers() const { return *renderers_; }
   const RegistrationOptions& options() const { return options_; }
 
  private:
-  RegionOfStudy region_;
-  RendererPyramid renderers_;
+  ProjectedRegion region_;
+  std::shared_ptr<const RendererPyramid> renderers_;
   RegistrationOptions options_;
 };
 

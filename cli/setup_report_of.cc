@@ -77,7 +77,7 @@ std::vector<MarkedStructure> marked_structures(const Study& study, const RegionS
   std::vector<MarkedStructure> marked;
   if (!study.structures) return marked;
   const auto add = [&](const Structure& structure) {
-    marked.push_back({structure.name, mask_of(structure, study.ct.hu.size, study.ct.hu.patient_from_voxel)});
+    marked.push_back({structure.name, mask_of(structure, study.ct->hu.size, study.ct->hu.patient_from_voxel)});
   };
   for (const std::string& name : region.structures) add(structure_named(*study.structures, name));
   if (!marked.empty()) return marked;
@@ -85,7 +85,7 @@ std::vector<MarkedStructure> marked_structures(const Study& study, const RegionS
     if ((structure.interpreted_type == "PTV" || structure.interpreted_type == "CTV" ||
          structure.interpreted_type == "GTV") &&
         !structure.contours.empty() &&
-        structure.frame_of_reference_uid.value_or(study.ct.frame_of_reference_uid) == study.ct.frame_of_reference_uid)
+        structure.frame_of_reference_uid.value_or(study.ct->frame_of_reference_uid) == study.ct->frame_of_reference_uid)
       add(structure);
   return marked;
 }
@@ -128,7 +128,7 @@ SetupReport setup_report_of(const Study& study, const RegistrationFlags& flags, 
   for (const MarkedStructure& structure : structures) report.points.push_back(centroid_of(structure, study));
   report.verdict = result.verdict;
   report.reasons = result.reasons;
-  report.identity = study.ct.identity;
+  report.identity = study.ct->identity;
   report.patient_position = to_string(study.patient_position);
   report.isocenter_patient_mm = study.isocenter_patient_mm;
   report.table = study.table;
@@ -182,8 +182,8 @@ SetupReport setup_report_of(const Study& study, const RegistrationFlags& flags, 
   report.seconds_rendering = result.seconds_rendering;
   report.seconds_similarity = result.seconds_similarity;
   if (study.machine) report.machine = {study.machine->name, study.machine->sha256};
-  report.ct_series_uid = study.ct.series_instance_uid;
-  report.ct_sha256 = study.ct.sha256;
+  report.ct_series_uid = study.ct->series_instance_uid;
+  report.ct_sha256 = study.ct->sha256;
   if (study.plan) {
     report.plan_label = study.plan->label;
     report.plan_approval = study.plan->approval_status;

@@ -95,7 +95,10 @@ void add_study_options(CLI::App& command, StudyOptions& options) {
                   "RT Structure Set; else the one that the plan refers to, else the only one drawn on the CT")
       ->type_name("FILE")
       ->group(parts);
+  add_study_switches(command, options);
+}
 
+void add_study_switches(CLI::App& command, StudyOptions& options) {
   const char* lacking = "What the files lack (never guessed; each use is written into the result)";
   command.add_option("--isocenter", options.isocenter, "Planned isocenter in patient coordinates of the CT, mm")
       ->delimiter(',')
@@ -136,10 +139,11 @@ void add_study_options(CLI::App& command, StudyOptions& options) {
   command.add_option("--allow", options.allow, allow_keys_help())->type_name("KEY=REASON")->group(lacking);
 }
 
-Study load(const StudyOptions& options, Notes& notes, Console& console) {
+Study load(const StudyOptions& options, Notes& notes, Console& console, CtStore& cts) {
   const StudyRequest request = options.request();
   ProgressBar bar(console, "Reading CT");
-  Study study = load_study(request, notes, [&](std::size_t done, std::size_t total) { bar.update(done, total); });
+  Study study = load_study(
+      request, notes, [&](std::size_t done, std::size_t total) { bar.update(done, total); }, cts);
   for (const std::string& file : notes.left_aside) console.err << "left aside: " << file << "\n";
   return study;
 }

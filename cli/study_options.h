@@ -28,9 +28,15 @@ struct StudyOptions {
   void check_finite() const;
 };
 void add_study_options(CLI::App& command, StudyOptions& options);
+// Those that do not name its parts.
+void add_study_switches(CLI::App& command, StudyOptions& options);
 
 // Loads the study behind a progress bar.
-Study load(const StudyOptions& options, Notes& notes, Console& console);
+Study load(const StudyOptions& options, Notes& notes, Console& console, CtStore& cts);
+inline Study load(const StudyOptions& options, Notes& notes, Console& console) {
+  CtStore none;
+  return load(options, notes, console, none);
+}
 
 // The beam qualities of its X-rays.
 std::vector<Beam> beams_of(const Study& study);

@@ -58,8 +58,9 @@ class TrackRun {
     const Study study = first_study(request);
     say_warnings();
     // An imager of another beam quality may begin later.
+    RendererStore renderers;
     const RegistrationSetup setup(options_.flags, study,
-                                  is_filled() ? std::vector(kBeams.begin(), kBeams.end()) : beams_of(study));
+                                  is_filled() ? std::vector(kBeams.begin(), kBeams.end()) : beams_of(study), renderers);
     const Eigen::Vector3d target = target_of(study);
     if (!options_.phases.empty())
       record_.tracking.predictor_options.phases_mm = displacements_of_phases(
@@ -81,7 +82,7 @@ class TrackRun {
     if (options_.flags.region.structures.empty()) return study.isocenter_patient_mm;
     if (!study.structures) throw Error("the study holds no RT Structure Set (--structures FILE names one)");
     const Structure& structure = structure_named(*study.structures, options_.flags.region.structures.front());
-    return centroid_patient_mm(mask_of(structure, study.ct.hu.size, study.ct.hu.patient_from_voxel));
+    return centroid_patient_mm(mask_of(structure, study.ct->hu.size, study.ct->hu.patient_from_voxel));
   }
 
   // X-rays must be there before anything can be checked: those of the first moment.

@@ -20,7 +20,7 @@ std::optional<TimedXray> XrayStream::checked(RtImage header) const {
   header = with_switches(header, request_.switches, said);
   if (!header.patient_position) header.patient_position = std::string(to_string(study_.patient_position));
   std::vector<Finding> findings = rt_image_findings(header);
-  std::ranges::move(patient_findings(study_.ct.identity, header.identity, where), std::back_inserter(findings));
+  std::ranges::move(patient_findings(study_.ct->identity, header.identity, where), std::back_inserter(findings));
   std::ranges::move(table_findings(header, study_.rt_images.front()), std::back_inserter(findings));
   settle(findings, request_.allowed, said);
   if (const auto missing = missing_attributes(header); !missing.empty())

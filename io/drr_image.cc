@@ -17,7 +17,7 @@ namespace {
 constexpr double kLineIntegralPerStored = 0.001;
 
 void put_general(DicomItem dataset, const Study& study, std::size_t index, const std::string& series_instance_uid) {
-  put_header(dataset, {.identity = study.ct.identity,
+  put_header(dataset, {.identity = study.ct->identity,
                        .sop_class_uid = UID_RTImageStorage,
                        .sop_instance_uid = new_uid(),
                        .modality = "RTIMAGE",
@@ -29,8 +29,8 @@ void put_general(DicomItem dataset, const Study& study, std::size_t index, const
   dataset.put(DCM_ImageType, "DERIVED\\SECONDARY\\DRR");
   dataset.put(DCM_ConversionType, "WSD");
   dataset.put(DCM_PatientOrientation, "");
-  for (const std::string& uid : study.ct.sop_instance_uids)
-    dataset.append_reference(DCM_SourceImageSequence, study.ct.sop_class_uid, uid);
+  for (const std::string& uid : study.ct->sop_instance_uids)
+    dataset.append_reference(DCM_SourceImageSequence, study.ct->sop_class_uid, uid);
 }
 
 void put_geometry(DicomItem dataset, const RtImage& image) {
@@ -72,7 +72,7 @@ void write_drr_image(const Study& study, std::size_t index, const Image<float>& 
   dataset.put(DCM_RTImageLabel, image.label.substr(0, 16));
   dataset.put(DCM_RTImageDescription, is_as_planned ? "DRR, patient as planned" : "DRR, patient off plan");
   dataset.put(DCM_DerivationDescription, fmt::format("DRR of the planning CT as {} should have seen it", image.label));
-  dataset.put(DCM_FrameOfReferenceUID, is_as_planned ? study.ct.frame_of_reference_uid : new_uid());
+  dataset.put(DCM_FrameOfReferenceUID, is_as_planned ? study.ct->frame_of_reference_uid : new_uid());
   dataset.put(DCM_PositionReferenceIndicator, "");
   if (is_as_planned) dataset.put(DCM_IsocenterPosition, std::span(study.isocenter_patient_mm.data(), 3));
   dataset.put(DCM_PatientPosition, to_string(study.patient_position));

@@ -145,6 +145,21 @@ void abandon_outputs() noexcept {
   for (const fs::path& staging : unfinished) fs::remove_all(staging, ignored);
 }
 
+void replace_text(const fs::path& path, std::string_view text) {
+  const fs::path aside = path.parent_path() / fmt::format(".{}.{}.partial", path.filename().string(), ::getpid());
+  std::error_code ignored;
+  try {
+    fs::remove(aside, ignored);
+    write_text(aside, text);
+    flush(aside);
+    if (::rename(aside.c_str(), path.c_str()) != 0) fail(path, std::strerror(errno));
+  } catch (...) {
+    fs::remove(aside, ignored);
+    throw;
+  }
+  flush(path.parent_path().empty() ? fs::path(".") : path.parent_path());
+}
+
 void write_text(const fs::path& path, std::string_view text) {
   const int descriptor = ::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0640);
   if (descriptor < 0) fail(path, std::strerror(errno));

@@ -14,7 +14,6 @@
 namespace isoshift {
 namespace {
 
-constexpr double kMaxTimeSpanS = 600.0;
 constexpr double kMaxTableMoveMm = 0.5;
 
 // Empty components at the end of a name may be written or not (PS3.5 6.2.1.1).

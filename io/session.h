@@ -11,6 +11,7 @@
 
 namespace isoshift {
 
+constexpr double kMaxTimeSpanS = 600.0;  // between the views of one session
 constexpr double kMaxTableTurnDeg = 0.1;
 
 // One patient: an ID is there and the same, and so are issuer, name and birth date where both files have them.

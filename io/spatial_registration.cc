@@ -26,8 +26,8 @@ SourceFrame source_frame(const Study& study, RegistrationSource axes, Notes& not
   for (const RtImage& image : study.rt_images) {
     if (!image.frame_of_reference_uid || !image.isocenter_mm ||
         image.frame_of_reference_uid != first.frame_of_reference_uid || *image.isocenter_mm != *first.isocenter_mm ||
-        image.frame_of_reference_uid == study.ct.frame_of_reference_uid) {
-      if (image.frame_of_reference_uid == study.ct.frame_of_reference_uid)
+        image.frame_of_reference_uid == study.ct->frame_of_reference_uid) {
+      if (image.frame_of_reference_uid == study.ct->frame_of_reference_uid)
         notes.warnings.push_back(fmt::format(
             "{}: shares the CT's {}, which would claim a perfect setup; the registration object uses a new one",
             image.label, described(DCM_FrameOfReferenceUID)));
@@ -72,16 +72,16 @@ void put_ct_references(DicomItem item, const CtSeries& ct) {
 // Common Instance Reference (C.12.2): every referenced instance, those of the CT's study and those of others.
 void put_common_instance_references(DicomItem dataset, const Study& study) {
   DicomItem ct_series = dataset.append_item(DCM_ReferencedSeriesSequence);
-  ct_series.put(DCM_SeriesInstanceUID, study.ct.series_instance_uid);
-  for (const std::string& uid : study.ct.sop_instance_uids)
-    ct_series.append_reference(DCM_ReferencedInstanceSequence, study.ct.sop_class_uid, uid);
+  ct_series.put(DCM_SeriesInstanceUID, study.ct->series_instance_uid);
+  for (const std::string& uid : study.ct->sop_instance_uids)
+    ct_series.append_reference(DCM_ReferencedInstanceSequence, study.ct->sop_class_uid, uid);
 
   std::map<std::string, std::map<std::string, std::vector<const RtImage*>>> by_study_and_series;
   for (const RtImage* image : image_files(study))
     by_study_and_series[image->identity.study_instance_uid][image->series_instance_uid].push_back(image);
   for (const auto& [study_uid, by_series] : by_study_and_series) {
     std::optional<DicomItem> other_study;
-    if (study_uid != study.ct.identity.study_instance_uid) {
+    if (study_uid != study.ct->identity.study_instance_uid) {
       other_study = dataset.append_item(DCM_StudiesContainingOtherReferencedInstancesSequence);
       other_study->put(DCM_StudyInstanceUID, study_uid);
     }
@@ -96,18 +96,18 @@ void put_common_instance_references(DicomItem dataset, const Study& study) {
 
 void put_general(DicomItem dataset, const Study& study, const std::string& sop_instance_uid,
                  const SpatialRegistrationOptions& options) {
-  put_header(dataset, {.identity = study.ct.identity,
+  put_header(dataset, {.identity = study.ct->identity,
                        .sop_class_uid = UID_SpatialRegistrationStorage,
                        .sop_instance_uid = sop_instance_uid,
                        .modality = "REG",
                        .series_instance_uid = new_uid(),
                        .series_number = 9001,
                        .series_description = "2D/3D setup registration"});
-  if (!study.ct.body_part_examined.empty())
-    dataset.put(DCM_BodyPartExamined, study.ct.body_part_examined);
+  if (!study.ct->body_part_examined.empty())
+    dataset.put(DCM_BodyPartExamined, study.ct->body_part_examined);
   else
     dataset.put(DCM_Laterality, "");  // type 2C: required, possibly empty, where the body part is unknown
-  dataset.put(DCM_FrameOfReferenceUID, study.ct.frame_of_reference_uid);
+  dataset.put(DCM_FrameOfReferenceUID, study.ct->frame_of_reference_uid);
   dataset.put(DCM_PositionReferenceIndicator, "");
   dataset.put(DCM_ContentLabel, options.content_label);
   dataset.put(DCM_ContentDescription, options.content_description);
@@ -121,8 +121,8 @@ DicomFile registration_object(const Study& study, const SourceFrame& source, con
   put_general(dataset, study, sop_instance_uid, options);
 
   DicomItem ct_item = dataset.append_item(DCM_RegistrationSequence);
-  ct_item.put(DCM_FrameOfReferenceUID, study.ct.frame_of_reference_uid);
-  put_ct_references(ct_item, study.ct);
+  ct_item.put(DCM_FrameOfReferenceUID, study.ct->frame_of_reference_uid);
+  put_ct_references(ct_item, *study.ct);
   put_matrix(ct_item, Eigen::Isometry3d::Identity(), "125021", "Frame of Reference Identity", "planning CT");
 
   DicomItem treatment_item = dataset.append_item(DCM_RegistrationSequence);

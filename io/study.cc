@@ -19,7 +19,7 @@ namespace {
 std::vector<Finding> patient_findings(const Study& study) {
   std::vector<Finding> findings;
   const auto compare = [&](const Identity& identity, const std::filesystem::path& path) {
-    std::ranges::move(patient_findings(study.ct.identity, identity, path.string()), std::back_inserter(findings));
+    std::ranges::move(patient_findings(study.ct->identity, identity, path.string()), std::back_inserter(findings));
   };
   if (study.plan) compare(study.plan->identity, study.plan->path);
   if (study.structures) compare(study.structures->identity, study.structures->path);
@@ -34,7 +34,7 @@ std::vector<Finding> plan_findings(const Study& study, Notes& notes) {
   if (!plan.frame_of_reference_uid)
     notes.warnings.push_back(
         fmt::format("the plan has no {}; taken as that of the CT", described(DCM_FrameOfReferenceUID)));
-  else if (*plan.frame_of_reference_uid != study.ct.frame_of_reference_uid)
+  else if (*plan.frame_of_reference_uid != study.ct->frame_of_reference_uid)
     findings.push_back(
         {"for-mismatch", fmt::format("{}: {} is not that of the CT, so the plan's isocenter does not apply "
                                      "to it",
@@ -62,7 +62,7 @@ std::vector<Finding> structure_findings(const Study& study, Notes& notes) {
     for (const Structure& structure : study.structures->structures) {
       if (!structure.frame_of_reference_uid)
         unknown.push_back(fmt::format("\"{}\"", structure.name));
-      else if (*structure.frame_of_reference_uid != study.ct.frame_of_reference_uid)
+      else if (*structure.frame_of_reference_uid != study.ct->frame_of_reference_uid)
         elsewhere.push_back(fmt::format("\"{}\"", structure.name));
     }
   if (!unknown.empty())
@@ -178,8 +178,8 @@ bool is_inside(const Eigen::VectorXd& position, const Eigen::VectorXd& size) {
 }
 
 void check_isocenter(const Study& study) {
-  const Eigen::Vector3d voxel = study.ct.hu.patient_from_voxel.inverse() * study.isocenter_patient_mm;
-  if (!is_inside(voxel, study.ct.hu.size.cast<double>()))
+  const Eigen::Vector3d voxel = study.ct->hu.patient_from_voxel.inverse() * study.isocenter_patient_mm;
+  if (!is_inside(voxel, study.ct->hu.size.cast<double>()))
     throw Error(fmt::format("the isocenter ({:.1f}) mm lies outside the CT ({})",
                             fmt::join(study.isocenter_patient_mm, ", "), described(DCM_IsocenterPosition)));
   for (std::size_t n = 0; n < study.xrays.size(); ++n) {
@@ -194,7 +194,7 @@ void check_isocenter(const Study& study) {
 
 }  // namespace
 
-Study load_study(const StudyRequest& request, Notes& notes, const Progress& progress) {
+Study load_study(const StudyRequest& request, Notes& notes, const Progress& progress, CtStore& cts) {
   NamedParts named = request.parts;
   named.takes_other_xrays = request.machine.has_value();
   const StudyParts parts = find_parts(named);
@@ -243,7 +243,7 @@ Study load_study(const StudyRequest& request, Notes& notes, const Progress& prog
       notes.warnings.push_back(fmt::format("{}: does not say whether its angles were measured ({} is missing)",
                                            image.label, described(DCM_ReportedValuesOrigin)));
 
-  study.ct = read_ct_series(parts.ct, request.allowed, notes, progress);
+  study.ct = cts.get(parts.ct, request.allowed, notes, progress);
   findings = patient_findings(study);
   std::ranges::move(plan_findings(study, notes), std::back_inserter(findings));
   std::ranges::move(structure_findings(study, notes), std::back_inserter(findings));
@@ -271,9 +271,9 @@ Study load_study(const StudyRequest& request, Notes& notes, const Progress& prog
         "{}: {} is {}, that of {} is {}",
         request.switches.patient_position ? "--patient-position" : study.rt_images.front().path.string(),
         described(DCM_PatientPosition), to_string(study.patient_position), study.plan->path.string(), *planned));
-  if (!study.ct.patient_position.empty() && study.ct.patient_position != to_string(study.patient_position))
+  if (!study.ct->patient_position.empty() && study.ct->patient_position != to_string(study.patient_position))
     notes.warnings.push_back(fmt::format("the CT was scanned in {}, the patient is treated in {} ({})",
-                                         study.ct.patient_position, to_string(study.patient_position),
+                                         study.ct->patient_position, to_string(study.patient_position),
                                          described(DCM_PatientPosition)));
   warn_of_planned_couch_angle(study, beams, notes);
   warn_of_planned_displacement(beams, notes);

@@ -1,12 +1,13 @@
 #pragma once
 // From a folder to everything one registration needs, checked: DICOM ends here.
 
+#include <memory>
 #include <optional>
 #include <vector>
 
 #include "geometry/patient_setup.h"
 #include "geometry/xray_image.h"
-#include "io/ct_series.h"
+#include "io/ct_store.h"
 #include "io/machine_profile.h"
 #include "io/notes.h"
 #include "io/rt_image.h"
@@ -27,7 +28,7 @@ struct StudyRequest {
 };
 
 struct Study {
-  CtSeries ct;
+  std::shared_ptr<const CtSeries> ct;
   std::optional<RtPlan> plan;
   std::optional<RtStructures> structures;
   std::vector<std::filesystem::path> image_files;  // of all X-rays that belong to it, those left out for others too
@@ -41,7 +42,11 @@ struct Study {
 };
 
 // Finds, reads and checks the parts. Everything the images lack is reported in one Error, with the switch that supplies
-// it; so is every check that fails without being allowed.
-Study load_study(const StudyRequest& request, Notes& notes, const Progress& progress);
+// it; so is every check that fails without being allowed. The CT is taken from the store if it was the last one.
+Study load_study(const StudyRequest& request, Notes& notes, const Progress& progress, CtStore& cts);
+inline Study load_study(const StudyRequest& request, Notes& notes, const Progress& progress) {
+  CtStore none;
+  return load_study(request, notes, progress, none);
+}
 
 }  // namespace isoshift

@@ -7,6 +7,7 @@
 
 #include "geometry/error.h"
 #include "io/dicom_dataset.h"
+#include "io/rt_image.h"
 
 namespace isoshift {
 namespace {
@@ -28,12 +29,44 @@ std::set<std::string> drawn_on(const DicomItem& structures) {
   return series_uids;
 }
 
+// The CT images that its contours may lie on (ContourImageSequence of the series).
+std::set<std::string> drawn_on_images(const DicomItem& structures) {
+  std::set<std::string> uids;
+  for (const DicomItem& frame : structures.items(DCM_ReferencedFrameOfReferenceSequence))
+    for (const DicomItem& study : frame.items(DCM_RTReferencedStudySequence))
+      for (const DicomItem& series : study.items(DCM_RTReferencedSeriesSequence))
+        for (const DicomItem& image : series.items(DCM_ContourImageSequence))
+          if (const auto uid = image.text(DCM_ReferencedSOPInstanceUID)) uids.insert(*uid);
+  return uids;
+}
+
 // The frames of reference of the structures: every one has its own (PS3.3 C.8.8.5).
 std::set<std::string> drawn_in(const DicomItem& structures) {
   std::set<std::string> frame_uids;
   for (const DicomItem& roi : structures.items(DCM_StructureSetROISequence))
     if (const auto uid = roi.text(DCM_ReferencedFrameOfReferenceUID)) frame_uids.insert(*uid);
   return frame_uids;
+}
+
+// Whose file it is: IDs of two issuers are two patients.
+std::string patient_of(const DicomItem& dataset) {
+  return dataset.text(DCM_PatientID).value_or("") + "\\" + dataset.text(DCM_IssuerOfPatientID).value_or("");
+}
+
+StudyFiles::Image xray(const fs::path& path, const DicomItem& dataset) {
+  const auto first_of = [&](const DcmTagKey& tag, const DcmTagKey& other) {
+    auto text = dataset.text(tag);
+    return text ? text : dataset.text(other);
+  };
+  RtImage timed;
+  timed.acquisition_date = first_of(DCM_AcquisitionDate, DCM_ContentDate);
+  timed.acquisition_time = first_of(DCM_AcquisitionTime, DCM_ContentTime);
+  return {.file = path,
+          .patient = patient_of(dataset),
+          .sop_instance_uid = dataset.required_text(DCM_SOPInstanceUID),
+          .plan_uid = first_reference(dataset, DCM_ReferencedRTPlanSequence),
+          .label = dataset.text(DCM_RTImageLabel).value_or(""),
+          .at_s = acquisition_seconds(timed)};
 }
 
 void add_ct_slice(const fs::path& path, const DicomItem& dataset, StudyFiles& files) {
@@ -45,48 +78,19 @@ void add_ct_slice(const fs::path& path, const DicomItem& dataset, StudyFiles& fi
   const std::string series_uid = dataset.required_text(DCM_SeriesInstanceUID);
   auto ct = std::ranges::find(files.cts, series_uid, &StudyFiles::Ct::series_instance_uid);
   if (ct == files.cts.end()) {
-    files.cts.push_back({.series_instance_uid = series_uid,
+    files.cts.push_back({.patient = patient_of(dataset),
+                         .series_instance_uid = series_uid,
                          .frame_of_reference_uid = dataset.text(DCM_FrameOfReferenceUID).value_or("")});
     ct = files.cts.end() - 1;
   }
   ct->files.push_back(path);
+  ct->sop_instance_uids.insert(dataset.required_text(DCM_SOPInstanceUID));
 }
 
 bool is_other_xray(const std::string& sop_class) {
   return sop_class == UID_ComputedRadiographyImageStorage || sop_class == UID_DigitalXRayImageStorageForPresentation ||
          sop_class == UID_DigitalXRayImageStorageForProcessing || sop_class == UID_XRayAngiographicImageStorage ||
          sop_class == UID_XRayRadiofluoroscopicImageStorage;
-}
-
-void add(const fs::path& path, StudyFiles& files) {
-  if (!begins_like_dicom(path)) {
-    files.left_aside.push_back(fmt::format("{}: not a DICOM file", path.string()));
-    return;
-  }
-  const DicomFile file = DicomFile::read(path, DicomFile::Extent::kHeader);
-  const DicomItem dataset = file.dataset();
-  const std::string sop_class = dataset.text(DCM_SOPClassUID).value_or("");
-  if (sop_class == UID_CTImageStorage || sop_class == UID_EnhancedCTImageStorage ||
-      sop_class == UID_LegacyConvertedEnhancedCTImageStorage) {
-    add_ct_slice(path, dataset, files);
-  } else if (sop_class == UID_RTImageStorage) {
-    files.images.push_back({.file = path, .plan_uid = first_reference(dataset, DCM_ReferencedRTPlanSequence)});
-  } else if (is_other_xray(sop_class)) {
-    files.other_xrays.push_back({.file = path, .plan_uid = ""});
-  } else if (sop_class == UID_RTPlanStorage || sop_class == UID_RTIonPlanStorage) {
-    files.plans.push_back({.file = path,
-                           .sop_instance_uid = dataset.required_text(DCM_SOPInstanceUID),
-                           .frame_of_reference_uid = dataset.text(DCM_FrameOfReferenceUID).value_or(""),
-                           .structure_set_uid = first_reference(dataset, DCM_ReferencedStructureSetSequence)});
-  } else if (sop_class == UID_RTStructureSetStorage) {
-    files.structures.push_back({.file = path,
-                                .sop_instance_uid = dataset.required_text(DCM_SOPInstanceUID),
-                                .ct_series_uids = drawn_on(dataset),
-                                .frame_of_reference_uids = drawn_in(dataset)});
-  } else {
-    files.left_aside.push_back(
-        fmt::format("{}: {}", path.string(), dcmFindNameOfUID(sop_class.c_str(), "an object of unknown class")));
-  }
 }
 
 // Where one kind of part was looked for, for a message: what was named for it, else the study.
@@ -193,55 +197,8 @@ void take_named_structures(const fs::path& named, const std::vector<StudyFiles::
       parts.left_aside.push_back(fmt::format("{}: an RT Structure Set that was not named", other.file.string()));
 }
 
-}  // namespace
-
-std::vector<fs::path> files_below(const std::vector<fs::path>& paths, const std::unordered_set<std::string>& but) {
-  std::vector<fs::path> files;
-  const auto add = [&](const fs::path& file) {
-    if (!but.contains(file.native())) files.push_back(file);
-  };
-  for (const fs::path& path : paths) {
-    std::error_code error;
-    const auto status = fs::status(path, error);
-    if (!fs::exists(status)) throw Error(fmt::format("{}: no such file or folder", path.string()));
-    if (!fs::is_directory(status)) {
-      add(path);
-      continue;
-    }
-    for (auto entry = fs::recursive_directory_iterator(path, error); !error && entry != fs::end(entry);
-         entry.increment(error))
-      if (!entry->path().filename().native().starts_with('.') && entry->is_regular_file()) add(entry->path());
-    if (error) throw Error(fmt::format("{}: cannot be searched: {}", path.string(), error.message()));
-  }
-  std::ranges::sort(files);
-  files.erase(std::ranges::unique(files).begin(), files.end());
-  return files;
-}
-
-StudyFiles scan_study(const std::vector<fs::path>& paths) {
-  StudyFiles files;
-  for (const fs::path& path : files_below(paths)) {
-    try {
-      add(path, files);
-    } catch (const Error& error) {
-      files.unreadable.emplace_back(error.what());
-    }
-  }
-  return files;
-}
-
-StudyParts find_parts(const NamedParts& named) {
-  StudyFiles files;
-  if (!named.study.empty()) files = scan_readable({named.study});
-  std::vector<StudyFiles::Plan> other_plans;  // a named plan makes those found in the folder others
-  if (!named.ct.empty()) files.cts = scan_readable(named.ct).cts;
-  if (!named.images.empty()) {
-    StudyFiles images = scan_readable(named.images);
-    std::swap(files.images, images.images);
-    std::swap(files.other_xrays, images.other_xrays);
-  }
-  if (named.plan) std::swap(other_plans, files.plans), files.plans = scan_readable({*named.plan}).plans;
-
+// The parts among scanned files, of which a person may have named some.
+StudyParts chosen(StudyFiles files, std::vector<StudyFiles::Plan> other_plans, const NamedParts& named) {
   for (const StudyFiles::Image& xray : files.other_xrays) {
     if (named.takes_other_xrays)
       files.images.push_back(xray);
@@ -298,5 +255,92 @@ StudyParts find_parts(const NamedParts& named) {
                             parts.plan->string(), searched(named.images, named.study)));
   return parts;
 }
+
+}  // namespace
+
+std::vector<fs::path> files_below(const std::vector<fs::path>& paths, const std::unordered_set<std::string>& but) {
+  std::vector<fs::path> files;
+  const auto add = [&](const fs::path& file) {
+    if (!but.contains(file.native())) files.push_back(file);
+  };
+  for (const fs::path& path : paths) {
+    std::error_code error;
+    const auto status = fs::status(path, error);
+    if (!fs::exists(status)) throw Error(fmt::format("{}: no such file or folder", path.string()));
+    if (!fs::is_directory(status)) {
+      add(path);
+      continue;
+    }
+    for (auto entry = fs::recursive_directory_iterator(path, error); !error && entry != fs::end(entry);
+         entry.increment(error))
+      if (!entry->path().filename().native().starts_with('.') && entry->is_regular_file()) add(entry->path());
+    if (error) throw Error(fmt::format("{}: cannot be searched: {}", path.string(), error.message()));
+  }
+  std::ranges::sort(files);
+  files.erase(std::ranges::unique(files).begin(), files.end());
+  return files;
+}
+
+void add_file(const fs::path& path, StudyFiles& files) {
+  if (!begins_like_dicom(path)) {
+    files.left_aside.push_back(fmt::format("{}: not a DICOM file", path.string()));
+    return;
+  }
+  const DicomFile file = DicomFile::read(path, DicomFile::Extent::kHeader);
+  const DicomItem dataset = file.dataset();
+  const std::string sop_class = dataset.text(DCM_SOPClassUID).value_or("");
+  if (sop_class == UID_CTImageStorage || sop_class == UID_EnhancedCTImageStorage ||
+      sop_class == UID_LegacyConvertedEnhancedCTImageStorage) {
+    add_ct_slice(path, dataset, files);
+  } else if (sop_class == UID_RTImageStorage) {
+    files.images.push_back(xray(path, dataset));
+  } else if (is_other_xray(sop_class)) {
+    files.other_xrays.push_back(xray(path, dataset));
+  } else if (sop_class == UID_RTPlanStorage || sop_class == UID_RTIonPlanStorage) {
+    files.plans.push_back({.file = path,
+                           .patient = patient_of(dataset),
+                           .sop_instance_uid = dataset.required_text(DCM_SOPInstanceUID),
+                           .frame_of_reference_uid = dataset.text(DCM_FrameOfReferenceUID).value_or(""),
+                           .structure_set_uid = first_reference(dataset, DCM_ReferencedStructureSetSequence)});
+  } else if (sop_class == UID_RTStructureSetStorage) {
+    files.structures.push_back({.file = path,
+                                .patient = patient_of(dataset),
+                                .sop_instance_uid = dataset.required_text(DCM_SOPInstanceUID),
+                                .ct_series_uids = drawn_on(dataset),
+                                .ct_sop_instance_uids = drawn_on_images(dataset),
+                                .frame_of_reference_uids = drawn_in(dataset)});
+  } else {
+    files.left_aside.push_back(
+        fmt::format("{}: {}", path.string(), dcmFindNameOfUID(sop_class.c_str(), "an object of unknown class")));
+  }
+}
+
+StudyFiles scan_study(const std::vector<fs::path>& paths) {
+  StudyFiles files;
+  for (const fs::path& path : files_below(paths)) {
+    try {
+      add_file(path, files);
+    } catch (const Error& error) {
+      files.unreadable.emplace_back(error.what());
+    }
+  }
+  return files;
+}
+
+StudyParts find_parts(const NamedParts& named) {
+  StudyFiles files;
+  if (!named.study.empty()) files = scan_readable({named.study});
+  std::vector<StudyFiles::Plan> other_plans;  // a named plan makes those found in the folder others
+  if (!named.ct.empty()) files.cts = scan_readable(named.ct).cts;
+  if (!named.images.empty()) {
+    StudyFiles images = scan_readable(named.images);
+    std::swap(files.images, images.images);
+    std::swap(files.other_xrays, images.other_xrays);
+  }
+  if (named.plan) std::swap(other_plans, files.plans), files.plans = scan_readable({*named.plan}).plans;
+  return chosen(std::move(files), std::move(other_plans), named);
+}
+
+StudyParts choose_parts(const StudyFiles& files) { return chosen(files, {}, {}); }
 
 }  // namespace isoshift

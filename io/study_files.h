@@ -14,24 +14,33 @@ namespace isoshift {
 // The files below some paths, sorted by what they are, with what tells which of them belong together.
 struct StudyFiles {
   struct Ct {
+    std::string patient;  // PatientID, and its issuer
     std::string series_instance_uid;
     std::string frame_of_reference_uid;
     std::vector<std::filesystem::path> files;
+    std::set<std::string> sop_instance_uids;
   };
   struct Plan {
     std::filesystem::path file;
+    std::string patient;
     std::string sop_instance_uid;
     std::string frame_of_reference_uid;
     std::string structure_set_uid;  // ReferencedStructureSetSequence
   };
   struct Image {
     std::filesystem::path file;
-    std::string plan_uid;  // ReferencedRTPlanSequence
+    std::string patient;
+    std::string sop_instance_uid;
+    std::string plan_uid;        // ReferencedRTPlanSequence
+    std::string label;           // RTImageLabel; empty: none
+    std::optional<double> at_s;  // when it was acquired, since an epoch
   };
   struct Structures {
     std::filesystem::path file;
+    std::string patient;
     std::string sop_instance_uid;
     std::set<std::string> ct_series_uids;           // of the images it was drawn on
+    std::set<std::string> ct_sop_instance_uids;     // those images
     std::set<std::string> frame_of_reference_uids;  // of its structures
   };
 
@@ -52,6 +61,9 @@ std::vector<std::filesystem::path> files_below(const std::vector<std::filesystem
 // Reads the headers of all files below `paths` (files or folders), in the order of their names. A file that is no DICOM
 // is left aside.
 StudyFiles scan_study(const std::vector<std::filesystem::path>& paths);
+
+// Adds one file to those scanned. Throws Error for one that cannot be read.
+void add_file(const std::filesystem::path& path, StudyFiles& files);
 
 // The parts of one registration.
 struct StudyParts {
@@ -77,5 +89,8 @@ struct NamedParts {
 // All else is left aside, with the reason. Throws Error where CT or images are absent or the files do not tell which of
 // several is meant; nobody has to tell that of structure sets, unless they are wanted.
 StudyParts find_parts(const NamedParts& named);
+
+// The same among files that were scanned, all of them candidates.
+StudyParts choose_parts(const StudyFiles& files);
 
 }  // namespace isoshift

@@ -63,7 +63,7 @@ Study* RegistrationCheckTest::study_ = nullptr;
 TEST_F(RegistrationCheckTest, OursPassesAndSaysItsMatrix) {
   const CheckedRegistration checked = check_registration(path_);
   EXPECT_TRUE(checked.findings.empty()) << checked.findings.front().text;
-  EXPECT_EQ(checked.registered_frame_uid, study_->ct.frame_of_reference_uid);
+  EXPECT_EQ(checked.registered_frame_uid, study_->ct->frame_of_reference_uid);
   EXPECT_NE(checked.source_frame_uid, checked.registered_frame_uid);
   const SpatialRegistration read = read_spatial_registration(path_);
   EXPECT_EQ(checked.registered_from_source->matrix(), read.items[1].registered_from_source.matrix());
@@ -108,14 +108,14 @@ TEST_F(RegistrationCheckTest, AFirstItemThatIsNotTheIdentityIsFound) {
     const Eigen::Matrix4d moved = result();
     put_matrix(d, 1, Eigen::Matrix4d::Identity());
     put_matrix(d, 0, moved);
-    item(d, 1).put(DCM_FrameOfReferenceUID, study_->ct.frame_of_reference_uid);
+    item(d, 1).put(DCM_FrameOfReferenceUID, study_->ct->frame_of_reference_uid);
     item(d, 0).put(DCM_FrameOfReferenceUID, source);
   });
 }
 
 TEST_F(RegistrationCheckTest, AFrameMovedAgainstItselfIsFound) {
   expect_error("item 2: moves the registered frame against itself",
-               [](DicomItem d) { item(d, 1).put(DCM_FrameOfReferenceUID, study_->ct.frame_of_reference_uid); });
+               [](DicomItem d) { item(d, 1).put(DCM_FrameOfReferenceUID, study_->ct->frame_of_reference_uid); });
 }
 
 TEST_F(RegistrationCheckTest, SeveralMatricesInAnItemAreComposedAndFound) {
@@ -130,7 +130,7 @@ TEST_F(RegistrationCheckTest, SeveralMatricesInAnItemAreComposedAndFound) {
 }
 
 TEST_F(RegistrationCheckTest, AMissingReferenceIsNamed) {
-  const std::string lost = study_->ct.sop_instance_uids.front();
+  const std::string lost = study_->ct->sop_instance_uids.front();
   expect_error("the first one " + lost, [&](DicomItem d) {
     for (const DicomItem& series : d.items(DCM_ReferencedSeriesSequence))
       for (DicomItem instance : series.items(DCM_ReferencedInstanceSequence))

@@ -76,10 +76,10 @@ TEST_F(SpatialRegistrationFileTest, HoldsAnExactIdentityAndTheTreatmentMatrix) {
   const Study study = load();
   const SpatialRegistration registration = write_truth(study);
   ASSERT_EQ(registration.items.size(), 2U);
-  EXPECT_EQ(registration.frame_of_reference_uid, study.ct.frame_of_reference_uid);
-  EXPECT_EQ(registration.items[0].frame_of_reference_uid, study.ct.frame_of_reference_uid);
+  EXPECT_EQ(registration.frame_of_reference_uid, study.ct->frame_of_reference_uid);
+  EXPECT_EQ(registration.items[0].frame_of_reference_uid, study.ct->frame_of_reference_uid);
   EXPECT_EQ(registration.items[0].registered_from_source.matrix(), Eigen::Matrix4d::Identity());
-  EXPECT_NE(registration.items[1].frame_of_reference_uid, study.ct.frame_of_reference_uid);
+  EXPECT_NE(registration.items[1].frame_of_reference_uid, study.ct->frame_of_reference_uid);
 
   // M (0, 0, 0) is the CT point now at the machine's isocenter; M^-1 isocenter is the setup error in patient axes.
   const Eigen::Isometry3d& m = registration.items[1].registered_from_source;
@@ -117,7 +117,9 @@ TEST_F(SpatialRegistrationFileTest, PassesDciodvfy) {
 
 TEST_F(SpatialRegistrationFileTest, PassesDciodvfyWithoutABodyPart) {
   Study study = load();
-  study.ct.body_part_examined.clear();
+  CtSeries without = *study.ct;
+  without.body_part_examined.clear();
+  study.ct = std::make_shared<const CtSeries>(std::move(without));
   write_truth(study);
   const CommandOutcome checked = run_shell("dciodvfy -new " + path().string());
   EXPECT_THAT(checked.out, testing::Not(HasSubstr("Error"))) << checked.out;
@@ -152,9 +154,9 @@ TEST_F(SpatialRegistrationFileTest, ImageFrameExampleOfDicomMd44) {
 
 TEST_F(SpatialRegistrationFileTest, TheCtsOwnFrameIsReplacedWithAWarning) {
   Study study = load();
-  for (RtImage& image : study.rt_images) image.frame_of_reference_uid = study.ct.frame_of_reference_uid;
+  for (RtImage& image : study.rt_images) image.frame_of_reference_uid = study.ct->frame_of_reference_uid;
   const SpatialRegistration registration = write_truth(study);
-  EXPECT_NE(registration.items[1].frame_of_reference_uid, study.ct.frame_of_reference_uid);
+  EXPECT_NE(registration.items[1].frame_of_reference_uid, study.ct->frame_of_reference_uid);
   EXPECT_THAT(notes_.warnings, testing::Contains(HasSubstr("would claim a perfect setup")));
 }
 
@@ -167,7 +169,7 @@ TEST_F(SpatialRegistrationFileTest, EveryReferencedInstanceIsListedUnderItsStudy
   const DicomItem d = file.dataset();
   const auto same_study = d.items(DCM_ReferencedSeriesSequence);
   ASSERT_EQ(same_study.size(), 2U);  // the CT, and the X-ray of the CT's study
-  EXPECT_EQ(same_study[0].items(DCM_ReferencedInstanceSequence).size(), study.ct.sop_instance_uids.size());
+  EXPECT_EQ(same_study[0].items(DCM_ReferencedInstanceSequence).size(), study.ct->sop_instance_uids.size());
   EXPECT_EQ(same_study[1].items(DCM_ReferencedInstanceSequence).size(), 1U);
   const auto others = d.items(DCM_StudiesContainingOtherReferencedInstancesSequence);
   ASSERT_EQ(others.size(), 1U);
@@ -192,7 +194,7 @@ TEST_F(SpatialRegistrationFileTest, ImagesThatAgreeOnNoFrameGetANewOneOfDicomMd4
     std::filesystem::remove(path());
     const SpatialRegistration registration = write_truth(study);
     const std::string& frame = registration.items[1].frame_of_reference_uid;
-    EXPECT_NE(frame, study.ct.frame_of_reference_uid);
+    EXPECT_NE(frame, study.ct->frame_of_reference_uid);
     for (const RtImage& image : study.rt_images) EXPECT_NE(frame, image.frame_of_reference_uid);
     EXPECT_THAT(Vector3d(actual_ * (registration.items[1].registered_from_source * Vector3d::Zero())),
                 VectorNear(Vector3d::Zero().eval(), 1e-6));

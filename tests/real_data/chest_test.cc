@@ -36,7 +36,7 @@ TEST(Chest, TheSpineIsTheCylinderThatWasDrawn) {
   EXPECT_EQ(spine.interpreted_type, "ORGAN");
   EXPECT_EQ(spine.contours.size(), 133U);
 
-  const auto mask = mask_of(spine, study.ct.hu.size, study.ct.hu.patient_from_voxel);
+  const auto mask = mask_of(spine, study.ct->hu.size, study.ct->hu.patient_from_voxel);
   const double polygon_mm2 = 24.0 * 35.0 * 35.0 * std::sin(2.0 * M_PI / 48.0);
   EXPECT_NEAR(volume_mm3(mask), polygon_mm2 * kHeightMm, 0.003 * polygon_mm2 * kHeightMm);
   EXPECT_NEAR(volume_mm3(mask), M_PI * 35.0 * 35.0 * kHeightMm, 0.01 * M_PI * 35.0 * 35.0 * kHeightMm);

@@ -79,7 +79,7 @@ TEST(HeadRegistration, RankCorrelationIsBlindToMonotoneChanges) {
   StudyRequest request;
   request.parts = {.study = kHead / "head-kv-pair", .ct = {kHead / "CT"}, .images = {}, .plan = {}};
   const Study study = load_study(request, notes, {});
-  const RendererPyramid renderers(RendererKind::kCpu, study.ct.hu, {}, kBothBeams);
+  const RendererPyramid renderers(RendererKind::kCpu, study.ct->hu, {}, kBothBeams);
   RegistrationOptions by_ranks = preset("paper");
   by_ranks.stages.front().pixel_fraction = 1.0;
   const auto found_with = [&](auto&& change) {

@@ -1,0 +1,161 @@
+#include "cli/batch_workers.h"
+
+#include <fmt/format.h>
+#include <poll.h>
+#include <signal.h>
+#include <spawn.h>
+#include <sys/prctl.h>
+#include <sys/socket.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <iostream>
+#include <list>
+#include <memory>
+
+#include "geometry/error.h"
+
+namespace isoshift {
+namespace {
+
+std::filesystem::path& worker_program() {
+  static std::filesystem::path program = "/proc/self/exe";
+  return program;
+}
+
+// A child on the other end of a socket that is its standard input and output.
+class Worker {
+ public:
+  explicit Worker(const std::vector<std::string>& arguments) {
+    int ends[2];
+    if (::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends) != 0)
+      throw Error(fmt::format("no worker can be started: {}", std::strerror(errno)));
+    socket_ = ends[0];
+    posix_spawn_file_actions_t actions;
+    posix_spawn_file_actions_init(&actions);
+    posix_spawn_file_actions_adddup2(&actions, ends[1], STDIN_FILENO);
+    posix_spawn_file_actions_adddup2(&actions, ends[1], STDOUT_FILENO);
+    std::vector<std::string> words = {"isoshift"};
+    words.insert(words.end(), arguments.begin(), arguments.end());
+    std::vector<char*> argv;
+    for (std::string& word : words) argv.push_back(word.data());
+    argv.push_back(nullptr);
+    const int failed =
+        ::posix_spawn(&process_, worker_program().c_str(), &actions, nullptr, argv.data(), environ);
+    posix_spawn_file_actions_destroy(&actions);
+    ::close(ends[1]);
+    if (failed != 0) {
+      ::close(socket_);
+      throw Error(fmt::format("no worker can be started: {}", std::strerror(failed)));
+    }
+  }
+  ~Worker() {
+    ::close(socket_);
+    if (process_ == 0) return;
+    ::kill(process_, SIGTERM);
+    ::waitpid(process_, nullptr, 0);
+  }
+  Worker(const Worker&) = delete;
+  Worker& operator=(const Worker&) = delete;
+
+  int socket() const { return socket_; }
+  const std::optional<BatchJob>& job() const { return job_; }
+  const std::string& last_ct() const { return last_ct_; }
+
+  void give(BatchJob job) {
+    const std::string line = job.name + "\n";
+    last_ct_ = job.ct_key;
+    job_ = std::move(job);
+    ::send(socket_, line.data(), line.size(), MSG_NOSIGNAL);  // one that died is found when it is read from
+  }
+
+  // Reads what is there. False: it died.
+  bool has_ended_job() {
+    char buffer[512];
+    const ssize_t count = ::recv(socket_, buffer, sizeof buffer, 0);
+    if (count <= 0) return false;
+    if (std::find(buffer, buffer + count, '\n') != buffer + count) job_.reset();
+    return true;
+  }
+
+  // Of one that has died.
+  std::string death() {
+    int status = 0;
+    ::waitpid(std::exchange(process_, 0), &status, 0);
+    if (WIFSIGNALED(status))
+      return fmt::format("the program was ended by signal {} ({})", WTERMSIG(status), ::strsignal(WTERMSIG(status)));
+    return fmt::format("the program ended with status {}", WEXITSTATUS(status));
+  }
+
+ private:
+  int socket_ = -1;
+  pid_t process_ = 0;
+  std::optional<BatchJob> job_;
+  std::string last_ct_;
+};
+
+// The next job for a worker: of the CT it holds, else of one that no other worker holds, else any.
+std::list<BatchJob>::iterator next_for(const Worker& worker, std::list<BatchJob>& jobs,
+                                       const std::list<std::unique_ptr<Worker>>& workers) {
+  const auto own = std::ranges::find(jobs, worker.last_ct(), &BatchJob::ct_key);
+  if (own != jobs.end()) return own;
+  const auto is_free = [&](const BatchJob& job) {
+    return std::ranges::none_of(workers, [&](const auto& other) { return other->last_ct() == job.ct_key; });
+  };
+  const auto free = std::ranges::find_if(jobs, is_free);
+  return free != jobs.end() ? free : jobs.begin();
+}
+
+}  // namespace
+
+void use_worker_program(std::filesystem::path program) { worker_program() = std::move(program); }
+
+void run_in_workers(std::vector<BatchJob> all, int count, const std::vector<std::string>& arguments,
+                    const std::function<void(const std::string& name, const std::optional<std::string>& death)>& on_end,
+                    const std::function<bool()>& should_stop) {
+  std::list<BatchJob> jobs(std::make_move_iterator(all.begin()), std::make_move_iterator(all.end()));
+  std::list<std::unique_ptr<Worker>> workers;
+  for (;;) {
+    while (workers.size() < std::min<std::size_t>(static_cast<std::size_t>(count), workers.size() + jobs.size()))
+      if (std::ranges::any_of(workers, [](const auto& worker) { return !worker->job(); }))
+        break;
+      else
+        workers.push_back(std::make_unique<Worker>(arguments));
+    for (const auto& worker : workers) {
+      if (worker->job() || jobs.empty()) continue;
+      const auto next = next_for(*worker, jobs, workers);
+      worker->give(std::move(*next));
+      jobs.erase(next);
+    }
+    if (should_stop() || std::ranges::none_of(workers, [](const auto& worker) { return worker->job().has_value(); }))
+      return;
+    std::vector<pollfd> polled;
+    for (const auto& worker : workers) polled.push_back({.fd = worker->socket(), .events = POLLIN, .revents = 0});
+    constexpr int kPatienceMs = 200;
+    ::poll(polled.data(), polled.size(), kPatienceMs);
+    auto event = polled.begin();
+    for (auto worker = workers.begin(); worker != workers.end(); ++event) {
+      const auto now = worker++;
+      if (event->revents == 0) continue;
+      const std::optional<BatchJob> job = (*now)->job();
+      const bool is_alive = (*now)->has_ended_job();
+      if (is_alive && (*now)->job()) continue;
+      if (should_stop()) return;  // the signal that says so has reached the workers, too
+      if (job) on_end(job->name, is_alive ? std::nullopt : std::optional((*now)->death()));
+      if (!is_alive) workers.erase(now);
+    }
+  }
+}
+
+void serve_cases(const std::function<void(const std::string& name)>& run) {
+  ::prctl(PR_SET_PDEATHSIG, SIGKILL);  // nobody would be told of what it does any more
+  for (std::string name; std::getline(std::cin, name);) {
+    run(name);
+    std::cout << name << std::endl;
+  }
+}
+
+}  // namespace isoshift

@@ -1,0 +1,30 @@
+#pragma once
+// Processes that register cases side by side. One that dies takes its case with it, and nothing else.
+
+#include <filesystem>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace isoshift {
+
+// Which program workers run: this one, or in tests the one that was built.
+void use_worker_program(std::filesystem::path program);
+
+struct BatchJob {
+  std::string name;
+  std::string ct_key;  // jobs with equal ones go to one worker, one after the other
+};
+
+// Hands the jobs to `workers` processes that run the worker program with `arguments`: a worker reads names of cases from
+// its standard input, one per line, and writes each back when its case has ended. `on_end` is told every name, and why
+// the worker died where it did. Returns early when `should_stop` says so; what runs then is given up.
+void run_in_workers(std::vector<BatchJob> jobs, int workers, const std::vector<std::string>& arguments,
+                    const std::function<void(const std::string& name, const std::optional<std::string>& death)>& on_end,
+                    const std::function<bool()>& should_stop);
+
+// The loop of a worker.
+void serve_cases(const std::function<void(const std::string& name)>& run);
+
+}  // namespace isoshift

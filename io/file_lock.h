@@ -1,0 +1,23 @@
+#pragma once
+// One process at a time: a lock that the system takes back when its holder ends, however it ends.
+
+#include <filesystem>
+#include <optional>
+
+namespace isoshift {
+
+class FileLock {
+ public:
+  // Nothing where another process holds it. The file remains. Throws Error if it cannot be made.
+  static std::optional<FileLock> try_take(const std::filesystem::path& path);
+  ~FileLock();
+  FileLock(FileLock&& other) noexcept;
+  FileLock& operator=(FileLock&&) = delete;
+
+ private:
+  explicit FileLock(int descriptor) : descriptor_(descriptor) {}
+
+  int descriptor_;
+};
+
+}  // namespace isoshift

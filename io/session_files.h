@@ -1,0 +1,31 @@
+#pragma once
+// Among the files of many patients: which X-rays were taken for one setup, and what else belongs to it.
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "io/study_files.h"
+
+namespace isoshift {
+
+// X-rays of one patient, one plan and one position: at most 10 minutes apart, no label twice (a label that comes again
+// is the next setup). X-rays without a time are told apart by their folder.
+struct SessionFiles {
+  std::string name;  // made from its X-rays' SOPInstanceUIDs; says nothing of the patient
+  std::string patient;
+  std::optional<double> at_s;  // of the first X-ray, since an epoch
+  std::vector<StudyFiles::Image> images;
+};
+
+// In the order of patients and times; an instance that is there twice counts once. `other_xrays`: whether those of
+// other classes than RT Image are X-rays to be registered.
+std::vector<SessionFiles> sessions_of(const StudyFiles& files, bool other_xrays);
+
+// What choose_parts() chooses from for a session: all files of its patient, and of X-rays its own.
+StudyFiles files_for(const SessionFiles& session, const StudyFiles& files);
+
+// What its files refer to and is not there, in words; empty: all is there.
+std::vector<std::string> missing_parts(const StudyFiles& of_session);
+
+}  // namespace isoshift
