@@ -24,9 +24,9 @@ class BatchFolder {
   // Makes the folder, or opens that of a batch with the same options. Throws Error if it holds anything else.
   BatchFolder(std::filesystem::path path, const std::vector<std::string>& options);
 
-  // From now on nobody else works on this shard; what a killed run left half written is removed. Throws Error while
-  // somebody does.
-  void work_on(const Shard& shard, const std::vector<BatchCase>& cases);
+  // While the lock lasts nobody else works on this shard; what a killed run left half written is removed. Throws Error
+  // where somebody does.
+  [[nodiscard]] FileLock work_on(const Shard& shard, const std::vector<BatchCase>& cases) const;
 
   const std::filesystem::path& path() const { return path_; }
   std::filesystem::path folder_of(const std::string& name) const { return path_ / "cases" / name; }
@@ -37,7 +37,6 @@ class BatchFolder {
 
  private:
   std::filesystem::path path_;
-  std::optional<FileLock> lock_;
 };
 
 }  // namespace isoshift

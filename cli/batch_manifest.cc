@@ -74,9 +74,10 @@ std::vector<NumberedRow> csv_rows(const std::string& text, const std::string& wh
                               names.size()));
     NumberedRow row{.line = static_cast<int>(n + 1), .cells = {}};
     for (std::size_t column = 0; column < names.size(); ++column)
-      row.cells[names[column]] = names[column] == "ct" || names[column] == "images"
-                                     ? parts_of(cells[column])
-                                     : (cells[column].empty() ? std::vector<std::string>() : std::vector{cells[column]});
+      row.cells[names[column]] =
+          names[column] == "ct" || names[column] == "images"
+              ? parts_of(cells[column])
+              : (cells[column].empty() ? std::vector<std::string>() : std::vector{cells[column]});
     rows.push_back(std::move(row));
   }
   return rows;
@@ -94,7 +95,8 @@ std::vector<NumberedRow> json_rows(const std::string& text, const std::string& w
     try {
       for (const auto& [name, value] : nlohmann::json::parse(one).get<std::map<std::string, nlohmann::json>>()) {
         check_column(name, fmt::format("{}, line {}", where, line));
-        row.cells[name] = value.is_array() ? value.get<std::vector<std::string>>() : std::vector{value.get<std::string>()};
+        row.cells[name] =
+            value.is_array() ? value.get<std::vector<std::string>>() : std::vector{value.get<std::string>()};
       }
     } catch (const nlohmann::json::exception&) {
       throw Error(fmt::format("{}, line {}: expected a JSON object of texts and lists of texts", where, line));
@@ -130,10 +132,11 @@ BatchCase case_of(const NumberedRow& row, const fs::path& folder, const std::str
                      .anatomy = one("anatomy")};
   const auto is_allowed = [](unsigned char c) { return std::isalnum(c) != 0 || c == '.' || c == '_' || c == '-'; };
   if (one_case.name.empty() || one_case.name.starts_with('.') || !std::ranges::all_of(one_case.name, is_allowed))
-    throw Error(fmt::format("{}, line {}: case \"{}\": expected a name of letters, digits, \".\", \"_\" and \"-\"", where,
-                            row.line, one_case.name));
+    throw Error(fmt::format("{}, line {}: case \"{}\": expected a name of letters, digits, \".\", \"_\" and \"-\"",
+                            where, row.line, one_case.name));
   if (one_case.study.empty() && (one_case.ct.empty() || one_case.images.empty()))
-    throw Error(fmt::format("{}, line {}: case {}: expected a study, or ct and images", where, row.line, one_case.name));
+    throw Error(
+        fmt::format("{}, line {}: case {}: expected a study, or ct and images", where, row.line, one_case.name));
   return one_case;
 }
 
@@ -219,8 +222,9 @@ std::vector<BatchCase> scan_cases(const fs::path& folder, bool other_xrays, Note
                        .images = parts.images,
                        .anatomy = ""});
     } catch (const Error& error) {
-      notes.warnings.push_back(fmt::format("{} and {} more X-rays make no case: {}", session.images.front().file.string(),
-                                           session.images.size() - 1, error.what()));
+      notes.warnings.push_back(fmt::format("{} and {} more X-rays make no case: {}",
+                                           session.images.front().file.string(), session.images.size() - 1,
+                                           error.what()));
     }
   }
   if (cases.empty()) throw Error(fmt::format("{}: holds no case: X-rays with a CT and a plan", folder.string()));

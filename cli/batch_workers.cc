@@ -15,6 +15,7 @@
 #include <iostream>
 #include <list>
 #include <memory>
+#include <utility>
 
 #include "geometry/error.h"
 
@@ -43,8 +44,7 @@ class Worker {
     std::vector<char*> argv;
     for (std::string& word : words) argv.push_back(word.data());
     argv.push_back(nullptr);
-    const int failed =
-        ::posix_spawn(&process_, worker_program().c_str(), &actions, nullptr, argv.data(), environ);
+    const int failed = ::posix_spawn(&process_, worker_program().c_str(), &actions, nullptr, argv.data(), environ);
     posix_spawn_file_actions_destroy(&actions);
     ::close(ends[1]);
     if (failed != 0) {
@@ -73,13 +73,18 @@ class Worker {
   }
 
   // Reads what is there. False: it died.
-  bool has_ended_job() {
+  bool hear() {
     char buffer[512];
     const ssize_t count = ::recv(socket_, buffer, sizeof buffer, 0);
     if (count <= 0) return false;
-    if (std::find(buffer, buffer + count, '\n') != buffer + count) job_.reset();
+    heard_.append(buffer, static_cast<std::size_t>(count));
+    for (std::size_t end = 0; (end = heard_.find('\n')) != std::string::npos; heard_.erase(0, end + 1)) {
+      if (is_ready_ && job_ && heard_.compare(0, end, job_->name) == 0) job_.reset();
+      is_ready_ = true;  // its first line says so
+    }
     return true;
   }
+  bool is_ready() const { return is_ready_; }
 
   // Of one that has died.
   std::string death() {
@@ -93,6 +98,8 @@ class Worker {
  private:
   int socket_ = -1;
   pid_t process_ = 0;
+  bool is_ready_ = false;
+  std::string heard_;
   std::optional<BatchJob> job_;
   std::string last_ct_;
 };
@@ -119,11 +126,9 @@ void run_in_workers(std::vector<BatchJob> all, int count, const std::vector<std:
   std::list<BatchJob> jobs(std::make_move_iterator(all.begin()), std::make_move_iterator(all.end()));
   std::list<std::unique_ptr<Worker>> workers;
   for (;;) {
-    while (workers.size() < std::min<std::size_t>(static_cast<std::size_t>(count), workers.size() + jobs.size()))
-      if (std::ranges::any_of(workers, [](const auto& worker) { return !worker->job(); }))
-        break;
-      else
-        workers.push_back(std::make_unique<Worker>(arguments));
+    auto idle = static_cast<std::size_t>(std::ranges::count_if(workers, [](const auto& w) { return !w->job(); }));
+    for (; workers.size() < static_cast<std::size_t>(count) && idle < jobs.size(); ++idle)
+      workers.push_back(std::make_unique<Worker>(arguments));
     for (const auto& worker : workers) {
       if (worker->job() || jobs.empty()) continue;
       const auto next = next_for(*worker, jobs, workers);
@@ -141,9 +146,10 @@ void run_in_workers(std::vector<BatchJob> all, int count, const std::vector<std:
       const auto now = worker++;
       if (event->revents == 0) continue;
       const std::optional<BatchJob> job = (*now)->job();
-      const bool is_alive = (*now)->has_ended_job();
-      if (is_alive && (*now)->job()) continue;
+      const bool is_alive = (*now)->hear();
+      if (is_alive && (*now)->job().has_value() == job.has_value()) continue;
       if (should_stop()) return;  // the signal that says so has reached the workers, too
+      if (!(*now)->is_ready()) throw Error(fmt::format("a worker could not begin: {}", (*now)->death()));
       if (job) on_end(job->name, is_alive ? std::nullopt : std::optional((*now)->death()));
       if (!is_alive) workers.erase(now);
     }
@@ -152,6 +158,7 @@ void run_in_workers(std::vector<BatchJob> all, int count, const std::vector<std:
 
 void serve_cases(const std::function<void(const std::string& name)>& run) {
   ::prctl(PR_SET_PDEATHSIG, SIGKILL);  // nobody would be told of what it does any more
+  std::cout << "ready" << std::endl;
   for (std::string name; std::getline(std::cin, name);) {
     run(name);
     std::cout << name << std::endl;

@@ -10,6 +10,7 @@ namespace isoshift {
 void add_inspect_command(CLI::App& app, Console& console, int& exit_status);
 void add_check_command(CLI::App& app, Console& console, int& exit_status);
 void add_register_command(CLI::App& app, Console& console, int& exit_status);
+void add_batch_command(CLI::App& app, Console& console, int& exit_status);
 void add_report_command(CLI::App& app, Console& console, int& exit_status);
 void add_drr_command(CLI::App& app, Console& console, int& exit_status);
 void add_phantom_command(CLI::App& app, Console& console, int& exit_status);

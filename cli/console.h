@@ -15,8 +15,8 @@ struct Console {
   bool err_is_terminal = false;
 };
 
-// Progress of one long piece of work: a bar that redraws itself on a terminal, a line per quarter elsewhere. Work that
-// ends within half a second shows nothing.
+// Progress of one long piece of work: a bar that redraws itself on a terminal, a line per quarter elsewhere, both
+// with the time left where it is long. Work that ends within half a second shows nothing.
 class ProgressBar {
  public:
   ProgressBar(Console& console, std::string what);
@@ -28,6 +28,8 @@ class ProgressBar {
   void update(std::size_t done, std::size_t total) { update(static_cast<double>(done) / static_cast<double>(total)); }
 
  private:
+  std::string time_left(double share) const;
+
   Console& console_;
   std::string what_;
   std::chrono::steady_clock::time_point begin_;

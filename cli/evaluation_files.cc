@@ -121,15 +121,6 @@ BarChart success_chart(const std::vector<EvaluatedRun>& runs, bool by_mrpd, cons
   return chart;
 }
 
-// In place of what is there, at once.
-void replace_text(const std::filesystem::path& file, std::string_view text) {
-  std::filesystem::path aside = file;
-  aside += ".new";
-  std::filesystem::remove(aside);
-  write_text(aside, text);
-  std::filesystem::rename(aside, file);
-}
-
 Json parsed(const std::filesystem::path& file) {
   std::ifstream stream(file);
   if (!stream) throw Error(fmt::format("{}: cannot be opened; is this the folder of an evaluation?", file.string()));

@@ -39,6 +39,7 @@ int run_isoshift(int argc, const char* const* argv, Console& console) {
   add_check_command(app, console, exit_status);
   add_report_command(app, console, exit_status);
   add_register_command(app, console, exit_status);
+  add_batch_command(app, console, exit_status);
   add_drr_command(app, console, exit_status);
   add_phantom_command(app, console, exit_status);
   add_evaluate_command(app, console, exit_status);

@@ -113,6 +113,11 @@ void add_phantom_command(CLI::App& app, Console& console, int&) {
           "--trace", options->trace,
           "Recorded motion for the target (t_s or Timestamp; x, y, z in patient axes, mm), from its first position")
       ->type_name("CSV");
+  command
+      ->add_option("--fractions", options->phantom.fractions,
+                   "Days of treatment, each with X-rays and a random setup error of its own")
+      ->type_name("N")
+      ->capture_default_str();
   command->add_option("--seed", options->phantom.seed, "Of anatomy, noise and UIDs")->capture_default_str();
   command->add_flag("--overwrite", options->overwrite, "Replace an earlier study in that folder");
   command->callback([options, &console] { run_phantom(*options, console); });

@@ -223,6 +223,7 @@ struct Moment {
   int instance = 1;
   Eigen::Vector3d displacement_mm = Eigen::Vector3d::Zero();
   std::uint64_t noise_seed = 0;
+  int day = 1;  // of March 2026
 };
 
 // TM with fractions where there are any.
@@ -256,9 +257,10 @@ void write_xray(const PhantomOptions& options, const StudyUids& study, const std
   const double corner_mm = 0.5 * (imager.pixels - 1) * imager.pixel_mm;
   dataset.put(DCM_ImageType, imager.is_megavoltage ? "ORIGINAL\\PRIMARY\\PORTAL" : "ORIGINAL\\PRIMARY\\RADIOGRAPH");
   dataset.put(DCM_ConversionType, "DI");
-  dataset.put(DCM_ContentDate, "20260301");
+  const std::string date = fmt::format("202603{:02}", moment.day);
+  dataset.put(DCM_ContentDate, date);
   dataset.put(DCM_ContentTime, time_of_day(moment.time_s));
-  dataset.put(DCM_AcquisitionDate, "20260301");
+  dataset.put(DCM_AcquisitionDate, date);
   dataset.put(DCM_AcquisitionTime, time_of_day(moment.time_s));
   dataset.put(DCM_PatientPosition, options.placement.patient_position);
   dataset.put(DCM_InstanceNumber, fmt::format("{}", moment.instance));
@@ -381,6 +383,7 @@ void write_breathing(const PhantomOptions& options, const StudyUids& study, Uids
   as_planned.translation_mm.setZero();
   as_planned.rotation_deg.setZero();
   std::string truth = "t_s,x_mm,y_mm,z_mm\n";
+  std::filesystem::create_directories(folder / "RTIMAGE");
   const int moments = static_cast<int>(breathing.seconds * breathing.rate_hz);
   const auto imagers = options.gantry_angles_deg.size();
   for (int n = 0; n < moments; ++n) {
@@ -398,6 +401,35 @@ void write_breathing(const PhantomOptions& options, const StudyUids& study, Uids
     if (progress) progress(static_cast<std::size_t>(n) + 1, static_cast<std::size_t>(moments));
   }
   write_text(folder / "truth.csv", truth);
+}
+
+// The session of a day: an X-ray at each gantry angle.
+void write_session(const PhantomOptions& options, const StudyUids& study, Uids& uids, int day,
+                   const std::filesystem::path& folder) {
+  std::filesystem::create_directories(folder);
+  const std::uint64_t seed = (options.seed + static_cast<std::uint64_t>(day - 1) * 1'000'003) * 1000;
+  for (std::size_t n = 0; n < options.gantry_angles_deg.size(); ++n)
+    write_xray(options, study, uids.next(), n,
+               {.time_s = 10.0 * static_cast<double>(n),
+                .instance = static_cast<int>(n + 1),
+                .displacement_mm = Eigen::Vector3d::Zero(),
+                .noise_seed = seed + n,
+                .day = day},
+               folder / fmt::format("{}.dcm", image_label(options.gantry_angles_deg[n])));
+}
+
+void write_later_fractions(const PhantomOptions& options, const StudyUids& study, Uids& uids,
+                           const std::filesystem::path& folder) {
+  std::mt19937_64 random(options.seed);
+  std::normal_distribution<double> translation(0.0, 2.0), rotation(0.0, 0.7);
+  for (int fraction = 2; fraction <= options.fractions; ++fraction) {
+    PhantomOptions of_day = options;
+    for (double& mm : of_day.placement.translation_mm) mm += translation(random);
+    for (double& deg : of_day.placement.rotation_deg) deg += rotation(random);
+    const std::string name = fmt::format("F{:02}", fraction);
+    write_session(of_day, study, uids, fraction, folder / "RTIMAGE" / name);
+    write_truth(of_day, folder / fmt::format("truth_{}.json", name));
+  }
 }
 
 }  // namespace
@@ -426,6 +458,8 @@ void PhantomOptions::check() const {
       !(breathing.rate_hz >= 0.1 && breathing.rate_hz <= 50.0))
     throw UsageError(fmt::format("{} s of breathing at {} Hz: expected at most 7200 s at 0.1 to 50 Hz",
                                  breathing.seconds, breathing.rate_hz));
+  if (fractions < 1 || fractions > 31 || (fractions > 1 && breathing.seconds > 0.0))
+    throw UsageError(fmt::format("{} fractions: expected 1 to 31, and one of a phantom that breathes", fractions));
   for (const double angle_deg : megavoltage_angles_deg)
     if (std::ranges::find(gantry_angles_deg, angle_deg) == gantry_angles_deg.end())
       throw UsageError(fmt::format("no X-ray is taken at gantry angle {}, which is to be MV", angle_deg));
@@ -452,17 +486,11 @@ void write_phantom_study(const PhantomOptions& options, const std::filesystem::p
                                 breathes ? Progress() : progress);
   if (options.anatomy == PhantomOptions::Anatomy::kThorax) study.structures = uids.next();
   write_plan(options, study, folder / "RTPLAN.dcm");
-  std::filesystem::create_directories(folder / "RTIMAGE");
-  for (std::size_t n = 0; !breathes && n < options.gantry_angles_deg.size(); ++n)
-    write_xray(options, study, uids.next(), n,
-               {.time_s = 10.0 * static_cast<double>(n),
-                .instance = static_cast<int>(n + 1),
-                .displacement_mm = Eigen::Vector3d::Zero(),
-                .noise_seed = options.seed * 1000 + n},
-               folder / "RTIMAGE" / fmt::format("{}.dcm", image_label(options.gantry_angles_deg[n])));
+  if (!breathes) write_session(options, study, uids, 1, folder / "RTIMAGE");
   if (options.anatomy == PhantomOptions::Anatomy::kThorax)
     write_structures(options, study, uids, folder / "RTSTRUCT.dcm");
   if (breathes) write_breathing(options, study, uids, folder, progress);
+  write_later_fractions(options, study, uids, folder);
   write_truth(options, folder / "truth.json");
 }
 

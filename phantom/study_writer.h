@@ -24,6 +24,7 @@ struct PhantomOptions {
   double photons = 20000.0;                             // per open pixel; fewer mean more noise
   std::vector<double> megavoltage_angles_deg;           // of those gantry angles, the ones taken with 6 MV
   BreathingOptions breathing;                           // of a thorax
+  int fractions = 1;                                    // days of treatment, one session of X-rays on each
   std::uint64_t seed = 1;                               // of anatomy, noise and UIDs
 
   // Throws UsageError naming the field and its value.
@@ -35,7 +36,8 @@ std::vector<Shape> phantom_shapes(const PhantomOptions& options,
 
 // Fills an existing folder: CT/, RTIMAGE/, RTPLAN.dcm, truth.json; of a thorax also RTSTRUCT.dcm with its target. One
 // that breathes has PHASES/00/, 01/, ..., RT Images of every imager at every moment, and truth.csv: where the target
-// was, mm from where it was planned, IEC 61217 fixed.
+// was, mm from where it was planned, IEC 61217 fixed. Every later fraction has RTIMAGE/F02/, ... and truth_F02.json,
+// ...: its setup error is that of the first and a random one of 2 mm and 0.7 degrees (one standard deviation) per axis.
 void write_phantom_study(const PhantomOptions& options, const std::filesystem::path& folder, const Progress& progress);
 
 }  // namespace isoshift

@@ -9,22 +9,10 @@
 #include "io/report/formats.h"
 #include "io/report/page.html.h"
 #include "io/report/polygons_json.h"
+#include "io/report/results_page.h"
 
 namespace isoshift {
 namespace {
-
-std::string escaped(std::string_view text) {
-  std::string result;
-  for (const char c : text) switch (c) {
-      case '&': result += "&amp;"; break;
-      case '<': result += "&lt;"; break;
-      case '>': result += "&gt;"; break;
-      case '"': result += "&quot;"; break;
-      case '\'': result += "&#39;"; break;
-      default: result += c;
-    }
-  return result;
-}
 
 std::string data_uri(std::string_view type, const std::string& bytes) {
   std::string base64(4 * ((bytes.size() + 2) / 3) + 1, '\0');
@@ -38,7 +26,7 @@ std::string data_uri(std::string_view type, const std::string& bytes) {
 std::string list(const std::vector<std::string>& lines) {
   if (lines.empty()) return "";
   std::string html = "<ul>";
-  for (const std::string& line : lines) html += "<li>" + escaped(line) + "</li>";
+  for (const std::string& line : lines) html += "<li>" + html_escaped(line) + "</li>";
   return html + "</ul>";
 }
 
@@ -46,7 +34,7 @@ std::string rows(const std::vector<ReportPage::Row>& list_of_rows) {
   std::string html;
   for (const ReportPage::Row& row : list_of_rows)
     html += fmt::format("<tr{}><th>{}</th><td>{}</td></tr>", row.name == "Patient" ? " class=\"patient\"" : "",
-                        escaped(row.name), escaped(row.value));
+                        html_escaped(row.name), html_escaped(row.value));
   return html;
 }
 
@@ -57,9 +45,9 @@ std::string quantities(const std::vector<Quantity>& list_of_quantities, const st
     const Quantity& quantity = list_of_quantities[n];
     html += fmt::format(
         "<tr{}><th>{}</th><td class=\"value\">{}</td><td>{}{}</td><td class=\"words\">{}</td></tr>",
-        is_couch && n < 3 ? " class=\"translation\"" : "", escaped(quantity.name), escaped(quantity.value),
+        is_couch && n < 3 ? " class=\"translation\"" : "", html_escaped(quantity.name), html_escaped(quantity.value),
         quantity.is_number && !quantity.plus_minus.empty() && !is_couch ? "± " + quantity.plus_minus + " " : "",
-        quantity.is_number ? quantity.unit : "", escaped(quantity.words));
+        quantity.is_number ? quantity.unit : "", html_escaped(quantity.words));
   }
   return html + "</table>";
 }
@@ -68,22 +56,22 @@ std::string couch(const ReportPage& page) {
   if (page.withheld)
     return "<p class=\"withheld\">withheld</p><p>The result was rejected: there is no shift to apply.</p>";
   return quantities(page.couch, "couch", true) +
-         fmt::format("<p class=\"dim\">{}. {}</p>", escaped(page.couch_order), escaped(page.couch_target));
+         fmt::format("<p class=\"dim\">{}. {}</p>", html_escaped(page.couch_order), html_escaped(page.couch_target));
 }
 
 std::string numbers(const ReportPage& page) {
   if (page.withheld) return "";
   std::string html = "<div><h2>Setup error: where the patient lies</h2>" +
                      quantities(page.setup_error, "setup-error", false) +
-                     fmt::format("<p class=\"dim\">{}</p></div>", escaped(page.setup_error_length));
+                     fmt::format("<p class=\"dim\">{}</p></div>", html_escaped(page.setup_error_length));
   if (page.display)
-    html += fmt::format("<div><h2>{}</h2>{}</div>", escaped(page.display->title),
+    html += fmt::format("<div><h2>{}</h2>{}</div>", html_escaped(page.display->title),
                         quantities(page.display->rows, "display", false));
   if (!page.left_over.empty()) {
-    html += fmt::format("<div><h2>{}</h2><table id=\"left-over\">", escaped(page.left_over_words));
+    html += fmt::format("<div><h2>{}</h2><table id=\"left-over\">", html_escaped(page.left_over_words));
     for (const ReportPage::LeftOver& left : page.left_over)
       html +=
-          fmt::format("<tr><th>{}</th><td>({}, {}, {}) {}</td><td>length {} {}</td></tr>", escaped(left.at),
+          fmt::format("<tr><th>{}</th><td>({}, {}, {}) {}</td><td>length {} {}</td></tr>", html_escaped(left.at),
                       left.components[0], left.components[1], left.components[2], left.unit, left.length, left.unit);
     html += "</table></div>";
   }
@@ -109,7 +97,7 @@ std::string view_figure(const SetupReport::View& view, std::size_t number) {
                        checked ? " checked" : "", words);
   };
   return fmt::format("<figure id=\"view{}\"><figcaption>{}</figcaption><div class=\"stills\">", number,
-                     escaped(printable(view.label))) +
+                     html_escaped(printable(view.label))) +
          png_image(view.picture.xray, "xray", "X-ray") +
          png_image(view.picture.drr_planned, "planned", "DRR, patient as planned") +
          png_image(view.picture.drr_found, "found", "DRR, patient as found") +
@@ -155,7 +143,7 @@ std::string in_script(const Json& json) {
 std::string details(const SetupReport& report, const ReportPage& page) {
   std::string html;
   for (const ReportPage::Section& section : page.details) {
-    html += fmt::format("<details><summary>{}</summary><table>{}</table>", escaped(section.title), rows(section.rows));
+    html += fmt::format("<details><summary>{}</summary><table>{}</table>", html_escaped(section.title), rows(section.rows));
     if (section.title == "Search")
       html += svg_image(520, 110, "The similarity reached against the evaluations made",
                         [&](Canvas& canvas) { draw_convergence(canvas, 0, 0, 520, 110, report.stages); });
@@ -181,13 +169,13 @@ std::string html_report(const SetupReport& report, const ReportPage& page) {
   }
   if (!page.warnings.empty()) notes += "<h2>Warnings</h2>" + list(page.warnings);
   if (!page.overrides.empty()) notes += "<h2>Overrides: what a person supplied or allowed</h2>" + list(page.overrides);
-  for (const std::string& line : page.conventions) conventions += "<p>" + escaped(line) + "</p>";
+  for (const std::string& line : page.conventions) conventions += "<p>" + html_escaped(line) + "</p>";
 
   // All text is escaped: none of it can look like a placeholder.
   std::string html = kPageHtml;
-  replace(html, "<!--DISCLAIMER-->", escaped(page.disclaimer));
-  replace(html, "<!--TITLE-->", escaped(page.title));
-  replace(html, "<!--PROGRAM-->", escaped(page.program));
+  replace(html, "<!--DISCLAIMER-->", html_escaped(page.disclaimer));
+  replace(html, "<!--TITLE-->", html_escaped(page.title));
+  replace(html, "<!--PROGRAM-->", html_escaped(page.program));
   replace(html, "<!--VERDICT_CLASS-->", std::string(to_string(page.verdict)));
   replace(html, "<!--COUCH_DRAWING-->",
           svg_image(260, 180, "The couch, its axes and the way it has to move",
@@ -196,9 +184,9 @@ std::string html_report(const SetupReport& report, const ReportPage& page) {
   replace(html, "<!--COUCH-->", couch(page));
   replace(html, "<!--NUMBERS-->", numbers(page));
   replace(html, "<!--VIEW_DATA-->", in_script(data));
-  replace(html, "<!--VERDICT-->", escaped(page.verdict_words));
+  replace(html, "<!--VERDICT-->", html_escaped(page.verdict_words));
   replace(html, "<!--REASONS-->", list(page.reasons));
-  replace(html, "<!--ACTION-->", escaped(page.action_words) + list(page.action_reasons));
+  replace(html, "<!--ACTION-->", html_escaped(page.action_words) + list(page.action_reasons));
   replace(html, "<!--DETAILS-->", details(report, page));
   replace(html, "<!--NOTES-->", notes);
   replace(html, "<!--VIEWS-->", views);

@@ -1,0 +1,59 @@
+#include "io/report/results_page.h"
+
+#include <fmt/format.h>
+
+#include "io/report/results.html.h"
+
+namespace isoshift {
+namespace {
+
+std::string cell_html(const ResultsPage::Cell& cell) {
+  const std::string text = html_escaped(cell.text);
+  const std::string sorted_by = cell.number ? fmt::format(" class=\"number\" data-number=\"{}\"", *cell.number) : "";
+  if (cell.link.empty()) return fmt::format("<td{}>{}</td>", sorted_by, text);
+  return fmt::format("<td{}><a href=\"{}\">{}</a></td>", sorted_by, html_escaped(cell.link), text);
+}
+
+std::string replaced(std::string text, std::string_view what, const std::string& with) {
+  return text.replace(text.find(what), what.size(), with);
+}
+
+}  // namespace
+
+std::string html_escaped(std::string_view text) {
+  std::string result;
+  for (const char c : text) switch (c) {
+      case '&': result += "&amp;"; break;
+      case '<': result += "&lt;"; break;
+      case '>': result += "&gt;"; break;
+      case '"': result += "&quot;"; break;
+      case '\'': result += "&#39;"; break;
+      default: result += c;
+    }
+  return result;
+}
+
+std::string results_html(const ResultsPage& page) {
+  std::string summary, charts, columns, rows;
+  for (const std::string& line : page.summary) summary += "<p>" + html_escaped(line) + "</p>\n";
+  for (const std::string& svg : page.charts_svg) charts += "<figure>" + svg + "</figure>\n";
+  for (const std::string& column : page.columns)
+    columns += "<th><button type=\"button\">" + html_escaped(column) + "</button></th>";
+  for (const ResultsPage::Row& row : page.rows) {
+    rows += "<tr class=\"" + html_escaped(row.verdict) + "\">";
+    for (const ResultsPage::Cell& cell : row.cells) rows += cell_html(cell);
+    rows += "</tr>\n";
+  }
+  std::string html = kResultsHtml;
+  html =
+      replaced(std::move(html), "%REFRESH%",
+               page.refresh_s > 0 ? fmt::format("<meta http-equiv=\"refresh\" content=\"{}\">", page.refresh_s) : "");
+  html = replaced(std::move(html), "%TITLE%", html_escaped(page.title));
+  html = replaced(std::move(html), "%HEADING%", html_escaped(page.title));
+  html = replaced(std::move(html), "%COLUMNS%", columns);
+  html = replaced(std::move(html), "%SUMMARY%", summary);
+  html = replaced(std::move(html), "%CHARTS%", charts);
+  return replaced(std::move(html), "%ROWS%", rows);
+}
+
+}  // namespace isoshift
