@@ -17,15 +17,11 @@
 #include <memory>
 #include <utility>
 
+#include "cli/child_process.h"
 #include "geometry/error.h"
 
 namespace isoshift {
 namespace {
-
-std::filesystem::path& worker_program() {
-  static std::filesystem::path program = "/proc/self/exe";
-  return program;
-}
 
 // A child on the other end of a socket that is its standard input and output.
 class Worker {
@@ -44,7 +40,7 @@ class Worker {
     std::vector<char*> argv;
     for (std::string& word : words) argv.push_back(word.data());
     argv.push_back(nullptr);
-    const int failed = ::posix_spawn(&process_, worker_program().c_str(), &actions, nullptr, argv.data(), environ);
+    const int failed = ::posix_spawn(&process_, this_program().c_str(), &actions, nullptr, argv.data(), environ);
     posix_spawn_file_actions_destroy(&actions);
     ::close(ends[1]);
     if (failed != 0) {
@@ -117,8 +113,6 @@ std::list<BatchJob>::iterator next_for(const Worker& worker, std::list<BatchJob>
 }
 
 }  // namespace
-
-void use_worker_program(std::filesystem::path program) { worker_program() = std::move(program); }
 
 void run_in_workers(std::vector<BatchJob> all, int count, const std::vector<std::string>& arguments,
                     const std::function<void(const std::string& name, const std::optional<std::string>& death)>& on_end,

@@ -1,7 +1,6 @@
 #pragma once
 // Processes that register cases side by side. One that dies takes its case with it, and nothing else.
 
-#include <filesystem>
 #include <functional>
 #include <optional>
 #include <string>
@@ -9,15 +8,12 @@
 
 namespace isoshift {
 
-// Which program workers run: this one, or in tests the one that was built.
-void use_worker_program(std::filesystem::path program);
-
 struct BatchJob {
   std::string name;
   std::string ct_key;  // jobs with equal ones go to one worker, one after the other
 };
 
-// Hands the jobs to `workers` processes that run the worker program with `arguments`: a worker reads names of cases
+// Hands the jobs to `workers` processes that run this program with `arguments`: a worker reads names of cases
 // from its standard input, one per line, and writes a line when it is ready, and each name when its case has ended.
 // `on_end` is told every name, and why the worker died where it did. Returns early when `should_stop` says so; what
 // runs then is given up. Throws Error where workers cannot even begin.

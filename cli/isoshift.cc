@@ -45,6 +45,8 @@ int run_isoshift(int argc, const char* const* argv, Console& console) {
   add_evaluate_command(app, console, exit_status);
   add_track_command(app, console, exit_status);
   add_predict_command(app, console, exit_status);
+  add_watch_command(app, console, exit_status);
+  add_release_command(app, console, exit_status);
   add_bench_command(app, console, exit_status);
   try {
     // CLI11 would say only that a command is missing.

@@ -69,6 +69,18 @@ std::optional<SiteFile::Release> release_from(JsonSection section) {
   return release;
 }
 
+SiteFile::Sessions sessions_from(JsonSection section) {
+  constexpr const char* kViews = "1 to 20 X-rays";
+  constexpr double kLongestS = 3600.0;
+  SiteFile::Sessions sessions{.views = section.required<int>("views", kViews)};
+  if (sessions.views < 1 || sessions.views > 20) section.refuse("views", kViews);
+  const auto quiet_s = section.number("quiet_s", 0.0, kLongestS);
+  if (!quiet_s) section.refuse_missing("quiet_s", "seconds");
+  sessions.quiet_s = *quiet_s;
+  section.end();
+  return sessions;
+}
+
 }  // namespace
 
 SiteFile read_site_file(const std::filesystem::path& path) {
@@ -88,6 +100,7 @@ SiteFile read_site_file(const std::filesystem::path& path) {
     if (unit != "mm" && unit != "cm") section.refuse("length_unit", "mm or cm");
     site.length_unit = unit == "mm" ? LengthUnit::kMm : LengthUnit::kCm;
   }
+  if (auto sessions = section.section("sessions")) site.sessions = sessions_from(std::move(*sessions));
   if (auto release = section.section("release")) site.automatic_release = release_from(std::move(*release));
   section.end();
   return site;

@@ -30,6 +30,12 @@ struct SiteFile {
     std::string by, on;
   };
 
+  // When a session of X-rays is complete.
+  struct Sessions {
+    int views = 2;         // so many X-rays are there,
+    double quiet_s = 0.0;  // and nothing of the patient has come for so long
+  };
+
   std::filesystem::path path;
   std::string name;
   std::string sha256;                                             // of the file, hexadecimal
@@ -37,6 +43,7 @@ struct SiteFile {
   CouchDof couch_dof = CouchDof::kSix;
   std::optional<Scale> couch_scale;  // shown beside IEC 61217
   LengthUnit length_unit = LengthUnit::kMm;
+  std::optional<Sessions> sessions;
   std::optional<Release> automatic_release;  // who allowed it, and when; unset: a person releases every result
 };
 

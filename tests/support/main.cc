@@ -2,10 +2,12 @@
 
 #include <gmock/gmock.h>
 
+#include "cli/child_process.h"
 #include "io/decoder_process.h"
 
 int main(int argc, char** argv) {
   testing::InitGoogleMock(&argc, argv);
   isoshift::use_decoder(ISOSHIFT_PROGRAM);
+  isoshift::use_program(ISOSHIFT_PROGRAM);
   return RUN_ALL_TESTS();
 }

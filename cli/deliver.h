@@ -1,0 +1,33 @@
+#pragma once
+// Sends what was released to the peers of a watch file.
+
+#include <chrono>
+#include <map>
+#include <string>
+
+#include "cli/console.h"
+#include "io/results_tree.h"
+#include "io/watch_file.h"
+
+namespace isoshift {
+
+// Peers that are down are tried again, after longer and longer times.
+class Deliverer {
+ public:
+  Deliverer(const ResultsTree& tree, const WatchFile& watch) : tree_(tree), watch_(watch) {}
+
+  // Tries all that is due. True: something was sent. Only for whoever holds the lock of the tree.
+  bool deliver(Console& console);
+
+ private:
+  struct Pause {
+    std::chrono::seconds length{0};
+    std::chrono::steady_clock::time_point until;
+  };
+
+  const ResultsTree& tree_;
+  const WatchFile& watch_;
+  std::map<std::string, Pause> pauses_;  // by peer
+};
+
+}  // namespace isoshift

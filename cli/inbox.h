@@ -1,0 +1,56 @@
+#pragma once
+// The files of many patients as they come, from a folder or an Orthanc server, in any order, some twice, some broken.
+
+#include <chrono>
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <optional>
+#include <set>
+#include <string>
+#include <unordered_set>
+
+#include "io/notes.h"
+#include "io/orthanc.h"
+#include "io/session_files.h"
+#include "io/watch_file.h"
+
+namespace isoshift {
+
+class Inbox {
+ public:
+  using Clock = std::chrono::steady_clock;
+
+  // What comes from a server is kept in `objects`.
+  Inbox(const WatchFile& watch, std::filesystem::path objects);
+
+  // Takes what has come since the last call. A file counts once it has not changed between two calls. Throws Error for
+  // a server that does not answer; the next call goes on.
+  void update(Notes& notes);
+
+  const StudyFiles& files() const { return files_; }
+  // When the last file of a patient came.
+  std::optional<Clock::time_point> last_of(const std::string& patient) const;
+
+ private:
+  struct Version {
+    std::uintmax_t size = 0;
+    std::filesystem::file_time_type written;
+    bool operator==(const Version&) const = default;
+  };
+  void update_folder(Notes& notes);
+  void update_orthanc(Notes& notes);
+  void take(const std::filesystem::path& file, Notes& notes);
+
+  const WatchFile& watch_;
+  std::filesystem::path objects_;
+  std::unique_ptr<Orthanc> orthanc_;
+  StudyFiles files_;
+  std::map<std::string, std::filesystem::path> file_of_uid_;  // by SOPInstanceUID
+  std::unordered_set<std::string> done_files_;
+  std::map<std::filesystem::path, Version> growing_;
+  std::map<std::string, Clock::time_point> last_of_;
+  std::int64_t last_change_ = 0;
+};
+
+}  // namespace isoshift

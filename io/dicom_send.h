@@ -1,0 +1,14 @@
+#pragma once
+// Sends DICOM objects to a peer: C-STORE (PS3.4 Annex B), with TLS as PS3.15 B.9 (BCP 195) has it.
+
+#include <filesystem>
+
+#include "io/watch_file.h"
+
+namespace isoshift {
+
+// Returns when the peer has answered that it stored the object: with success, or with a warning (PS3.7 C.4.2), which is
+// the text; empty otherwise. Throws Error naming the peer and why for anything else.
+std::string send_object(const std::filesystem::path& file, const DicomPeer& peer);
+
+}  // namespace isoshift

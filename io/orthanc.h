@@ -1,0 +1,42 @@
+#pragma once
+// An Orthanc server, by its REST interface: which instances have come, and their files.
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "io/watch_file.h"
+
+namespace isoshift {
+
+class Orthanc {
+ public:
+  explicit Orthanc(OrthancServer server);
+  ~Orthanc();
+  Orthanc(const Orthanc&) = delete;
+  Orthanc& operator=(const Orthanc&) = delete;
+
+  struct Changes {
+    std::vector<std::string> instances;  // Orthanc's identifiers of those that are new
+    std::int64_t last = 0;               // to ask from next time
+    bool done = true;                    // no more for now
+  };
+  // Throws Error naming the server for one that does not answer, refuses, or answers something else.
+  Changes changes_since(std::int64_t last) const;
+
+  // The file as it was received; empty for one that has been deleted since.
+  std::string file_of(const std::string& instance) const;
+
+ private:
+  struct Answer {
+    long status = 0;
+    std::string body;
+  };
+  Answer get(const std::string& path) const;
+
+  OrthancServer server_;
+  void* curl_;
+};
+
+}  // namespace isoshift

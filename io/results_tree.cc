@@ -1,0 +1,155 @@
+#include "io/results_tree.h"
+
+#include <fcntl.h>
+#include <fmt/chrono.h>
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <chrono>
+#include <cstring>
+
+#include "geometry/error.h"
+#include "io/json_file.h"
+#include "io/output_folder.h"
+#include "io/report/result_folder.h"
+#include "io/sha256.h"
+
+namespace isoshift {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+
+std::string now() {
+  return fmt::format("{:%Y-%m-%dT%H:%M:%S%z}",
+                     fmt::localtime(std::chrono::system_clock::to_time_t(std::chrono::system_clock::now())));
+}
+
+fs::path release_file(const fs::path& tree, const std::string& session) {
+  return tree / "released" / (session + ".json");
+}
+
+}  // namespace
+
+ResultsTree::ResultsTree(fs::path path) : path_(std::move(path)) {
+  for (const char* folder : {"sessions", "released", "sent"}) {
+    std::error_code error;
+    fs::create_directories(path_ / folder, error);
+    if (error) throw Error(fmt::format("{}: cannot be made: {}", (path_ / folder).string(), error.message()));
+  }
+}
+
+std::vector<std::string> ResultsTree::sessions() const {
+  std::vector<std::string> names;
+  for (const auto& entry : fs::directory_iterator(path_ / "sessions"))
+    if (fs::exists(entry.path() / kResultFile) && entry.path().extension().empty())
+      names.push_back(entry.path().filename().string());
+  std::ranges::sort(names);
+  return names;
+}
+
+void ResultsTree::clean() const {
+  for (const auto& entry : fs::directory_iterator(path_ / "sessions"))
+    if (entry.path().filename().string().find(".partial-") != std::string::npos) fs::remove_all(entry.path());
+}
+
+std::optional<Release> ResultsTree::release_of(const std::string& session) const {
+  const fs::path file = release_file(path_, session);
+  if (!fs::exists(file)) return std::nullopt;
+  const nlohmann::json json = read_json_file(file).json;
+  Release release{
+      .session = session, .by = json.at("by"), .on = json.at("on"), .objects = {}, .peers = json.at("peers")};
+  for (const auto& object : json.at("objects")) release.objects.push_back({object.at("file"), object.at("sha256")});
+  return release;
+}
+
+Release ResultsTree::release(const std::string& session, const std::string& by,
+                             const std::vector<std::string>& peers) const {
+  const fs::path folder = this->session(session);
+  if (session.find('/') != std::string::npos || !fs::exists(folder / kResultFile))
+    throw Error(fmt::format("{}: holds no session {}", path_.string(), session));
+  const std::string verdict = read_json_file(folder / kResultFile).json.at("verdict");
+  if (verdict == "rejected") throw Error(fmt::format("session {}: was rejected: there is nothing to release", session));
+  Release release{.session = session, .by = by, .on = now(), .objects = {}, .peers = peers};
+  Json objects = Json::array();
+  for (const char* file : {kRegistrationFile, "report.dcm"}) {
+    if (!fs::exists(folder / file)) continue;
+    release.objects.push_back({file, sha256_of_file(folder / file)});
+    objects.push_back({{"file", file}, {"sha256", release.objects.back().sha256}});
+  }
+  // Of two who release at the same time one is told that the other has: a hard link does not replace.
+  const fs::path file = release_file(path_, session),
+                 aside = path_ / "released" / fmt::format(".{}.{}", session, ::getpid());
+  replace_text(aside, Json{{"schema", 1},
+                           {"session", session},
+                           {"by", by},
+                           {"on", release.on},
+                           {"verdict", verdict},
+                           {"objects", objects},
+                           {"peers", peers}}
+                              .dump(2) +
+                          "\n");
+  const int failed = ::link(aside.c_str(), file.c_str());
+  const int reason = errno;
+  std::error_code ignored;
+  fs::remove(aside, ignored);
+  if (failed != 0 && reason == EEXIST) {
+    const Release before = release_of(session).value();
+    throw Error(fmt::format("session {}: has been released by {} on {}", session, before.by, before.on));
+  }
+  if (failed != 0) throw Error(fmt::format("{}: cannot be written: {}", file.string(), std::strerror(reason)));
+  audit("released", {{"session", session}, {"by", by}, {"verdict", verdict}, {"objects", objects}, {"peers", peers}});
+  return release;
+}
+
+fs::path ResultsTree::sent_file(const Delivery& delivery) const {
+  return path_ / "sent" / fmt::format("{}.{}.{}", delivery.session, delivery.peer, delivery.object.file);
+}
+
+std::vector<Delivery> ResultsTree::pending() const {
+  std::vector<Delivery> pending;
+  for (const auto& entry : fs::directory_iterator(path_ / "released")) {
+    if (entry.path().extension() != ".json" || entry.path().filename().string().starts_with('.')) continue;
+    const Release release = release_of(entry.path().stem().string()).value();
+    for (const std::string& peer : release.peers)
+      for (const Release::Object& object : release.objects) {
+        const Delivery delivery{.session = release.session, .peer = peer, .object = object};
+        if (!fs::exists(sent_file(delivery))) pending.push_back(delivery);
+      }
+  }
+  std::ranges::sort(pending, {}, [](const Delivery& one) { return std::pair(one.session, one.peer); });
+  return pending;
+}
+
+fs::path ResultsTree::checked_file(const Delivery& delivery) const {
+  const fs::path file = session(delivery.session) / delivery.object.file;
+  if (sha256_of_file(file) != delivery.object.sha256)
+    throw Error(fmt::format("{}: is not what was released: its SHA-256 differs", file.string()));
+  return file;
+}
+
+void ResultsTree::mark_sent(const Delivery& delivery, const std::string& answer) const {
+  replace_text(sent_file(delivery), Json{{"on", now()}, {"answer", answer.empty() ? "success" : answer}}.dump() + "\n");
+  audit("sent", {{"session", delivery.session},
+                 {"peer", delivery.peer},
+                 {"object", delivery.object.sha256},
+                 {"answer", answer.empty() ? "success" : answer}});
+}
+
+void ResultsTree::audit(const std::string& event, Json details) const {
+  Json line = {{"on", now()}, {"event", event}};
+  line.update(details);
+  const std::string text = line.dump() + "\n";
+  const fs::path file = path_ / "audit.jsonl";
+  const int descriptor = ::open(file.c_str(), O_WRONLY | O_APPEND | O_CREAT | O_CLOEXEC, 0640);
+  const bool written = descriptor >= 0 &&
+                       ::write(descriptor, text.data(), text.size()) == static_cast<ssize_t>(text.size()) &&
+                       ::fsync(descriptor) == 0;
+  const int reason = errno;
+  if (descriptor >= 0) ::close(descriptor);
+  if (!written) throw Error(fmt::format("{}: cannot be written: {}", file.string(), std::strerror(reason)));
+}
+
+}  // namespace isoshift
