@@ -4,6 +4,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <cmath>
 #include <fstream>
 #include <iterator>
 #include <map>
@@ -74,7 +75,8 @@ std::string summary_csv(const BatchSummary& summary) {
 
 ResultsPage::Cell number_cell(const std::optional<double>& value, int decimals) {
   if (!value) return {.text = ""};
-  return {.text = fmt::format("{:.{}f}", *value, decimals), .number = *value};
+  const double unit = std::pow(10.0, decimals), rounded = std::round(*value * unit) / unit;
+  return {.text = fmt::format("{:.{}f}", rounded == 0.0 ? 0.0 : rounded, decimals), .number = *value};
 }
 
 std::vector<std::string> component_titles() {
@@ -111,11 +113,12 @@ std::string index_html(const BatchSummary& summary) {
   for (const CaseEnd& end : summary.cases) {
     ResultsPage::Row row{
         .verdict = status_of(end),
-        .cells = {{.text = end.name, .link = end.report ? "cases/" + end.name + "/report.html" : ""},
-                  {.text = end.report ? end.report->identity.patient_id : "", .link = ""},
-                  {.text = acquired(end)},
-                  {.text = status_of(end)},
-                  {.text = end.report ? std::string(to_string(shown_shift(*end.report).action)) : ""}}};
+        .cells = {
+            {.text = end.name, .link = end.report ? "cases/" + end.name + "/report.html" : ""},
+            {.text = end.report ? end.report->identity.patient_id : "", .link = end.report ? "patients.html" : ""},
+            {.text = acquired(end)},
+            {.text = status_of(end)},
+            {.text = end.report ? std::string(to_string(shown_shift(*end.report).action)) : ""}}};
     const Components components = end.report ? shown_components(*end.report) : Components();
     for (std::size_t n = 0; n < components.size(); ++n) row.cells.push_back(number_cell(components[n], n < 3 ? 1 : 2));
     row.cells.push_back({.text = reason_of(end)});
@@ -125,7 +128,7 @@ std::string index_html(const BatchSummary& summary) {
 }
 
 std::string chart_of(const PatientErrors& patient) {
-  LineChart chart{.title = patient.patient, .x_label = "fraction", .y_label = "mm", .curves = {}, .from_zero = false};
+  LineChart chart{.title = patient.patient, .x_label = "accepted fraction", .y_label = "mm", .curves = {}, .from_zero = false};
   for (std::size_t axis = 0; axis < 3; ++axis) {
     LineChart::Curve curve{.name = std::string(1, "xyz"[axis]), .points = {}};
     for (std::size_t n = 0; n < patient.fractions.size(); ++n)

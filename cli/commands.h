@@ -2,6 +2,7 @@
 // One function per command: it adds flags to the command line and, when the command is chosen, runs it.
 
 #include <CLI/CLI.hpp>
+#include <filesystem>
 
 #include "cli/console.h"
 
@@ -20,6 +21,9 @@ void add_watch_command(CLI::App& app, Console& console, int& exit_status);
 void add_release_command(CLI::App& app, Console& console, int& exit_status);
 void add_evaluate_command(CLI::App& app, Console& console, int& exit_status);
 void add_bench_command(CLI::App& app, Console& console, int& exit_status);
+
+// Manual pages of all commands, into a folder.
+void write_manual(const std::filesystem::path& folder);
 
 // The whole program: parses, runs, and turns every exception into a message and an exit status.
 int run_isoshift(int argc, const char* const* argv, Console& console);

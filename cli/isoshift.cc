@@ -3,8 +3,10 @@
 
 #include <algorithm>
 #include <exception>
+#include <sstream>
 
 #include "cli/commands.h"
+#include "cli/man_pages.h"
 #include "geometry/error.h"
 #include "io/version.h"
 
@@ -28,9 +30,9 @@ int say(Console& console, const std::exception& error, int status) {
 
 }  // namespace
 
-int run_isoshift(int argc, const char* const* argv, Console& console) {
-  int exit_status = kExitAccepted;
-  CLI::App app(kDescription, "isoshift");
+namespace {
+
+void add_commands(CLI::App& app, Console& console, int& exit_status) {
   app.footer(kFooter);
   app.require_subcommand(1);
   app.set_version_flag("--version", fmt::format("isoshift {} ({})", kVersion, kCommit));
@@ -48,6 +50,23 @@ int run_isoshift(int argc, const char* const* argv, Console& console) {
   add_watch_command(app, console, exit_status);
   add_release_command(app, console, exit_status);
   add_bench_command(app, console, exit_status);
+}
+
+}  // namespace
+
+void write_manual(const std::filesystem::path& folder) {
+  std::ostringstream nobody;
+  Console console{.out = nobody, .err = nobody};
+  int exit_status = 0;
+  CLI::App app(kDescription, "isoshift");
+  add_commands(app, console, exit_status);
+  write_man_pages(app, folder);
+}
+
+int run_isoshift(int argc, const char* const* argv, Console& console) {
+  int exit_status = kExitAccepted;
+  CLI::App app(kDescription, "isoshift");
+  add_commands(app, console, exit_status);
   try {
     // CLI11 would say only that a command is missing.
     const auto commands = app.get_subcommands({});

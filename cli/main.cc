@@ -33,8 +33,9 @@ void end_cleanly_on_signals() {
 }  // namespace
 
 int main(int argc, char** argv) {
-  // Not a command for people: the child that decodes compressed pixels.
+  // Not commands for people: the child that decodes compressed pixels, and the manual that the build makes.
   if (argc == 2 && std::string_view(argv[1]) == "__decode") return isoshift::run_decoder();
+  if (argc == 3 && std::string_view(argv[1]) == "__manual") return isoshift::write_manual(argv[2]), 0;
   isoshift::use_decoder("/proc/self/exe");
   end_cleanly_on_signals();
   isoshift::Console console{.out = std::cout, .err = std::cerr, .err_is_terminal = ::isatty(STDERR_FILENO) == 1};

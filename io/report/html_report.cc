@@ -1,5 +1,4 @@
 #include <fmt/format.h>
-#include <openssl/evp.h>
 
 #include <cmath>
 #include <functional>
@@ -7,21 +6,12 @@
 
 #include "io/report/drawings.h"
 #include "io/report/formats.h"
+#include "io/report/html.h"
 #include "io/report/page.html.h"
 #include "io/report/polygons_json.h"
-#include "io/report/results_page.h"
 
 namespace isoshift {
 namespace {
-
-std::string data_uri(std::string_view type, const std::string& bytes) {
-  std::string base64(4 * ((bytes.size() + 2) / 3) + 1, '\0');
-  const int size =
-      EVP_EncodeBlock(reinterpret_cast<unsigned char*>(base64.data()),
-                      reinterpret_cast<const unsigned char*>(bytes.data()), static_cast<int>(bytes.size()));
-  base64.resize(static_cast<std::size_t>(size));
-  return fmt::format("data:{};base64,{}", type, base64);
-}
 
 std::string list(const std::vector<std::string>& lines) {
   if (lines.empty()) return "";
@@ -143,7 +133,8 @@ std::string in_script(const Json& json) {
 std::string details(const SetupReport& report, const ReportPage& page) {
   std::string html;
   for (const ReportPage::Section& section : page.details) {
-    html += fmt::format("<details><summary>{}</summary><table>{}</table>", html_escaped(section.title), rows(section.rows));
+    html +=
+        fmt::format("<details><summary>{}</summary><table>{}</table>", html_escaped(section.title), rows(section.rows));
     if (section.title == "Search")
       html += svg_image(520, 110, "The similarity reached against the evaluations made",
                         [&](Canvas& canvas) { draw_convergence(canvas, 0, 0, 520, 110, report.stages); });

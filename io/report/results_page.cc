@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include "io/report/html.h"
 #include "io/report/results.html.h"
 
 namespace isoshift {
@@ -20,23 +21,11 @@ std::string replaced(std::string text, std::string_view what, const std::string&
 
 }  // namespace
 
-std::string html_escaped(std::string_view text) {
-  std::string result;
-  for (const char c : text) switch (c) {
-      case '&': result += "&amp;"; break;
-      case '<': result += "&lt;"; break;
-      case '>': result += "&gt;"; break;
-      case '"': result += "&quot;"; break;
-      case '\'': result += "&#39;"; break;
-      default: result += c;
-    }
-  return result;
-}
-
 std::string results_html(const ResultsPage& page) {
   std::string summary, charts, columns, rows;
   for (const std::string& line : page.summary) summary += "<p>" + html_escaped(line) + "</p>\n";
-  for (const std::string& svg : page.charts_svg) charts += "<figure>" + svg + "</figure>\n";
+  for (const std::string& svg : page.charts_svg)
+    charts += fmt::format("<figure><img alt=\"\" src=\"{}\"></figure>\n", data_uri("image/svg+xml", svg));
   for (const std::string& column : page.columns)
     columns += "<th><button type=\"button\">" + html_escaped(column) + "</button></th>";
   for (const ResultsPage::Row& row : page.rows) {

@@ -29,7 +29,4 @@ struct ResultsPage {
 
 std::string results_html(const ResultsPage& page);
 
-// Text as it may stand in HTML.
-std::string html_escaped(std::string_view text);
-
 }  // namespace isoshift

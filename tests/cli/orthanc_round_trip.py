@@ -8,54 +8,19 @@ the loopback device. Prints what went wrong and exits with 1, or nothing and 0.
 
 import json
 import pathlib
-import socket
 import subprocess
 import sys
-import time
-import urllib.error
-import urllib.request
 
-
-def free_port():
-    with socket.socket() as listener:
-        listener.bind(("127.0.0.1", 0))
-        return listener.getsockname()[1]
-
-
-def fetch(url):
-    with urllib.request.urlopen(url, timeout=60) as answer:
-        return answer.read()
-
-
-def wait_until_up(url, server):
-    for _ in range(300):
-        if server.poll() is not None:
-            sys.exit(f"Orthanc ended with {server.returncode}: {server.stdout.read()}")
-        try:
-            return fetch(url)
-        except urllib.error.URLError:
-            time.sleep(0.1)
-    sys.exit("Orthanc did not answer within 30 s")
-
-
-def send(files, port):
-    sent = subprocess.run(["storescu", "-aec", "ORTHANC", "127.0.0.1", str(port), *map(str, files)], capture_output=True, text=True)
-    if sent.returncode != 0:
-        sys.exit(f"storescu: {sent.stdout}{sent.stderr}")
+from orthanc_server import Orthanc, fetch
 
 
 def main(program, study, result, work):
-    http, dicom = free_port(), free_port()
-    configuration = {"HttpPort": http, "DicomPort": dicom, "RemoteAccessAllowed": False, "DicomAlwaysAllowStore": True,
-                     "DicomCheckCalledAet": True, "StorageDirectory": str(work / "storage"), "IndexDirectory": str(work / "storage")}
-    (work / "orthanc.json").write_text(json.dumps(configuration))
-    server = subprocess.Popen(["/usr/sbin/Orthanc", str(work / "orthanc.json")], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+    server = Orthanc(work / "orthanc")
     try:
-        url = f"http://127.0.0.1:{http}"
-        wait_until_up(url + "/system", server)
+        server.start()
         files = sorted(study.rglob("*.dcm")) + sorted(result.rglob("*.dcm"))
-        send(files, dicom)
-        instances = json.loads(fetch(url + "/instances"))
+        server.send(files)
+        instances = server.get("/instances")
         if len(instances) != len(files):
             sys.exit(f"{len(files)} objects were sent, Orthanc holds {len(instances)}")
         back = work / "back"
@@ -63,12 +28,11 @@ def main(program, study, result, work):
         registration = None
         for instance in instances:
             path = back / f"{instance}.dcm"
-            path.write_bytes(fetch(f"{url}/instances/{instance}/file"))
-            if json.loads(fetch(f"{url}/instances/{instance}/simplified-tags"))["Modality"] == "REG":
+            path.write_bytes(fetch(f"{server.url}/instances/{instance}/file"))
+            if server.get(f"/instances/{instance}/simplified-tags")["Modality"] == "REG":
                 registration = path
     finally:
-        server.terminate()
-        server.wait()
+        server.stop()
 
     again = subprocess.run([program, "register", str(back), "-o", str(work / "again"), "--write-reg-for-review"], capture_output=True, text=True)
     if again.returncode not in (0, 3):

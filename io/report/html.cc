@@ -1,0 +1,30 @@
+#include "io/report/html.h"
+
+#include <fmt/format.h>
+#include <openssl/evp.h>
+
+namespace isoshift {
+
+std::string html_escaped(std::string_view text) {
+  std::string result;
+  for (const char c : text) switch (c) {
+      case '&': result += "&amp;"; break;
+      case '<': result += "&lt;"; break;
+      case '>': result += "&gt;"; break;
+      case '"': result += "&quot;"; break;
+      case '\'': result += "&#39;"; break;
+      default: result += c;
+    }
+  return result;
+}
+
+std::string data_uri(std::string_view type, std::string_view bytes) {
+  std::string base64(4 * ((bytes.size() + 2) / 3) + 1, '\0');
+  const int size =
+      EVP_EncodeBlock(reinterpret_cast<unsigned char*>(base64.data()),
+                      reinterpret_cast<const unsigned char*>(bytes.data()), static_cast<int>(bytes.size()));
+  base64.resize(static_cast<std::size_t>(size));
+  return fmt::format("data:{};base64,{}", type, base64);
+}
+
+}  // namespace isoshift

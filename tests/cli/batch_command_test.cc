@@ -1,0 +1,168 @@
+// Many studies: registered once each, whatever happens in between.
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <iterator>
+#include <nlohmann/json.hpp>
+
+#include "cli/batch_manifest.h"
+#include "cli/child_process.h"
+#include "tests/support/small_study.h"
+
+namespace isoshift {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::HasSubstr;
+
+class BatchCommandTest : public testing::Test {
+ protected:
+  BatchCommandTest() {
+    for (const int seed : {1, 2}) {
+      PhantomOptions options = small_phantom();
+      options.seed = static_cast<std::uint64_t>(seed);
+      options.fractions = 2;
+      fs::create_directories(exported() / fmt::format("{}", seed));
+      write_phantom_study(options, exported() / fmt::format("{}", seed), {});
+    }
+  }
+  ~BatchCommandTest() override { use_program(ISOSHIFT_PROGRAM); }
+
+  fs::path exported() const { return folder_ / "exported"; }
+  fs::path results() const { return folder_ / "results"; }
+  CommandOutcome batch(const std::vector<std::string>& more = {}) const {
+    std::vector<std::string> arguments = {"batch", exported().string(), "-o", results().string(), "--preset", "fast"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return run_command(arguments);
+  }
+  nlohmann::json summary() const { return nlohmann::json::parse(std::ifstream(results() / "summary.json")); }
+  // Results by case, without what differs from run to run.
+  std::map<std::string, nlohmann::json> cases() const {
+    std::map<std::string, nlohmann::json> all;
+    for (const auto& entry : fs::directory_iterator(results() / "cases")) {
+      nlohmann::json json = nlohmann::json::parse(std::ifstream(entry.path() / "result.json"));
+      json.erase("seconds");
+      json.erase("made_on");
+      json["references"].erase("spatial_registration");
+      for (auto& stage : json["stages"]) stage.erase("seconds");
+      all[entry.path().filename()] = json;
+    }
+    return all;
+  }
+
+  TemporaryFolder folder_;
+};
+
+TEST_F(BatchCommandTest, RegistersEverySessionOnceAndGoesOn) {
+  const CommandOutcome outcome = batch({"--jobs", "2"});
+  EXPECT_NE(outcome.exit_status, 1) << outcome.err;
+  EXPECT_EQ(summary()["cases"].size(), 4U);
+  for (const char* file : {"index.html", "patients.html", "summary.csv", "manifest.csv", "batch.json"})
+    EXPECT_TRUE(fs::exists(results() / file)) << file;
+  const auto before = cases();
+  ASSERT_EQ(before.size(), 4U);
+
+  // What is there is not made again; what is not, is, and is the same.
+  const auto kept = fs::last_write_time(results() / "cases" / before.begin()->first / "result.json");
+  const std::string lost = before.rbegin()->first;
+  fs::remove_all(results() / "cases" / lost);
+  fs::create_directories(results() / "cases" / (lost + ".partial-abcdef"));  // of a run that was killed
+  const CommandOutcome again = batch();
+  EXPECT_THAT(again.err, HasSubstr("3 of 4 cases have been registered before"));
+  EXPECT_EQ(cases(), before);
+  EXPECT_EQ(fs::last_write_time(results() / "cases" / before.begin()->first / "result.json"), kept);
+
+  const CommandOutcome other = batch({"--dof", "translation"});
+  EXPECT_EQ(other.exit_status, 1);
+  EXPECT_THAT(other.err, HasSubstr("holds a batch with other options: --preset=fast"));
+}
+
+TEST_F(BatchCommandTest, ShardsAndMergeGiveTheSame) {
+  for (const char* shard : {"1/3", "2/3", "3/3"}) EXPECT_NE(batch({"--shard", shard}).exit_status, 1);
+  EXPECT_FALSE(fs::exists(results() / "summary.json"));
+  EXPECT_NE(batch({"--merge"}).exit_status, 1);
+  EXPECT_EQ(summary()["cases"].size(), 4U);
+  EXPECT_EQ(batch({"--shard", "4/3"}).exit_status, 2);
+}
+
+TEST_F(BatchCommandTest, OneBadCaseStopsNoOther) {
+  edit(exported() / "1" / "RTIMAGE" / "F02" / "KV_G000.dcm", [](DicomItem d) { d.erase(DCM_GantryAngle); });
+  const CommandOutcome outcome = batch();
+  const nlohmann::json all = summary()["cases"];
+  EXPECT_EQ(std::ranges::count_if(all, [](const auto& one) { return one["status"] == "failed"; }), 1);
+  for (const auto& one : all)
+    if (one["status"] == "failed") EXPECT_THAT(one["error"].get<std::string>(), HasSubstr("GantryAngle"));
+  EXPECT_THAT(outcome.out, HasSubstr("1 failed"));
+}
+
+// A program that dies over its first case is started anew for the next.
+TEST_F(BatchCommandTest, AWorkerThatDiesTakesItsCaseWithIt) {
+  const fs::path program = folder_ / "dies";
+  std::ofstream(program) << "#!/bin/sh\necho ready\nread name\nkill -9 $$\n";
+  fs::permissions(program, fs::perms::owner_all);
+  use_program(program);
+  const CommandOutcome outcome = batch();
+  EXPECT_EQ(outcome.exit_status, 4);
+  for (const auto& one : summary()["cases"])
+    EXPECT_THAT(one["error"].get<std::string>(), HasSubstr("ended by signal 9"));
+
+  std::ofstream(program) << "#!/bin/sh\nexit 3\n";
+  fs::remove_all(results());
+  EXPECT_THAT(batch().err, HasSubstr("a worker could not begin: the program ended with status 3"));
+}
+
+TEST_F(BatchCommandTest, ScanWritesTheManifestThatBatchReads) {
+  const fs::path manifest = folder_ / "cases.csv";
+  EXPECT_EQ(run_command({"batch", "--scan", exported().string(), "-o", manifest.string()}).exit_status, 0);
+  const std::vector<BatchCase> found = read_manifest(manifest);
+  ASSERT_EQ(found.size(), 4U);
+  EXPECT_EQ(found[0].ct, std::vector{exported() / "1" / "CT"});
+  EXPECT_EQ(found[0].images.size(), 2U);
+  EXPECT_EQ(found[1].images[0], exported() / "1" / "RTIMAGE" / "F02" / "KV_G000.dcm");
+  EXPECT_EQ(found[2].plan, exported() / "2" / "RTPLAN.dcm");
+}
+
+class ManifestTest : public testing::Test {
+ protected:
+  std::string error_of(const std::string& text) const {
+    std::ofstream(folder_ / "m.csv") << text;
+    try {
+      read_manifest(folder_ / "m.csv");
+    } catch (const std::exception& error) {
+      return error.what();
+    }
+    return "";
+  }
+  TemporaryFolder folder_;
+};
+
+TEST_F(ManifestTest, TablesAndJsonLinesSayTheSame) {
+  std::ofstream(folder_ / "m.csv") << "case,ct,images,anatomy\n\"a\",\"CT, planning\",a.dcm;b.dcm,head\n";
+  std::ofstream(folder_ / "m.jsonl")
+      << R"({"case": "a", "ct": "CT, planning", "images": ["a.dcm", "b.dcm"], "anatomy": "head"})"
+      << "\n";
+  for (const char* name : {"m.csv", "m.jsonl"}) {
+    const auto cases = read_manifest(folder_ / name);
+    ASSERT_EQ(cases.size(), 1U);
+    EXPECT_EQ(cases[0].ct, std::vector{folder_ / "CT, planning"});
+    EXPECT_EQ(cases[0].images, (std::vector{folder_ / "a.dcm", folder_ / "b.dcm"}));
+    EXPECT_EQ(cases[0].anatomy, "head");
+  }
+}
+
+TEST_F(ManifestTest, MistakesAreNamed) {
+  EXPECT_THAT(error_of("case,foo\n"), HasSubstr("\"foo\" is no column"));
+  EXPECT_THAT(error_of("case,study\na,s\na,t\n"), HasSubstr("line 3: case a is there twice"));
+  EXPECT_THAT(error_of("case,study\n../a,s\n"), HasSubstr("line 2: case \"../a\""));
+  EXPECT_THAT(error_of("case,study\na\n"), HasSubstr("line 2: 1 cells, expected 2"));
+  EXPECT_THAT(error_of("case,ct\na,CT\n"), HasSubstr("expected a study, or ct and images"));
+  EXPECT_THAT(error_of("case,study\n"), HasSubstr("holds no case"));
+  EXPECT_THAT(error_of("case,study\n\"a,s\n"), HasSubstr("line"));
+  EXPECT_THAT(error_of("{\"case\": 3}\n"), HasSubstr("line 1: expected a JSON object"));
+}
+
+}  // namespace
+}  // namespace isoshift

@@ -1,0 +1,93 @@
+// Batches on a cluster, and a treatment room: with a Slurm and with Orthanc servers of the test's own.
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <iterator>
+
+#include "tests/support/small_study.h"
+
+namespace isoshift {
+namespace {
+
+namespace fs = std::filesystem;
+
+TEST(Watch, RegistersWhatComesAndSendsWhatIsReleasedOnce) {
+  if (!fs::exists("/usr/sbin/Orthanc")) GTEST_SKIP() << "Orthanc is not installed";
+  const TemporaryFolder work;
+  const CommandOutcome checked = run_shell(fmt::format("/usr/bin/python3 {}/tests/cli/watch_with_orthanc.py {} {}",
+                                                       ISOSHIFT_SOURCE_DIR, ISOSHIFT_PROGRAM, (work / "").string()));
+  std::ifstream log(work / "watch.log");
+  EXPECT_EQ(checked.exit_status, 0) << checked.out << std::string(std::istreambuf_iterator<char>(log), {});
+}
+
+TEST(Watch, FollowsAFolder) {
+  const TemporaryFolder work;
+  const SmallStudy study;
+  fs::create_directories(work / "in");
+  std::ofstream(work / "site.json") << R"({"site_file": 1, "name": "S", "sessions": {"views": 2, "quiet_s": 1},)"
+                                    << R"( "release": {"rule": "automatic", "by": "J. Doe", "on": "2026-03-01"}})";
+  std::ofstream(work / "watch.json") << R"({"watch_file": 1, "folder": "in", "results": "out", "site": "site.json",)"
+                                     << R"( "register": ["--preset=fast"]})";
+  // Copies of a file count once, one that is no DICOM not at all; the watch ends when it is asked to.
+  const CommandOutcome outcome = run_shell(fmt::format(
+      "cd {0} && ({1} watch watch.json & watch=$!; cp -r {2} in/study; cp in/study/RTPLAN.dcm in/again.dcm; echo x > "
+      "in/x; "
+      "for n in $(seq 120); do ls out/sessions/*/result.json >/dev/null 2>&1 && break; sleep 0.5; done; sleep 3; "
+      "kill $watch; wait $watch)",
+      (work / "").string(), ISOSHIFT_PROGRAM, study.path().string()));
+  EXPECT_EQ(outcome.exit_status, 0) << outcome.out;
+  EXPECT_EQ(std::distance(fs::directory_iterator(work / "out" / "sessions"), {}), 1);
+  std::ifstream index(work / "out" / "index.html");
+  const std::string page{std::istreambuf_iterator<char>(index), {}};
+  EXPECT_THAT(page, testing::HasSubstr("sessions/"));
+  const auto session = fs::directory_iterator(work / "out" / "sessions")->path();
+  const bool is_accepted = fs::exists(session / "spatial_registration.dcm");
+  EXPECT_EQ(fs::is_empty(work / "out" / "released"), !is_accepted);  // automatically: accepted ones only
+}
+
+TEST(Watch, FlagsOfTheFileAreCheckedAtStart) {
+  const TemporaryFolder work;
+  fs::create_directories(work / "in");
+  std::ofstream(work / "site.json") << R"({"site_file": 1, "name": "S", "sessions": {"views": 2, "quiet_s": 1}})";
+  std::ofstream(work / "watch.json") << R"({"watch_file": 1, "folder": "in", "results": "out", "site": "site.json",)"
+                                     << R"( "register": ["--preste=fast"]})";
+  const CommandOutcome outcome = run_command({"watch", (work / "watch.json").string()});
+  EXPECT_EQ(outcome.exit_status, 1);
+  EXPECT_THAT(outcome.err, testing::HasSubstr("watch.json: register: "));
+  EXPECT_THAT(outcome.err, testing::HasSubstr("--preste=fast"));
+}
+
+TEST(Slurm, RunsABatchAsAJobArray) {
+  const TemporaryFolder work;
+  PhantomOptions options = small_phantom();
+  options.fractions = 3;
+  fs::create_directories(work / "exported");
+  write_phantom_study(options, work / "exported", {});
+  const CommandOutcome outcome = run_shell(fmt::format(
+      "{0}/tests/cli/slurm.sh {1} batch {2}/exported -o {2}/results --preset fast --slurm 2", ISOSHIFT_SOURCE_DIR,
+      ISOSHIFT_PROGRAM, fs::path(work / ".").lexically_normal().parent_path().string()));
+  constexpr int kNoSlurm = 77;
+  if (outcome.exit_status == kNoSlurm) GTEST_SKIP() << "Slurm cannot be started here: " << outcome.out;
+  EXPECT_EQ(outcome.exit_status, 0) << outcome.out;
+  EXPECT_EQ(std::distance(fs::directory_iterator(work / "results" / "cases"), {}), 3);
+  EXPECT_TRUE(fs::exists(work / "results" / "summary.json"));
+
+  // As an undisturbed run.
+  const CommandOutcome again =
+      run_command({"batch", (work / "exported").string(), "-o", (work / "again").string(), "--preset", "fast"});
+  EXPECT_NE(again.exit_status, 1) << again.err;
+  const auto table = [&](const char* folder) {
+    std::ifstream file(work / folder / "summary.csv");
+    std::string text;
+    for (std::string line; std::getline(file, line);)
+      text += line.substr(0, line.rfind(',', line.rfind(',') - 1)) + "\n";
+    return text;  // without times and names of reports
+  };
+  EXPECT_EQ(table("results"), table("again"));
+}
+
+}  // namespace
+}  // namespace isoshift
