@@ -80,6 +80,14 @@ TEST_F(BatchCommandTest, RegistersEverySessionOnceAndGoesOn) {
   EXPECT_THAT(other.err, HasSubstr("holds a batch with other options: --preset=fast"));
 }
 
+TEST_F(BatchCommandTest, ItsPageSortsFiltersAndLinks) {
+  if (!fs::exists("/usr/bin/chromedriver")) GTEST_SKIP() << "Chromium is not installed";
+  ASSERT_NE(batch().exit_status, 1);
+  const CommandOutcome seen = run_shell(fmt::format("/usr/bin/python3 {}/tests/io/results_page_in_browser.py {}",
+                                                    ISOSHIFT_SOURCE_DIR, (results() / "index.html").string()));
+  EXPECT_EQ(seen.exit_status, 0) << seen.out;
+}
+
 TEST_F(BatchCommandTest, ShardsAndMergeGiveTheSame) {
   for (const char* shard : {"1/3", "2/3", "3/3"}) EXPECT_NE(batch({"--shard", shard}).exit_status, 1);
   EXPECT_FALSE(fs::exists(results() / "summary.json"));

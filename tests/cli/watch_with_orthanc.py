@@ -16,6 +16,8 @@ import threading
 import time
 import urllib.error
 
+import pydicom
+
 from orthanc_server import Orthanc, fetch
 
 VIEWS, QUIET_S = 2, 2
@@ -133,9 +135,10 @@ def main(program, work, patients):
         # Every patient's own, once.
         found = {room.result(session)["patient"]["id"]: session for session in room.sessions()}
         expect(sorted(found) == sorted(made), f"sessions of {sorted(found)}")
+        owner = {str(pydicom.dcmread(file, stop_before_pixels=True).SOPInstanceUID): patient for patient, files in made.items() for file in files}
         for patient, session in found.items():
             views = {view["sop_instance_uid"] for view in room.result(session)["views"]}
-            expect(len(views) == VIEWS, f"{patient}: {len(views)} views")
+            expect(len(views) == VIEWS and {owner[uid] for uid in views} == {patient}, f"{patient}: views of {[owner[uid] for uid in views]}")
             expect(room.result(session)["verdict"] != "rejected", f"{patient}: {room.result(session)['reasons']}")
 
         # Nothing leaves before a person releases it, and then once, though the peer is down and the watch is killed.
