@@ -114,6 +114,8 @@ class Batch {
         if (!one->anatomy.empty()) registered.anatomy = one->anatomy;
         registered.output = folder.folder_of(name);
         register_study(registered, shared, quiet);
+      } catch (const WriteError&) {
+        throw;  // the case is as good as before
       } catch (const std::exception& error) {
         folder.fail(name, error.what());
       }

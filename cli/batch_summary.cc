@@ -128,7 +128,8 @@ std::string index_html(const BatchSummary& summary) {
 }
 
 std::string chart_of(const PatientErrors& patient) {
-  LineChart chart{.title = patient.patient, .x_label = "accepted fraction", .y_label = "mm", .curves = {}, .from_zero = false};
+  LineChart chart{
+      .title = patient.patient, .x_label = "accepted fraction", .y_label = "mm", .curves = {}, .from_zero = false};
   for (std::size_t axis = 0; axis < 3; ++axis) {
     LineChart::Curve curve{.name = std::string(1, "xyz"[axis]), .points = {}};
     for (std::size_t n = 0; n < patient.fractions.size(); ++n)

@@ -23,6 +23,8 @@
 namespace isoshift {
 namespace {
 
+constexpr char kStop = '!';  // begins a line that says why no case can be registered any more
+
 // A child on the other end of a socket that is its standard input and output.
 class Worker {
  public:
@@ -68,13 +70,14 @@ class Worker {
     ::send(socket_, line.data(), line.size(), MSG_NOSIGNAL);  // one that died is found when it is read from
   }
 
-  // Reads what is there. False: it died.
+  // Reads what is there. False: it died. Throws Error for what would befall every other case, too.
   bool hear() {
     char buffer[512];
     const ssize_t count = ::recv(socket_, buffer, sizeof buffer, 0);
     if (count <= 0) return false;
     heard_.append(buffer, static_cast<std::size_t>(count));
     for (std::size_t end = 0; (end = heard_.find('\n')) != std::string::npos; heard_.erase(0, end + 1)) {
+      if (heard_.front() == kStop) throw Error(heard_.substr(1, end - 1));
       if (is_ready_ && job_ && heard_.compare(0, end, job_->name) == 0) job_.reset();
       is_ready_ = true;  // its first line says so
     }
@@ -154,8 +157,14 @@ void serve_cases(const std::function<void(const std::string& name)>& run) {
   ::prctl(PR_SET_PDEATHSIG, SIGKILL);  // nobody would be told of what it does any more
   std::cout << "ready" << std::endl;
   for (std::string name; std::getline(std::cin, name);) {
-    run(name);
-    std::cout << name << std::endl;
+    try {
+      run(name);
+      std::cout << name << std::endl;
+    } catch (const std::exception& error) {
+      std::string why = error.what();
+      std::ranges::replace(why, '\n', ' ');
+      std::cout << kStop << why << std::endl;
+    }
   }
 }
 

@@ -21,7 +21,7 @@ void run_in_workers(std::vector<BatchJob> jobs, int workers, const std::vector<s
                     const std::function<void(const std::string& name, const std::optional<std::string>& death)>& on_end,
                     const std::function<bool()>& should_stop);
 
-// The loop of a worker.
+// The loop of a worker. What `run` throws ends the whole batch: there is no use in going on.
 void serve_cases(const std::function<void(const std::string& name)>& run);
 
 }  // namespace isoshift

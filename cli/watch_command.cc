@@ -89,8 +89,9 @@ class Watch {
     std::string why;
     Clock::time_point at;
     std::optional<Clock::time_point> news;  // of the patient, when it failed
-    std::chrono::seconds pause{30};
+    std::chrono::seconds pause{0};
   };
+  static constexpr std::chrono::seconds kFirstPause{30}, kLongestPause{600};
 
   // Nothing that fails now ends the watch: a full disk, a server that is down. Each kind of trouble is said once.
   void attempt(const std::string& what, const std::function<void()>& work) {
@@ -172,16 +173,14 @@ class Watch {
     }
     if (!why.empty()) {
       Failure& failure = failures_[session.name];
-      if (failure.why != why) {
-        console_.err << fmt::format("session {}: {}\n", session.name, why);
-        tree_.audit("failed", {{"session", session.name}});
-        failure.pause = std::chrono::seconds(30);
-      } else {
-        failure.pause = std::min(2 * failure.pause, std::chrono::seconds(600));
-      }
-      failure.why = why;
+      const bool is_new = std::exchange(failure.why, why) != why;
+      failure.pause = is_new ? kFirstPause : std::min(2 * failure.pause, kLongestPause);
       failure.at = Clock::now();
       failure.news = inbox_.last_of(session.patient);
+      if (is_new) {
+        console_.err << fmt::format("session {}: {}\n", session.name, why);
+        tree_.audit("failed", {{"session", session.name}});
+      }
       return why;
     }
     failures_.erase(session.name);

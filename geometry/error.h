@@ -19,4 +19,10 @@ class UsageError : public Error {
   using Error::Error;
 };
 
+// The disk, not the work: what cannot be written now may be later.
+class WriteError : public Error {
+ public:
+  using Error::Error;
+};
+
 }  // namespace isoshift

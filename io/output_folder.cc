@@ -28,7 +28,7 @@ std::set<fs::path> unfinished;
 
 // Every failure to write is told the same way: what, where, why, and that nothing was left behind.
 [[noreturn]] void fail(const fs::path& path, const std::string& why) {
-  throw Error(fmt::format("{}: cannot be written: {}\n       No result was left behind", path.string(), why));
+  throw WriteError(fmt::format("{}: cannot be written: {}\n       No result was left behind", path.string(), why));
 }
 
 void flush(const fs::path& path) {

@@ -121,6 +121,26 @@ TEST_F(BatchCommandTest, AWorkerThatDiesTakesItsCaseWithIt) {
   EXPECT_THAT(batch().err, HasSubstr("a worker could not begin: the program ended with status 3"));
 }
 
+// No case is blamed for a full disk: with room again the same command goes on.
+TEST_F(BatchCommandTest, AFullDiskLosesNoCase) {
+  const fs::path disk = folder_ / "disk";
+  fs::create_directories(disk);
+  if (run_shell(fmt::format("mount -t tmpfs -o size=300k none {}", disk.string())).exit_status != 0)
+    GTEST_SKIP() << "no file system can be mounted here";
+  const auto on_disk = [&] {
+    return run_command({"batch", exported().string(), "-o", (disk / "results").string(), "--preset", "fast"});
+  };
+  const CommandOutcome full = on_disk();
+  EXPECT_EQ(full.exit_status, 1);
+  EXPECT_THAT(full.err, HasSubstr("No space left on device"));
+  EXPECT_EQ(run_shell("find " + disk.string() + " -name error.json").out, "");
+  EXPECT_EQ(run_shell(fmt::format("mount -o remount,size=50m {}", disk.string())).exit_status, 0);
+  const CommandOutcome again = on_disk();
+  EXPECT_NE(again.exit_status, 1) << again.err;
+  EXPECT_EQ(std::distance(fs::directory_iterator(disk / "results" / "cases"), {}), 4);
+  run_shell("umount " + disk.string());
+}
+
 TEST_F(BatchCommandTest, ScanWritesTheManifestThatBatchReads) {
   const fs::path manifest = folder_ / "cases.csv";
   EXPECT_EQ(run_command({"batch", "--scan", exported().string(), "-o", manifest.string()}).exit_status, 0);
