@@ -87,7 +87,7 @@ class Batch {
     if (options_.merge) return summarize(folder, cases);
     const Shard shard = options_.shard.empty() ? Shard() : shard_from(options_.shard);
     if (shard.count > 1) cases = cases_of(shard, std::move(cases));
-    const FileLock lock = folder.work_on(shard, cases);
+    const ShardLock lock = folder.work_on(shard, cases);
     if (!register_all(folder, cases)) {
       console_.err << "ended before all cases were registered; the same command goes on\n";
       return kExitFailed;

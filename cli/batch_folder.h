@@ -19,6 +19,10 @@ struct Shard {
   int number = 1, count = 1;
 };
 
+struct ShardLock {
+  std::optional<FileLock> count, shard;
+};
+
 class BatchFolder {
  public:
   // Makes the folder, or opens that of a batch with the same options. Throws Error if it holds anything else.
@@ -26,7 +30,7 @@ class BatchFolder {
 
   // While the lock lasts nobody else works on this shard; what a killed run left half written is removed. Throws Error
   // where somebody does.
-  [[nodiscard]] FileLock work_on(const Shard& shard, const std::vector<BatchCase>& cases) const;
+  [[nodiscard]] ShardLock work_on(const Shard& shard, const std::vector<BatchCase>& cases) const;
 
   const std::filesystem::path& path() const { return path_; }
   std::filesystem::path folder_of(const std::string& name) const { return path_ / "cases" / name; }

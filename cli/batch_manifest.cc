@@ -153,6 +153,19 @@ std::vector<fs::path> ct_paths(const fs::path& top, const std::vector<fs::path>&
   return {folder};
 }
 
+// Why a file in a folder of these parts cannot be read: it may be one of them, and without it they are another study.
+std::string unreadable_beside(const StudyParts& parts, const StudyFiles& all) {
+  std::set<std::string> folders;
+  for (const auto& files : {parts.ct, parts.images})
+    for (const fs::path& file : files) folders.insert(file.parent_path().string() + "/");
+  for (const std::string& reason : all.unreadable)  // each begins with the file's name
+    for (const std::string& folder : folders)
+      if (reason.starts_with(folder) &&
+          reason.substr(0, reason.find(": ")).find('/', folder.size()) == std::string::npos)
+        return reason;
+  return "";
+}
+
 std::string quoted(const std::string& cell) {
   if (cell.find_first_of(",\"\n") == std::string::npos) return cell;
   std::string text = "\"";
@@ -213,7 +226,11 @@ std::vector<BatchCase> scan_cases(const fs::path& folder, bool other_xrays, Note
   std::vector<BatchCase> cases;
   for (const SessionFiles& session : sessions_of(files, other_xrays)) {
     try {
-      const StudyParts parts = choose_parts(files_for(session, files));
+      const StudyFiles own = files_for(session, files);
+      const StudyParts parts = choose_parts(own);
+      if (const std::string absent = missing_ct_images(own); !absent.empty()) throw Error(absent + " are not there");
+      if (const std::string reason = unreadable_beside(parts, files); !reason.empty())
+        throw Error("a file beside them may be theirs: " + reason);
       cases.push_back({.name = session.name,
                        .study = {},
                        .plan = parts.plan.value_or(fs::path()),

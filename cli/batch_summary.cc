@@ -28,6 +28,13 @@ std::string status_of(const CaseEnd& end) {
   return end.error.empty() ? "open" : "failed";
 }
 
+// IDs of two issuers are two patients.
+std::string patient_of(const SetupReport& report) {
+  const Identity& identity = report.identity;
+  return identity.patient_id_issuer.empty() ? identity.patient_id
+                                            : fmt::format("{} ({})", identity.patient_id, identity.patient_id_issuer);
+}
+
 std::string acquired(const CaseEnd& end) {
   return end.report && !end.report->views.empty() ? end.report->views.front().acquired : "";
 }
@@ -195,7 +202,7 @@ BatchSummary summary_of(const BatchFolder& folder, const std::vector<BatchCase>&
     const Components shown = shown_components(*end.report);
     if (!std::ranges::all_of(shown, [](const auto& component) { return component.has_value(); })) continue;
     std::ranges::transform(shown, all.begin(), [](const auto& component) { return *component; });
-    by_patient[end.report->identity.patient_id].emplace_back(acquired(end), all);
+    by_patient[patient_of(*end.report)].emplace_back(acquired(end), all);
   }
   for (auto& [patient, fractions] : by_patient) {
     std::ranges::stable_sort(fractions, {}, [](const auto& fraction) { return fraction.first; });

@@ -15,6 +15,7 @@
 #include <iostream>
 #include <list>
 #include <memory>
+#include <set>
 #include <utility>
 
 #include "cli/child_process.h"
@@ -86,12 +87,17 @@ class Worker {
   bool is_ready() const { return is_ready_; }
 
   // Of one that has died.
-  std::string death() {
+  struct Death {
+    std::string why;
+    bool from_outside = false;  // a signal that programs do not give themselves
+  };
+  Death death() {
     int status = 0;
     ::waitpid(std::exchange(process_, 0), &status, 0);
     if (WIFSIGNALED(status))
-      return fmt::format("the program was ended by signal {} ({})", WTERMSIG(status), ::strsignal(WTERMSIG(status)));
-    return fmt::format("the program ended with status {}", WEXITSTATUS(status));
+      return {fmt::format("the program was ended by signal {} ({})", WTERMSIG(status), ::strsignal(WTERMSIG(status))),
+              WTERMSIG(status) == SIGKILL || WTERMSIG(status) == SIGTERM};
+    return {fmt::format("the program ended with status {}", WEXITSTATUS(status)), WEXITSTATUS(status) == 128 + SIGTERM};
   }
 
  private:
@@ -122,6 +128,7 @@ void run_in_workers(std::vector<BatchJob> all, int count, const std::vector<std:
                     const std::function<bool()>& should_stop) {
   std::list<BatchJob> jobs(std::make_move_iterator(all.begin()), std::make_move_iterator(all.end()));
   std::list<std::unique_ptr<Worker>> workers;
+  std::set<std::string> tried_twice;
   for (;;) {
     auto idle = static_cast<std::size_t>(std::ranges::count_if(workers, [](const auto& w) { return !w->job(); }));
     for (; workers.size() < static_cast<std::size_t>(count) && idle < jobs.size(); ++idle)
@@ -146,9 +153,14 @@ void run_in_workers(std::vector<BatchJob> all, int count, const std::vector<std:
       const bool is_alive = (*now)->hear();
       if (is_alive && (*now)->job().has_value() == job.has_value()) continue;
       if (should_stop()) return;  // the signal that says so has reached the workers, too
-      if (!(*now)->is_ready()) throw Error(fmt::format("a worker could not begin: {}", (*now)->death()));
-      if (job) on_end(job->name, is_alive ? std::nullopt : std::optional((*now)->death()));
+      if (!(*now)->is_ready()) throw Error(fmt::format("a worker could not begin: {}", (*now)->death().why));
+      const std::optional<Worker::Death> death = is_alive ? std::nullopt : std::optional((*now)->death());
       if (!is_alive) workers.erase(now);
+      // One that was killed from outside may have been in nobody's way: its case has another try.
+      if (job && death && death->from_outside && tried_twice.insert(job->name).second)
+        jobs.push_front(*job);
+      else if (job)
+        on_end(job->name, death ? std::optional(death->why) : std::nullopt);
     }
   }
 }

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <set>
 
 #include "geometry/error.h"
 #include "io/dicom_send.h"
@@ -13,18 +14,23 @@ bool Deliverer::deliver(Console& console) {
   constexpr std::chrono::seconds kFirstPause(2), kLongestPause(300);
   const auto now = std::chrono::steady_clock::now();
   bool has_sent = false;
+  std::set<std::string> failing;  // in this round: the next of its objects has its turn in the next one
   for (const Delivery& delivery : tree_.pending()) {
     const auto peer = std::ranges::find(watch_.peers, delivery.peer, &DicomPeer::name);
-    Pause& pause = pauses_[delivery.peer];
-    if (now < pause.until) continue;
+    const std::string key = fmt::format("{}/{}/{}", delivery.session, delivery.peer, delivery.object.file);
+    Pause& pause = pauses_[key];
+    if (now < pause.until || failing.contains(delivery.peer)) continue;
     try {
       if (peer == watch_.peers.end())
         throw Error(fmt::format("peer {}: the watch file does not name it", delivery.peer));
-      tree_.mark_sent(delivery, send_object(tree_.checked_file(delivery), *peer));
+      const std::filesystem::path file = tree_.checked_file(delivery);
+      tree_.prepare_to_send(delivery);
+      tree_.mark_sent(delivery, send_object(file, *peer));
       console.err << fmt::format("session {}: {} sent to {}\n", delivery.session, delivery.object.file, delivery.peer);
-      pause = {};
+      pauses_.erase(key);
       has_sent = true;
-    } catch (const Error& error) {
+    } catch (const std::exception& error) {
+      failing.insert(delivery.peer);
       pause.length = std::clamp(2 * pause.length, kFirstPause, kLongestPause);
       pause.until = now + pause.length;
       console.err << fmt::format("session {}: {} not sent, tried again in {} s: {}\n", delivery.session,

@@ -11,7 +11,7 @@
 
 namespace isoshift {
 
-// Peers that are down are tried again, after longer and longer times.
+// What could not be sent is tried again, after longer and longer times.
 class Deliverer {
  public:
   Deliverer(const ResultsTree& tree, const WatchFile& watch) : tree_(tree), watch_(watch) {}
@@ -27,7 +27,7 @@ class Deliverer {
 
   const ResultsTree& tree_;
   const WatchFile& watch_;
-  std::map<std::string, Pause> pauses_;  // by peer
+  std::map<std::string, Pause> pauses_;  // by session, peer and file
 };
 
 }  // namespace isoshift

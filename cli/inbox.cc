@@ -72,15 +72,17 @@ void Inbox::update(Notes& notes) {
 
 void Inbox::update_folder(Notes& notes) {
   std::map<fs::path, Version> still_growing;
-  for (const fs::path& file : files_below({watch_.folder}, done_files_)) {
+  for (const fs::path& file : files_below({watch_.folder})) {
     std::error_code gone;
     const Version version{fs::file_size(file, gone), fs::last_write_time(file, gone)};
-    if (gone) continue;
-    const auto before = growing_.find(file);
-    if (before != growing_.end() && before->second == version)
-      take(file, notes);
-    else
+    const auto done = done_.find(file), before = growing_.find(file);
+    if (gone || (done != done_.end() && done->second == version)) continue;
+    if (before == growing_.end() || before->second != version) {
       still_growing[file] = version;
+      continue;
+    }
+    done_[file] = version;
+    take(file, notes);
   }
   growing_ = std::move(still_growing);
 }
@@ -88,30 +90,46 @@ void Inbox::update_folder(Notes& notes) {
 // The server's files are written first, then the number of the change that was the last: whoever is stopped between
 // asks for some again.
 void Inbox::update_orthanc(Notes& notes) {
-  for (const fs::path& file : files_below({objects_}, done_files_)) take(file, notes);  // of an earlier run
-  for (bool done = false; !done;) {
-    Orthanc::Changes changes = orthanc_->changes_since(last_change_);
-    if (changes.last < last_change_) {  // another database
-      last_change_ = 0;
-      continue;
-    }
-    for (const std::string& instance : changes.instances) {
-      const fs::path file = objects_ / (sha256_of(instance) + ".dcm");
-      if (fs::exists(file)) continue;
-      const std::string content = orthanc_->file_of(instance);
-      if (content.empty()) continue;
+  if (!has_read_objects_)
+    for (const fs::path& file : files_below({objects_})) take(file, notes);  // of an earlier run
+  has_read_objects_ = true;
+  has_all_changes_ = false;
+  const Orthanc::Changes changes = orthanc_->changes_since(last_change_);
+  if (changes.last < last_change_) {  // another database
+    last_change_ = 0;
+    return;
+  }
+  for (const std::string& instance : changes.instances) unfetched_.emplace(instance, 0);
+  for (const auto& [instance, tries] : std::map(unfetched_)) fetch(instance, notes);
+  has_all_changes_ = changes.done;
+  if (changes.last == last_change_) return;
+  last_change_ = changes.last;
+  if (unfetched_.empty()) replace_text(objects_ / kLastChange, fmt::format("{}\n", last_change_));
+}
+
+// One that the server does not give is tried some times more, and holds up no other.
+void Inbox::fetch(const std::string& instance, Notes& notes) {
+  constexpr int kMostTries = 5;
+  const fs::path file = objects_ / (sha256_of(instance) + ".dcm");
+  try {
+    const std::string content = orthanc_->file_of(instance);
+    if (!content.empty() && (!fs::exists(file) || sha256_of_file(file) != sha256_of(content))) {
       replace_text(file, content);
       take(file, notes);
     }
-    done = changes.done;
-    if (changes.last == last_change_) continue;
-    last_change_ = changes.last;
-    replace_text(objects_ / kLastChange, fmt::format("{}\n", last_change_));
+    unfetched_.erase(instance);
+  } catch (const Error& error) {
+    if (++unfetched_[instance] < kMostTries) return;
+    notes.warnings.push_back(fmt::format("left out: an instance that the server does not give: {}", error.what()));
+    unfetched_.erase(instance);
   }
 }
 
 void Inbox::take(const fs::path& file, Notes& notes) {
-  done_files_.insert(file.native());
+  if (!taken_.insert(file.native()).second) {  // another content under a name that was there before
+    forget(file, files_);
+    std::erase_if(file_of_uid_, [&](const auto& entry) { return entry.second == file; });
+  }
   StudyFiles one;
   try {
     add_file(file, one);
@@ -124,11 +142,11 @@ void Inbox::take(const fs::path& file, Notes& notes) {
   last_of_[found->patient] = Clock::now();
   const auto [entry, is_new] = file_of_uid_.emplace(found->uid, file);
   if (!is_new) {
-    const fs::path& before = entry->second;
-    if (sha256_of_file(before) == sha256_of_file(file)) return;
+    const fs::path before = entry->second;
     if (is_whole(before)) {
-      notes.warnings.push_back(fmt::format("{}: left out: differs from {}, which has the same SOPInstanceUID",
-                                           file.string(), before.string()));
+      if (sha256_of_file(before) != sha256_of_file(file))
+        notes.warnings.push_back(fmt::format("{}: left out: differs from {}, which has the same SOPInstanceUID",
+                                             file.string(), before.string()));
       return;
     }
     forget(before, files_);

@@ -6,7 +6,6 @@
 #include <map>
 #include <memory>
 #include <optional>
-#include <set>
 #include <string>
 #include <unordered_set>
 
@@ -28,6 +27,10 @@ class Inbox {
   // a server that does not answer; the next call goes on.
   void update(Notes& notes);
 
+  // Nothing more is known to be on its way: files that grow, changes that the server has not told, instances that it
+  // did not give.
+  bool is_settled() const { return growing_.empty() && unfetched_.empty() && has_all_changes_; }
+
   const StudyFiles& files() const { return files_; }
   // When the last file of a patient came.
   std::optional<Clock::time_point> last_of(const std::string& patient) const;
@@ -40,6 +43,7 @@ class Inbox {
   };
   void update_folder(Notes& notes);
   void update_orthanc(Notes& notes);
+  void fetch(const std::string& instance, Notes& notes);
   void take(const std::filesystem::path& file, Notes& notes);
 
   const WatchFile& watch_;
@@ -47,8 +51,10 @@ class Inbox {
   std::unique_ptr<Orthanc> orthanc_;
   StudyFiles files_;
   std::map<std::string, std::filesystem::path> file_of_uid_;  // by SOPInstanceUID
-  std::unordered_set<std::string> done_files_;
-  std::map<std::filesystem::path, Version> growing_;
+  std::unordered_set<std::string> taken_;
+  std::map<std::filesystem::path, Version> done_, growing_;
+  std::map<std::string, int> unfetched_;  // instances, and how often that was tried
+  bool has_all_changes_ = true, has_read_objects_ = false;
   std::map<std::string, Clock::time_point> last_of_;
   std::int64_t last_change_ = 0;
 };

@@ -1,7 +1,9 @@
 // isoshift watch: registers what comes into a treatment room, and holds the results until they are released.
 
-#include <fmt/chrono.h>
 #include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <chrono>
@@ -33,7 +35,7 @@ using Clock = std::chrono::steady_clock;
 constexpr const char* kLockFile = ".watch.lock";
 
 // Flags of isoshift register that a watch file names must be some, and none of those that watch sets itself.
-void check_registration_flags(const WatchFile& watch) {
+RegisterOptions checked_registration_flags(const WatchFile& watch) {
   CLI::App app;
   RegisterOptions options;
   add_result_options(app, options);
@@ -47,16 +49,18 @@ void check_registration_flags(const WatchFile& watch) {
   }
   if (!options.site.empty())
     throw Error(fmt::format("{}: register: --site is named by site, not here", watch.path.string()));
+  return options;
 }
 
 class Watch {
  public:
-  Watch(const WatchFile& watch, Console& console)
+  Watch(const WatchFile& watch, bool takes_other_xrays, Console& console)
       : watch_(watch),
         console_(console),
         tree_(watch.results),
         inbox_(watch, watch.results / "objects"),
-        deliverer_(tree_, watch) {}
+        deliverer_(tree_, watch),
+        takes_other_xrays_(takes_other_xrays) {}
 
   void run() {
     const auto lock = FileLock::try_take(tree_.path() / kLockFile);
@@ -68,7 +72,8 @@ class Watch {
     console_.err << fmt::format("watching {}; results in {}\n",
                                 watch_.orthanc ? watch_.orthanc->url : watch_.folder.string(), tree_.path().string());
     while (!end.is_asked_for()) {
-      attempt("receiving", [&] { receive(); });
+      // While a server is down nothing is known to be quiet.
+      if (!attempt("receiving", [&] { receive(); })) steady_since_ = Clock::now();
       attempt("registering", [&] { register_complete(end); });
       attempt("releasing", [&] { release_automatically(); });
       attempt("sending", [&] { deliverer_.deliver(console_); });
@@ -94,13 +99,15 @@ class Watch {
   static constexpr std::chrono::seconds kFirstPause{30}, kLongestPause{600};
 
   // Nothing that fails now ends the watch: a full disk, a server that is down. Each kind of trouble is said once.
-  void attempt(const std::string& what, const std::function<void()>& work) {
+  bool attempt(const std::string& what, const std::function<void()>& work) {
     try {
       work();
       if (troubles_.erase(what) > 0) console_.err << what << ": goes on\n";
+      return true;
     } catch (const std::exception& error) {
       if (std::exchange(troubles_[what], error.what()) != error.what())
         console_.err << fmt::format("{}: {}\n", what, error.what());
+      return false;
     }
   }
 
@@ -124,10 +131,13 @@ class Watch {
     std::erase_if(files.images, is_done);
     std::erase_if(files.other_xrays, is_done);
     waiting_.clear();
-    for (SessionFiles& session : sessions_of(files, false)) {
+    bool has_retried = false;  // what has failed before does not hold up what is new
+    for (SessionFiles& session : sessions_of(files, takes_other_xrays_)) {
       if (end.is_asked_for()) return;
       const StudyFiles own = files_for(session, files);
+      const bool has_failed = failures_.contains(session.name);
       std::string why = reason_to_wait(session, own);
+      if (why.empty() && has_failed && std::exchange(has_retried, true)) why = failures_.at(session.name).why;
       if (why.empty()) why = registered(session, own);
       if (why.empty()) continue;
       const bool failed = failures_.contains(session.name);
@@ -142,7 +152,9 @@ class Watch {
       return fmt::format("{} of {} X-rays", session.images.size(), rule.views);
     if (const auto missing = missing_parts(own); !missing.empty()) return "waits for " + missing.front();
     const auto last = inbox_.last_of(session.patient);
-    if (last && Clock::now() - *last < std::chrono::duration<double>(rule.quiet_s)) return "more may come";
+    if (!inbox_.is_settled() || Clock::now() - std::max(last.value_or(steady_since_), steady_since_) <
+                                    std::chrono::duration<double>(rule.quiet_s))
+      return "more may come";
     const auto failure = failures_.find(session.name);
     if (failure == failures_.end()) return "";
     const bool has_news = last != failure->second.news;
@@ -152,6 +164,7 @@ class Watch {
   // Registers in a process of its own, whatever it meets there. Returns why there is no result.
   std::string registered(const SessionFiles& session, const StudyFiles& own) {
     std::string why;
+    const auto has_result = [&] { return std::filesystem::exists(tree_.session(session.name) / kResultFile); };
     try {
       const StudyParts parts = choose_parts(own);
       std::vector<std::string> words = {this_program().string(), "register", "--ct"};
@@ -164,11 +177,11 @@ class Watch {
                    {"--site", watch_.site.path.string(), "--output", tree_.session(session.name).string()});
       words.insert(words.end(), watch_.registration.begin(), watch_.registration.end());
       const ChildEnd end = run_child(std::move(words));
-      if (end.status == kExitFailed || end.status == kExitUsage || end.status > kExitRejected)
+      if (!has_result() && end.status == kExitFailed)
         why = end.output.substr(std::min(end.output.size(), end.output.rfind("error: ")));
-      if (why.empty() && !std::filesystem::exists(tree_.session(session.name) / kResultFile))
+      else if (!has_result())
         why = fmt::format("the registration ended with status {} and left no result", end.status);
-    } catch (const Error& error) {
+    } catch (const std::exception& error) {
       why = error.what();
     }
     if (!why.empty()) {
@@ -263,12 +276,19 @@ class Watch {
   std::map<std::string, Failure> failures_;
   std::map<std::string, std::string> troubles_;
   std::string index_;
+  Clock::time_point steady_since_ = Clock::now();  // everything that came has been seen
+  bool takes_other_xrays_;                         // a machine profile supplies their geometry
 };
 
 void run_release(const std::filesystem::path& file, const std::string& session, const std::string& by,
                  Console& console) {
   if (by.find_first_not_of(' ') == std::string::npos) throw UsageError("--by: expected the name of who releases it");
   const WatchFile watch = read_watch_file(file);
+  // What another user writes the watch could not read.
+  struct stat of_results {};
+  if (::stat(watch.results.c_str(), &of_results) == 0 && of_results.st_uid != ::geteuid())
+    throw Error(fmt::format("{}: belongs to another user, who runs isoshift watch: release as that one (sudo -u USER)",
+                            watch.results.string()));
   const ResultsTree tree(watch.results);
   const Release release = tree.release(session, by, Watch::names_of_peers(watch));
   for (const Release::Object& object : release.objects)
@@ -296,8 +316,8 @@ void add_watch_command(CLI::App& app, Console& console, int& exit_status) {
       ->type_name("FILE");
   command->callback([file, &console, &exit_status] {
     const WatchFile watch = read_watch_file(*file);
-    check_registration_flags(watch);
-    Watch(watch, console).run();
+    const bool has_machine = !checked_registration_flags(watch).study.machine.empty();
+    Watch(watch, has_machine, console).run();
     exit_status = kExitAccepted;
   });
 }

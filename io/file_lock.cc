@@ -13,11 +13,11 @@
 
 namespace isoshift {
 
-std::optional<FileLock> FileLock::try_take(const std::filesystem::path& path) {
+std::optional<FileLock> FileLock::try_take(const std::filesystem::path& path, Kind kind) {
   const int descriptor = ::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0640);
   if (descriptor < 0) throw Error(fmt::format("{}: cannot be written: {}", path.string(), std::strerror(errno)));
   FileLock lock(descriptor);
-  if (::flock(descriptor, LOCK_EX | LOCK_NB) == 0) return lock;
+  if (::flock(descriptor, (kind == Kind::kAlone ? LOCK_EX : LOCK_SH) | LOCK_NB) == 0) return lock;
   if (errno == EWOULDBLOCK) return std::nullopt;
   throw Error(fmt::format("{}: cannot be locked: {}", path.string(), std::strerror(errno)));
 }

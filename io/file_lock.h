@@ -9,7 +9,9 @@ namespace isoshift {
 class FileLock {
  public:
   // Nothing where another process holds it. The file remains. Throws Error if it cannot be made.
-  static std::optional<FileLock> try_take(const std::filesystem::path& path);
+  // Shared: others may share it, and none may have it alone.
+  enum class Kind { kAlone, kShared };
+  static std::optional<FileLock> try_take(const std::filesystem::path& path, Kind kind = Kind::kAlone);
   ~FileLock();
   FileLock(FileLock&& other) noexcept;
   FileLock& operator=(FileLock&&) = delete;

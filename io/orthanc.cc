@@ -50,7 +50,7 @@ Orthanc::Answer Orthanc::get(const std::string& path) const {
 }
 
 Orthanc::Changes Orthanc::changes_since(std::int64_t last) const {
-  const Answer answer = get(fmt::format("/changes?since={}&limit=1000", last));
+  const Answer answer = get(fmt::format("/changes?since={}&limit=200", last));
   try {
     const nlohmann::json json = nlohmann::json::parse(answer.body);
     Changes changes{.instances = {}, .last = json.at("Last").get<std::int64_t>(), .done = json.at("Done").get<bool>()};

@@ -128,13 +128,14 @@ void OutputFolder::commit() {
   // An earlier output changes places with the new one, and is then removed from the staging name. Without one, a rename
   // takes an empty folder's place and fails if anything has appeared there meanwhile.
   const unsigned flags = replaces_ ? RENAME_EXCHANGE : 0;
+  std::unique_lock lock(unfinished_mutex);  // abandon_outputs() removes it whole, or not at all
   if (::renameat2(AT_FDCWD, staging_.c_str(), AT_FDCWD, destination_.c_str(), flags) != 0)
     fail(destination_, std::strerror(errno));
+  unfinished.erase(staging_);
+  lock.unlock();
   flush(destination_.parent_path());
   std::error_code ignored;
   if (replaces_) fs::remove_all(staging_, ignored);
-  const std::lock_guard lock(unfinished_mutex);
-  unfinished.erase(staging_);
   staging_.clear();
 }
 

@@ -112,7 +112,12 @@ std::vector<Delivery> ResultsTree::pending() const {
   std::vector<Delivery> pending;
   for (const auto& entry : fs::directory_iterator(path_ / "released")) {
     if (entry.path().extension() != ".json" || entry.path().filename().string().starts_with('.')) continue;
-    const Release release = release_of(entry.path().stem().string()).value();
+    Release release;
+    try {
+      release = release_of(entry.path().stem().string()).value();
+    } catch (const std::exception&) {
+      continue;  // whoever shows its state says that it cannot be read
+    }
     for (const std::string& peer : release.peers)
       for (const Release::Object& object : release.objects) {
         const Delivery delivery{.session = release.session, .peer = peer, .object = object};
@@ -130,8 +135,16 @@ fs::path ResultsTree::checked_file(const Delivery& delivery) const {
   return file;
 }
 
+fs::path ResultsTree::prepared_file(const Delivery& delivery) const {
+  return path_ / "sent" / ("." + sent_file(delivery).filename().string());
+}
+
+void ResultsTree::prepare_to_send(const Delivery& delivery) const {
+  replace_text(prepared_file(delivery), Json{{"on", now()}, {"object", delivery.object.sha256}}.dump() + "\n");
+}
+
 void ResultsTree::mark_sent(const Delivery& delivery, const std::string& answer) const {
-  replace_text(sent_file(delivery), Json{{"on", now()}, {"answer", answer.empty() ? "success" : answer}}.dump() + "\n");
+  fs::rename(prepared_file(delivery), sent_file(delivery));
   audit("sent", {{"session", delivery.session},
                  {"peer", delivery.peer},
                  {"object", delivery.object.sha256},
@@ -141,15 +154,16 @@ void ResultsTree::mark_sent(const Delivery& delivery, const std::string& answer)
 void ResultsTree::audit(const std::string& event, Json details) const {
   Json line = {{"on", now()}, {"event", event}};
   line.update(details);
-  const std::string text = line.dump() + "\n";
-  const fs::path file = path_ / "audit.jsonl";
-  const int descriptor = ::open(file.c_str(), O_WRONLY | O_APPEND | O_CREAT | O_CLOEXEC, 0640);
-  const bool written = descriptor >= 0 &&
-                       ::write(descriptor, text.data(), text.size()) == static_cast<ssize_t>(text.size()) &&
-                       ::fsync(descriptor) == 0;
-  const int reason = errno;
-  if (descriptor >= 0) ::close(descriptor);
-  if (!written) throw Error(fmt::format("{}: cannot be written: {}", file.string(), std::strerror(reason)));
+  unwritten_ += line.dump() + "\n";
+  const int descriptor = ::open((path_ / "audit.jsonl").c_str(), O_WRONLY | O_APPEND | O_CREAT | O_CLOEXEC, 0640);
+  if (descriptor < 0) return;
+  const off_t before = ::lseek(descriptor, 0, SEEK_END);
+  const ssize_t written = ::write(descriptor, unwritten_.data(), unwritten_.size());
+  if (written == static_cast<ssize_t>(unwritten_.size()) && ::fsync(descriptor) == 0)
+    unwritten_.clear();
+  else if (written > 0 && ::ftruncate(descriptor, before) != 0)
+    unwritten_.erase(0, static_cast<std::size_t>(written));
+  ::close(descriptor);
 }
 
 }  // namespace isoshift

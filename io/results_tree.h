@@ -5,7 +5,7 @@
 //   sessions/NAME/           the result of a session of X-rays
 //   released/NAME.json       who released it, and what goes to whom
 //   sent/NAME.PEER.FILE      that peer has answered that it stored this file
-//   audit.jsonl              what happened when: no names, no UIDs
+//   audit.jsonl              what happened when, who released what: no names of patients, no UIDs
 
 #include <filesystem>
 #include <nlohmann/json.hpp>
@@ -51,15 +51,19 @@ class ResultsTree {
   std::vector<Delivery> pending() const;
   // The file, if it is what was released. Throws Error if it has changed since.
   std::filesystem::path checked_file(const Delivery& delivery) const;
+  // Writes what mark_sent() only has to put in place: with a full disk nothing is sent that cannot be marked.
+  void prepare_to_send(const Delivery& delivery) const;
   void mark_sent(const Delivery& delivery, const std::string& answer) const;
 
-  // One line, flushed.
+  // One line, flushed. What cannot be written now is with the next one.
   void audit(const std::string& event, nlohmann::ordered_json details) const;
 
  private:
   std::filesystem::path sent_file(const Delivery& delivery) const;
+  std::filesystem::path prepared_file(const Delivery& delivery) const;
 
   std::filesystem::path path_;
+  mutable std::string unwritten_;  // of the audit log
 };
 
 }  // namespace isoshift

@@ -66,35 +66,39 @@ StudyFiles files_for(const SessionFiles& session, const StudyFiles& files) {
   return own;
 }
 
+std::string missing_ct_images(const StudyFiles& of_session) {
+  for (const StudyFiles::Plan& plan : of_session.plans) {
+    const auto is_imaged = [&](const auto& image) { return image.plan_uid == plan.sop_instance_uid; };
+    if (std::ranges::none_of(of_session.images, is_imaged)) continue;
+    for (const StudyFiles::Structures& structures : of_session.structures) {
+      if (structures.sop_instance_uid != plan.structure_set_uid) continue;
+      const auto absent = std::ranges::count_if(structures.ct_sop_instance_uids, [&](const std::string& uid) {
+        return std::ranges::none_of(of_session.cts, [&](const auto& ct) { return ct.sop_instance_uids.contains(uid); });
+      });
+      if (absent > 0)
+        return fmt::format("{} of the {} CT images of the RT Structure Set", absent,
+                           structures.ct_sop_instance_uids.size());
+    }
+  }
+  return "";
+}
+
 std::vector<std::string> missing_parts(const StudyFiles& of_session) {
   std::vector<std::string> missing;
   if (of_session.cts.empty()) missing.emplace_back("the CT");
-  const auto plan_of = [&](const StudyFiles::Image& image) {
-    return std::ranges::find(of_session.plans, image.plan_uid, &StudyFiles::Plan::sop_instance_uid);
-  };
-  for (const StudyFiles::Image& image : of_session.images) {
-    if (image.plan_uid.empty()) continue;
-    const auto plan = plan_of(image);
-    if (plan == of_session.plans.end()) {
-      missing.push_back(fmt::format("the RT Plan {}", image.plan_uid));
-      break;
-    }
-    if (plan->structure_set_uid.empty()) continue;
-    const auto structures =
-        std::ranges::find(of_session.structures, plan->structure_set_uid, &StudyFiles::Structures::sop_instance_uid);
-    if (structures == of_session.structures.end()) {
+  std::set<std::string> plan_uids;
+  for (const StudyFiles::Image& image : of_session.images)
+    if (!image.plan_uid.empty()) plan_uids.insert(image.plan_uid);
+  for (const std::string& uid : plan_uids) {
+    const auto plan = std::ranges::find(of_session.plans, uid, &StudyFiles::Plan::sop_instance_uid);
+    if (plan == of_session.plans.end())
+      missing.push_back(fmt::format("the RT Plan {}", uid));
+    else if (!plan->structure_set_uid.empty() &&
+             std::ranges::find(of_session.structures, plan->structure_set_uid,
+                               &StudyFiles::Structures::sop_instance_uid) == of_session.structures.end())
       missing.push_back(fmt::format("the RT Structure Set {}", plan->structure_set_uid));
-      break;
-    }
-    std::size_t absent = 0;
-    for (const std::string& uid : structures->ct_sop_instance_uids)
-      absent +=
-          std::ranges::none_of(of_session.cts, [&](const auto& ct) { return ct.sop_instance_uids.contains(uid); });
-    if (absent > 0)
-      missing.push_back(fmt::format("{} of the {} CT images of the RT Structure Set", absent,
-                                    structures->ct_sop_instance_uids.size()));
-    break;
   }
+  if (std::string images = missing_ct_images(of_session); !images.empty()) missing.push_back(std::move(images));
   return missing;
 }
 

@@ -25,6 +25,9 @@ std::vector<SessionFiles> sessions_of(const StudyFiles& files, bool other_xrays)
 // What choose_parts() chooses from for a session: all files of its patient, and of X-rays its own.
 StudyFiles files_for(const SessionFiles& session, const StudyFiles& files);
 
+// CT images that its structure set was drawn on and that are not there, in words; empty: none, or nobody knows.
+std::string missing_ct_images(const StudyFiles& of_session);
+
 // What its files refer to and is not there, in words; empty: all is there.
 std::vector<std::string> missing_parts(const StudyFiles& of_session);
 

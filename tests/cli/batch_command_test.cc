@@ -8,8 +8,10 @@
 #include <iterator>
 #include <nlohmann/json.hpp>
 
+#include "cli/batch_folder.h"
 #include "cli/batch_manifest.h"
 #include "cli/child_process.h"
+#include "geometry/error.h"
 #include "tests/support/small_study.h"
 
 namespace isoshift {
@@ -94,6 +96,24 @@ TEST_F(BatchCommandTest, ShardsAndMergeGiveTheSame) {
   EXPECT_NE(batch({"--merge"}).exit_status, 1);
   EXPECT_EQ(summary()["cases"].size(), 4U);
   EXPECT_EQ(batch({"--shard", "4/3"}).exit_status, 2);
+}
+
+// Of one count shards work side by side; another count, or the same shard again, would work on the same cases.
+TEST_F(BatchCommandTest, NoCaseIsWorkedOnTwice) {
+  const BatchFolder folder(results(), {});
+  const ShardLock first = folder.work_on({1, 4}, {}), second = folder.work_on({2, 4}, {});
+  for (const Shard& other : {Shard{1, 4}, Shard{1, 8}, Shard{1, 1}})
+    EXPECT_THROW(static_cast<void>(folder.work_on(other, {})), Error) << other.number << "/" << other.count;
+  EXPECT_NO_THROW(static_cast<void>(folder.work_on({3, 4}, {})));
+  EXPECT_NO_THROW(BatchFolder(results(), {}));
+  EXPECT_THROW(BatchFolder(exported(), {}), Error);
+}
+
+TEST_F(BatchCommandTest, ATruncatedFileBesideMakesNoCase) {
+  fs::resize_file(exported() / "1" / "RTIMAGE" / "KV_G090.dcm", 300);
+  const CommandOutcome outcome = batch();
+  EXPECT_THAT(outcome.err, HasSubstr("make no case: a file beside them may be theirs"));
+  EXPECT_EQ(summary()["cases"].size(), 3U);
 }
 
 TEST_F(BatchCommandTest, OneBadCaseStopsNoOther) {

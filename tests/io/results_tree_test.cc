@@ -54,6 +54,8 @@ TEST_F(ResultsTreeTest, EveryObjectIsPendingForEveryPeerUntilItIsSent) {
   std::vector<Delivery> pending = tree_.pending();
   ASSERT_EQ(pending.size(), 4U);
   EXPECT_EQ(tree_.checked_file(pending[0]), tree_.session("a") / pending[0].object.file);
+  tree_.prepare_to_send(pending[0]);
+  EXPECT_EQ(ResultsTree(tree_.path()).pending().size(), 4U);  // killed before the peer answered
   tree_.mark_sent(pending[0], "");
   const ResultsTree reopened(tree_.path());  // as after a kill
   EXPECT_EQ(reopened.pending().size(), 3U);
