@@ -41,6 +41,7 @@ class Worker {
     std::vector<std::string> words = {"isoshift"};
     words.insert(words.end(), arguments.begin(), arguments.end());
     std::vector<char*> argv;
+    argv.reserve(words.size() + 1);
     for (std::string& word : words) argv.push_back(word.data());
     argv.push_back(nullptr);
     const int failed = ::posix_spawn(&process_, this_program().c_str(), &actions, nullptr, argv.data(), environ);

@@ -129,12 +129,13 @@ std::string trace_csv(const TrackRecord& record) {
   const auto add_late_until = [&](double time_s) {
     for (; late != late_s.end() && *late <= time_s; ++late) csv += fmt::format("{:.4f},,,,,,,,,,,,,,,late\n", *late);
   };
-  for (const auto& [frame, processing_s] : record.rows) {
+  for (const TraceRow& row : record.rows) {
+    const TrackedFrame& frame = row.frame;
     add_late_until(frame.time_s);
     const auto if_known = [&](const Eigen::Vector3d& v) { return frame.is_known ? three(v) : ",,"; };
     csv += fmt::format("{:.4f},{},{},{},{},{:.5f},{:.4f},{}\n", frame.time_s,
                        frame.measured_mm ? three(*frame.measured_mm) : ",,", if_known(frame.filtered_mm),
-                       if_known(frame.predicted_mm), if_known(frame.sigma_mm), frame.similarity, processing_s,
+                       if_known(frame.predicted_mm), if_known(frame.sigma_mm), frame.similarity, row.processing_s,
                        to_string(frame.status));
   }
   add_late_until(record.rows.back().frame.time_s);

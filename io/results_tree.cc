@@ -129,7 +129,7 @@ std::vector<Delivery> ResultsTree::pending() const {
 }
 
 fs::path ResultsTree::checked_file(const Delivery& delivery) const {
-  const fs::path file = session(delivery.session) / delivery.object.file;
+  fs::path file = session(delivery.session) / delivery.object.file;
   if (sha256_of_file(file) != delivery.object.sha256)
     throw Error(fmt::format("{}: is not what was released: its SHA-256 differs", file.string()));
   return file;
@@ -151,7 +151,7 @@ void ResultsTree::mark_sent(const Delivery& delivery, const std::string& answer)
                  {"answer", answer.empty() ? "success" : answer}});
 }
 
-void ResultsTree::audit(const std::string& event, Json details) const {
+void ResultsTree::audit(const std::string& event, const Json& details) const {
   Json line = {{"on", now()}, {"event", event}};
   line.update(details);
   unwritten_ += line.dump() + "\n";

@@ -56,7 +56,7 @@ class ResultsTree {
   void mark_sent(const Delivery& delivery, const std::string& answer) const;
 
   // One line, flushed. What cannot be written now is with the next one.
-  void audit(const std::string& event, nlohmann::ordered_json details) const;
+  void audit(const std::string& event, const nlohmann::ordered_json& details) const;
 
  private:
   std::filesystem::path sent_file(const Delivery& delivery) const;

@@ -277,7 +277,7 @@ std::vector<fs::path> files_below(const std::vector<fs::path>& paths, const std:
     if (error) throw Error(fmt::format("{}: cannot be searched: {}", path.string(), error.message()));
   }
   std::ranges::sort(files);
-  files.erase(std::ranges::unique(files).begin(), files.end());
+  files.erase(std::unique(files.begin(), files.end()), files.end());
   return files;
 }
 

@@ -30,7 +30,7 @@ class Reader {
 
   // A file that is there.
   fs::path file(JsonSection& section, const char* key) const {
-    const fs::path path = place(section, key, "the name of a file");
+    fs::path path = place(section, key, "the name of a file");
     if (::access(path.c_str(), R_OK) != 0)
       throw Error(fmt::format("{}: {}: {} cannot be read", section.where(), key, path.string()));
     return path;

@@ -29,8 +29,7 @@ TEST(Watch, FollowsAFolder) {
   fs::create_directories(work / "in");
   std::ofstream(work / "site.json") << R"({"site_file": 1, "name": "S", "sessions": {"views": 2, "quiet_s": 1},)"
                                     << R"( "release": {"rule": "automatic", "by": "J. Doe", "on": "2026-03-01"}})";
-  std::ofstream(work / "watch.json") << R"({"watch_file": 1, "folder": "in", "results": "out", "site": "site.json",)"
-                                     << R"( "register": ["--preset=fast"]})";
+  std::ofstream(work / "watch.json") << R"({"watch_file": 1, "folder": "in", "results": "out", "site": "site.json"})";
   // Copies of a file count once, one that is no DICOM not at all; the watch ends when it is asked to.
   const CommandOutcome outcome = run_shell(fmt::format(
       "cd {0} && ({1} watch watch.json & watch=$!; cp -r {2} in/study; cp in/study/RTPLAN.dcm in/again.dcm; echo x > "
@@ -44,8 +43,10 @@ TEST(Watch, FollowsAFolder) {
   const std::string page{std::istreambuf_iterator<char>(index), {}};
   EXPECT_THAT(page, testing::HasSubstr("sessions/"));
   const auto session = fs::directory_iterator(work / "out" / "sessions")->path();
-  const bool is_accepted = fs::exists(session / "spatial_registration.dcm");
-  EXPECT_EQ(fs::is_empty(work / "out" / "released"), !is_accepted);  // automatically: accepted ones only
+  ASSERT_TRUE(fs::exists(session / "spatial_registration.dcm")) << outcome.out;  // it was accepted
+  std::ifstream released(work / "out" / "released" / (session.filename().string() + ".json"));
+  const std::string record{std::istreambuf_iterator<char>(released), {}};
+  EXPECT_THAT(record, testing::HasSubstr("automatic, allowed by J. Doe on 2026-03-01"));
 }
 
 TEST(Watch, FlagsOfTheFileAreCheckedAtStart) {
