@@ -4,7 +4,6 @@
 #include <tbb/global_control.h>
 
 #include <algorithm>
-#include <chrono>
 #include <memory>
 #include <set>
 #include <sstream>
@@ -124,9 +123,7 @@ class Batch {
 
  private:
   int scan() const {
-    Notes notes;
-    const std::vector<BatchCase> cases = scan_cases(options_.cases, !options_.each.study.machine.empty(), notes);
-    for (const std::string& warning : notes.warnings) console_.err << "warning: " << warning << "\n";
+    const std::vector<BatchCase> cases = scanned_cases();
     replace_text(options_.output, manifest_csv(cases));
     console_.out << fmt::format("{}: {} cases\n", options_.output.string(), cases.size());
     return kExitAccepted;
@@ -138,6 +135,10 @@ class Batch {
     if (const auto scanned = options_.output / "manifest.csv";
         (options_.worker || options_.merge || !options_.shard.empty()) && std::filesystem::exists(scanned))
       return read_manifest(scanned);
+    return scanned_cases();
+  }
+
+  std::vector<BatchCase> scanned_cases() const {
     Notes notes;
     std::vector<BatchCase> cases = scan_cases(options_.cases, !options_.each.study.machine.empty(), notes);
     for (const std::string& warning : notes.warnings) console_.err << "warning: " << warning << "\n";

@@ -13,6 +13,7 @@
 #include <set>
 
 #include "geometry/error.h"
+#include "io/csv.h"
 #include "io/session_files.h"
 
 namespace isoshift {
@@ -166,13 +167,6 @@ std::string unreadable_beside(const StudyParts& parts, const StudyFiles& all) {
   return "";
 }
 
-std::string quoted(const std::string& cell) {
-  if (cell.find_first_of(",\"\n") == std::string::npos) return cell;
-  std::string text = "\"";
-  for (const char c : cell) text += c == '"' ? std::string("\"\"") : std::string(1, c);
-  return text + "\"";
-}
-
 std::string joined(const std::vector<fs::path>& paths) {
   std::string text;
   for (const fs::path& path : paths) text += (text.empty() ? "" : std::string(1, kBetweenPaths)) + path.string();
@@ -214,8 +208,9 @@ std::vector<BatchCase> read_manifest(const fs::path& path) {
 std::string manifest_csv(const std::vector<BatchCase>& cases) {
   std::string csv = fmt::format("{}\n", fmt::join(kColumns, ","));
   for (const BatchCase& c : cases)
-    csv += fmt::format("{},{},{},{},{},{},{}\n", c.name, quoted(c.study.string()), quoted(joined(c.ct)),
-                       quoted(c.plan.string()), quoted(c.structures.string()), quoted(joined(c.images)), c.anatomy);
+    csv += fmt::format("{},{},{},{},{},{},{}\n", c.name, csv_quoted(c.study.string()), csv_quoted(joined(c.ct)),
+                       csv_quoted(c.plan.string()), csv_quoted(c.structures.string()), csv_quoted(joined(c.images)),
+                       c.anatomy);
   return csv;
 }
 

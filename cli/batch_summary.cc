@@ -5,15 +5,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
-#include <iterator>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <utility>
 
+#include "io/csv.h"
 #include "io/json_file.h"
 #include "io/output_folder.h"
-#include "io/report/formats.h"
 #include "io/report/line_chart.h"
 #include "io/report/result_folder.h"
 #include "io/report/results_page.h"
@@ -53,13 +51,6 @@ Components shown_components(const SetupReport& report) {
           shown.setup_error_deg[0], shown.setup_error_deg[1], shown.setup_error_deg[2]};
 }
 
-std::string quoted(const std::string& cell) {
-  std::string text = "\"";
-  if (!cell.empty() && std::string_view("=+-@").find(cell.front()) != std::string_view::npos) text += '\'';
-  for (const char c : cell) text += c == '"' ? std::string("\"\"") : std::string(1, c);
-  return text + "\"";
-}
-
 std::string summary_csv(const BatchSummary& summary) {
   std::string csv = fmt::format("case,patient_id,acquired,verdict,action,{},reason,seconds,report\n",
                                 fmt::join(kErrorComponents, ","));
@@ -72,9 +63,9 @@ std::string summary_csv(const BatchSummary& summary) {
       components = fmt::format("{}", fmt::join(texts, ","));
     }
     csv += fmt::format("{},{},{},{},{},{},{},{},{}\n", end.name,
-                       end.report ? quoted(end.report->identity.patient_id) : "", acquired(end), status_of(end),
-                       end.report ? to_string(shown_shift(*end.report).action) : "", components, quoted(reason_of(end)),
-                       end.report ? fmt::format("{:.3f}", end.report->seconds_total) : "",
+                       end.report ? csv_cell(end.report->identity.patient_id) : "", acquired(end), status_of(end),
+                       end.report ? to_string(shown_shift(*end.report).action) : "", components,
+                       csv_cell(reason_of(end)), end.report ? fmt::format("{:.3f}", end.report->seconds_total) : "",
                        end.report ? fmt::format("cases/{}/report.pdf", end.name) : "");
   }
   return csv;
@@ -173,9 +164,7 @@ CaseEnd end_of(const BatchFolder& folder, const std::string& name) {
     end.error = read_json_file(folder.folder_of(name) / kErrorFile).json.value("error", "unknown");
     return end;
   }
-  const std::filesystem::path path = folder.folder_of(name) / kResultFile;
-  std::ifstream file(path, std::ios::binary);
-  end.report = report_from_json({std::istreambuf_iterator<char>(file), {}}, path.string());
+  end.report = read_report(folder.folder_of(name));
   return end;
 }
 

@@ -1,14 +1,12 @@
 #include "cli/setup_report_of.h"
 
-#include <fmt/chrono.h>
 #include <fmt/format.h>
-
-#include <chrono>
 
 #include "cli/view_pictures.h"
 #include "geometry/error.h"
 #include "geometry/mask.h"
 #include "geometry/rotation.h"
+#include "io/local_time.h"
 #include "io/sha256.h"
 #include "io/structure_mask.h"
 #include "io/version.h"
@@ -121,8 +119,7 @@ SetupReport setup_report_of(const Study& study, const RegistrationFlags& flags, 
   const std::vector<MarkedStructure> structures = marked_structures(study, flags.region);
   std::vector<ViewPicture> pictures = view_pictures(study, renderer, structures, result.actual_room_from_patient);
   SetupReport report;
-  report.made_on = fmt::format("{:%Y-%m-%dT%H:%M:%S%z}",
-                               fmt::localtime(std::chrono::system_clock::to_time_t(std::chrono::system_clock::now())));
+  report.made_on = local_time();
   report.version = kVersion;
   report.commit = kCommit;
   for (const MarkedStructure& structure : structures) report.points.push_back(centroid_of(structure, study));

@@ -116,10 +116,7 @@ RtImage read_frame(const std::filesystem::path& path, const DicomItem& d, const 
   for (const DicomItem& plan : d.items(DCM_ReferencedRTPlanSequence))
     image.plan_sop_instance_uid = plan.text(DCM_ReferencedSOPInstanceUID);
   if (const auto number = d.number(DCM_ReferencedBeamNumber)) image.beam_number = static_cast<int>(*number);
-  image.acquisition_date = d.text(DCM_AcquisitionDate);
-  if (!image.acquisition_date) image.acquisition_date = d.text(DCM_ContentDate);
-  image.acquisition_time = d.text(DCM_AcquisitionTime);
-  if (!image.acquisition_time) image.acquisition_time = d.text(DCM_ContentTime);
+  read_acquisition_time(d, image);
   image.frame_offset_s = frame_offset_s(d, frame);
   image.kvp = attributes.number(DCM_KVP);
 
@@ -213,6 +210,13 @@ std::vector<RtImage> read_rt_images(const std::filesystem::path& path, Notes& no
       images.push_back(read_frame(path, dataset, format, frame, std::move(of_frame)));
   }
   return images;
+}
+
+void read_acquisition_time(const DicomItem& dataset, RtImage& image) {
+  image.acquisition_date = dataset.text(DCM_AcquisitionDate);
+  if (!image.acquisition_date) image.acquisition_date = dataset.text(DCM_ContentDate);
+  image.acquisition_time = dataset.text(DCM_AcquisitionTime);
+  if (!image.acquisition_time) image.acquisition_time = dataset.text(DCM_ContentTime);
 }
 
 std::optional<double> acquisition_seconds(const RtImage& image) {

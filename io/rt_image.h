@@ -82,6 +82,9 @@ extern const std::map<std::string, DcmTagKey, std::less<>> kEquipmentAttributes;
 // geometry: it is left out, with a warning.
 std::vector<RtImage> read_rt_images(const std::filesystem::path& path, Notes& notes);
 
+// Date and time of acquisition, else of the content.
+void read_acquisition_time(const DicomItem& dataset, RtImage& image);
+
 // What a person supplies for what the files lack; a value given here replaces a file's too, and that is noted.
 struct RtImageSwitches {
   std::map<std::string, double> gantry_angle_deg;  // by label

@@ -46,7 +46,7 @@ std::vector<SessionFiles> sessions_of(const StudyFiles& files, bool other_xrays)
   for (const StudyFiles::Image& image : images) {
     if (!seen.insert(image.sop_instance_uid).second) continue;
     if (sessions.empty() || !belongs_to(sessions.back(), image))
-      sessions.push_back({.name = "", .patient = image.patient, .at_s = image.at_s, .images = {}});
+      sessions.push_back({.name = "", .patient = image.patient, .images = {}});
     sessions.back().images.push_back(image);
   }
   for (SessionFiles& session : sessions) session.name = name_of(session.images);

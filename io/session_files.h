@@ -1,7 +1,6 @@
 #pragma once
 // Among the files of many patients: which X-rays were taken for one setup, and what else belongs to it.
 
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -14,7 +13,6 @@ namespace isoshift {
 struct SessionFiles {
   std::string name;  // made from its X-rays' SOPInstanceUIDs; says nothing of the patient
   std::string patient;
-  std::optional<double> at_s;  // of the first X-ray, since an epoch
   std::vector<StudyFiles::Image> images;
 };
 

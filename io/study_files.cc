@@ -4,6 +4,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <iterator>
+#include <utility>
 
 #include "geometry/error.h"
 #include "io/dicom_dataset.h"
@@ -19,25 +21,20 @@ std::string first_reference(const DicomItem& dataset, const DcmTagKey& sequence)
   return "";
 }
 
-// The series that a structure set was drawn on (PS3.3 C.8.8.5).
-std::set<std::string> drawn_on(const DicomItem& structures) {
-  std::set<std::string> series_uids;
+// The series that a structure set was drawn on (PS3.3 C.8.8.5), and its images.
+struct DrawnOn {
+  std::set<std::string> series_uids, image_uids;
+};
+DrawnOn drawn_on(const DicomItem& structures) {
+  DrawnOn drawn;
   for (const DicomItem& frame : structures.items(DCM_ReferencedFrameOfReferenceSequence))
     for (const DicomItem& study : frame.items(DCM_RTReferencedStudySequence))
-      for (const DicomItem& series : study.items(DCM_RTReferencedSeriesSequence))
-        if (const auto uid = series.text(DCM_SeriesInstanceUID)) series_uids.insert(*uid);
-  return series_uids;
-}
-
-// The CT images that its contours may lie on (ContourImageSequence of the series).
-std::set<std::string> drawn_on_images(const DicomItem& structures) {
-  std::set<std::string> uids;
-  for (const DicomItem& frame : structures.items(DCM_ReferencedFrameOfReferenceSequence))
-    for (const DicomItem& study : frame.items(DCM_RTReferencedStudySequence))
-      for (const DicomItem& series : study.items(DCM_RTReferencedSeriesSequence))
+      for (const DicomItem& series : study.items(DCM_RTReferencedSeriesSequence)) {
+        if (const auto uid = series.text(DCM_SeriesInstanceUID)) drawn.series_uids.insert(*uid);
         for (const DicomItem& image : series.items(DCM_ContourImageSequence))
-          if (const auto uid = image.text(DCM_ReferencedSOPInstanceUID)) uids.insert(*uid);
-  return uids;
+          if (const auto uid = image.text(DCM_ReferencedSOPInstanceUID)) drawn.image_uids.insert(*uid);
+      }
+  return drawn;
 }
 
 // The frames of reference of the structures: every one has its own (PS3.3 C.8.8.5).
@@ -54,13 +51,8 @@ std::string patient_of(const DicomItem& dataset) {
 }
 
 StudyFiles::Image xray(const fs::path& path, const DicomItem& dataset) {
-  const auto first_of = [&](const DcmTagKey& tag, const DcmTagKey& other) {
-    auto text = dataset.text(tag);
-    return text ? text : dataset.text(other);
-  };
   RtImage timed;
-  timed.acquisition_date = first_of(DCM_AcquisitionDate, DCM_ContentDate);
-  timed.acquisition_time = first_of(DCM_AcquisitionTime, DCM_ContentTime);
+  read_acquisition_time(dataset, timed);
   return {.file = path,
           .patient = patient_of(dataset),
           .sop_instance_uid = dataset.required_text(DCM_SOPInstanceUID),
@@ -303,16 +295,36 @@ void add_file(const fs::path& path, StudyFiles& files) {
                            .frame_of_reference_uid = dataset.text(DCM_FrameOfReferenceUID).value_or(""),
                            .structure_set_uid = first_reference(dataset, DCM_ReferencedStructureSetSequence)});
   } else if (sop_class == UID_RTStructureSetStorage) {
+    DrawnOn drawn = drawn_on(dataset);
     files.structures.push_back({.file = path,
                                 .patient = patient_of(dataset),
                                 .sop_instance_uid = dataset.required_text(DCM_SOPInstanceUID),
-                                .ct_series_uids = drawn_on(dataset),
-                                .ct_sop_instance_uids = drawn_on_images(dataset),
+                                .ct_series_uids = std::move(drawn.series_uids),
+                                .ct_sop_instance_uids = std::move(drawn.image_uids),
                                 .frame_of_reference_uids = drawn_in(dataset)});
   } else {
     files.left_aside.push_back(
         fmt::format("{}: {}", path.string(), dcmFindNameOfUID(sop_class.c_str(), "an object of unknown class")));
   }
+}
+
+void merge(StudyFiles from, StudyFiles& files) {
+  for (StudyFiles::Ct& ct : from.cts) {
+    const auto same = std::ranges::find(files.cts, ct.series_instance_uid, &StudyFiles::Ct::series_instance_uid);
+    if (same == files.cts.end()) {
+      files.cts.push_back(std::move(ct));
+      continue;
+    }
+    std::ranges::move(ct.files, std::back_inserter(same->files));
+    same->sop_instance_uids.merge(ct.sop_instance_uids);
+  }
+  const auto append = [&](auto member) { std::ranges::move(from.*member, std::back_inserter(files.*member)); };
+  append(&StudyFiles::plans);
+  append(&StudyFiles::images);
+  append(&StudyFiles::other_xrays);
+  append(&StudyFiles::structures);
+  append(&StudyFiles::left_aside);
+  append(&StudyFiles::unreadable);
 }
 
 StudyFiles scan_study(const std::vector<fs::path>& paths) {

@@ -65,6 +65,9 @@ StudyFiles scan_study(const std::vector<std::filesystem::path>& paths);
 // Adds one file to those scanned. Throws Error for one that cannot be read.
 void add_file(const std::filesystem::path& path, StudyFiles& files);
 
+// Adds what was scanned elsewhere.
+void merge(StudyFiles from, StudyFiles& files);
+
 // The parts of one registration.
 struct StudyParts {
   std::vector<std::filesystem::path> ct;

@@ -3,21 +3,12 @@
 
 #include <vector>
 
+#include "io/csv.h"
 #include "io/report/canvas.h"
 #include "io/report/formats.h"
 
 namespace isoshift {
 namespace {
-
-// A text as a cell: quoted where RFC 4180 asks for it, and no formula for a spreadsheet.
-std::string cell(std::string text) {
-  if (!text.empty() && std::string_view("=+-@\t\r").find(text.front()) != std::string_view::npos)
-    text.insert(text.begin(), '\'');
-  if (text.find_first_of(",\"\r\n") == std::string::npos) return text;
-  std::string quoted = "\"";
-  for (const char c : text) quoted += c == '"' ? std::string("\"\"") : std::string(1, c);
-  return quoted + "\"";
-}
 
 // A number as every program reads it: without the plus sign; empty where there is none.
 std::string number(const Quantity& quantity) {
@@ -39,18 +30,18 @@ std::string csv_report(const SetupReport& report) {
     names.push_back(std::move(name));
     cells.push_back(std::move(value));
   };
-  add("made_on", cell(report.made_on));
-  add("patient_id", cell(printable(report.identity.patient_id)));
-  add("patient_name", cell(name_for_people(report.identity.patient_name)));
-  add("plan", cell(printable(report.plan_label)));
-  add("plan_uid", cell(report.plan_uid));
+  add("made_on", csv_cell(report.made_on));
+  add("patient_id", csv_cell(printable(report.identity.patient_id)));
+  add("patient_name", csv_cell(name_for_people(report.identity.patient_name)));
+  add("plan", csv_cell(printable(report.plan_label)));
+  add("plan_uid", csv_cell(report.plan_uid));
   std::vector<std::string> views;
   for (const SetupReport::View& view : report.views) views.push_back(printable(view.label));
-  add("views", cell(joined(views)));
+  add("views", csv_cell(joined(views)));
   add("verdict", std::string(to_string(page.verdict)));
-  add("reasons", cell(joined(page.reasons)));
+  add("reasons", csv_cell(joined(page.reasons)));
   add("action", std::string(to_string(page.action)));
-  add("action_reasons", cell(joined(page.action_reasons)));
+  add("action_reasons", csv_cell(joined(page.action_reasons)));
   const auto add_numbers = [&](const std::vector<Quantity>& quantities, const std::vector<std::string>& columns) {
     for (std::size_t n = 0; n < columns.size(); ++n) {
       add(columns[n], n < quantities.size() ? number(quantities[n]) : "");
@@ -63,7 +54,7 @@ std::string csv_report(const SetupReport& report) {
                                  "error_about_z_deg"});
   add("overrides", fmt::format("{}", page.overrides.size()));
   add("warnings", fmt::format("{}", page.warnings.size()));
-  add("spatial_registration_uid", cell(report.spatial_registration_uid));
+  add("spatial_registration_uid", csv_cell(report.spatial_registration_uid));
   return fmt::format("{}\r\n{}\r\n", fmt::join(names, ","), fmt::join(cells, ","));
 }
 

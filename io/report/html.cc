@@ -27,4 +27,9 @@ std::string data_uri(std::string_view type, std::string_view bytes) {
   return fmt::format("data:{};base64,{}", type, base64);
 }
 
+void fill(std::string& html, std::string_view placeholder, const std::string& by) {
+  for (std::size_t at = html.find(placeholder); at != std::string::npos; at = html.find(placeholder, at + by.size()))
+    html.replace(at, placeholder.size(), by);
+}
+
 }  // namespace isoshift

@@ -144,11 +144,6 @@ std::string details(const SetupReport& report, const ReportPage& page) {
   return html;
 }
 
-void replace(std::string& html, std::string_view placeholder, const std::string& by) {
-  for (std::size_t at = html.find(placeholder); at != std::string::npos; at = html.find(placeholder, at + by.size()))
-    html.replace(at, placeholder.size(), by);
-}
-
 }  // namespace
 
 std::string html_report(const SetupReport& report, const ReportPage& page) {
@@ -164,24 +159,24 @@ std::string html_report(const SetupReport& report, const ReportPage& page) {
 
   // All text is escaped: none of it can look like a placeholder.
   std::string html = kPageHtml;
-  replace(html, "<!--DISCLAIMER-->", html_escaped(page.disclaimer));
-  replace(html, "<!--TITLE-->", html_escaped(page.title));
-  replace(html, "<!--PROGRAM-->", html_escaped(page.program));
-  replace(html, "<!--VERDICT_CLASS-->", std::string(to_string(page.verdict)));
-  replace(html, "<!--COUCH_DRAWING-->",
-          svg_image(260, 180, "The couch, its axes and the way it has to move",
-                    [&](Canvas& canvas) { draw_couch(canvas, 0, 0, 260, 180, report, page); }));
-  replace(html, "<!--CONVENTIONS-->", conventions);
-  replace(html, "<!--COUCH-->", couch(page));
-  replace(html, "<!--NUMBERS-->", numbers(page));
-  replace(html, "<!--VIEW_DATA-->", in_script(data));
-  replace(html, "<!--VERDICT-->", html_escaped(page.verdict_words));
-  replace(html, "<!--REASONS-->", list(page.reasons));
-  replace(html, "<!--ACTION-->", html_escaped(page.action_words) + list(page.action_reasons));
-  replace(html, "<!--DETAILS-->", details(report, page));
-  replace(html, "<!--NOTES-->", notes);
-  replace(html, "<!--VIEWS-->", views);
-  replace(html, "<!--WHO-->", rows(page.who));
+  fill(html, "<!--DISCLAIMER-->", html_escaped(page.disclaimer));
+  fill(html, "<!--TITLE-->", html_escaped(page.title));
+  fill(html, "<!--PROGRAM-->", html_escaped(page.program));
+  fill(html, "<!--VERDICT_CLASS-->", std::string(to_string(page.verdict)));
+  fill(html, "<!--COUCH_DRAWING-->",
+       svg_image(260, 180, "The couch, its axes and the way it has to move",
+                 [&](Canvas& canvas) { draw_couch(canvas, 0, 0, 260, 180, report, page); }));
+  fill(html, "<!--CONVENTIONS-->", conventions);
+  fill(html, "<!--COUCH-->", couch(page));
+  fill(html, "<!--NUMBERS-->", numbers(page));
+  fill(html, "<!--VIEW_DATA-->", in_script(data));
+  fill(html, "<!--VERDICT-->", html_escaped(page.verdict_words));
+  fill(html, "<!--REASONS-->", list(page.reasons));
+  fill(html, "<!--ACTION-->", html_escaped(page.action_words) + list(page.action_reasons));
+  fill(html, "<!--DETAILS-->", details(report, page));
+  fill(html, "<!--NOTES-->", notes);
+  fill(html, "<!--VIEWS-->", views);
+  fill(html, "<!--WHO-->", rows(page.who));
   return html;
 }
 

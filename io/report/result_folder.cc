@@ -64,12 +64,16 @@ void write_result(const SetupReport& report, const std::filesystem::path& folder
   }
 }
 
-SetupReport read_result(const std::filesystem::path& folder) {
+SetupReport read_report(const std::filesystem::path& folder) {
   const std::filesystem::path path = folder / kResultFile;
   std::ifstream file(path, std::ios::binary);
   const std::string json{std::istreambuf_iterator<char>(file), {}};
   if (!file) throw Error(fmt::format("{}: cannot be read: this is no folder of a result", path.string()));
-  SetupReport report = report_from_json(json, path.string());
+  return report_from_json(json, path.string());
+}
+
+SetupReport read_result(const std::filesystem::path& folder) {
+  SetupReport report = read_report(folder);
   for (std::size_t n = 0; n < report.views.size(); ++n) {
     ViewPicture& picture = report.views[n].picture;
     for (const auto& [name, member] : kPictures) picture.*member = read_gray_png(picture_path(folder, n, name));

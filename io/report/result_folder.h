@@ -13,7 +13,10 @@ inline constexpr const char* kRegistrationFile = "spatial_registration.dcm";
 // Writes result.json, report.txt, report.csv, report.pdf, report.html, report.dcm, and pictures per view.
 void write_result(const SetupReport& report, const std::filesystem::path& folder);
 
-// Throws Error naming the file that is missing or is none of a result.
+// Its numbers, without pictures. Throws Error naming the file that is missing or is none of a result.
+SetupReport read_report(const std::filesystem::path& folder);
+
+// The same with pictures. Throws Error naming the file that is missing or is none of a result.
 SetupReport read_result(const std::filesystem::path& folder);
 
 }  // namespace isoshift

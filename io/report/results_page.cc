@@ -15,17 +15,16 @@ std::string cell_html(const ResultsPage::Cell& cell) {
   return fmt::format("<td{}><a href=\"{}\">{}</a></td>", sorted_by, html_escaped(cell.link), text);
 }
 
-std::string replaced(std::string text, std::string_view what, const std::string& with) {
-  return text.replace(text.find(what), what.size(), with);
-}
-
 }  // namespace
 
 std::string results_html(const ResultsPage& page) {
-  std::string summary, charts, columns, rows;
+  std::string summary, charts, pages, columns, rows;
   for (const std::string& line : page.summary) summary += "<p>" + html_escaped(line) + "</p>\n";
   for (const std::string& svg : page.charts_svg)
     charts += fmt::format("<figure><img alt=\"\" src=\"{}\"></figure>\n", data_uri("image/svg+xml", svg));
+  for (const ResultsPage::Cell& other : page.pages)
+    pages += fmt::format("<a href=\"{}\">{}</a>\n", html_escaped(other.link), html_escaped(other.text));
+  if (!pages.empty()) pages = "<nav>Other pages: " + pages + "</nav>\n";
   for (const std::string& column : page.columns)
     columns += "<th><button type=\"button\">" + html_escaped(column) + "</button></th>";
   for (const ResultsPage::Row& row : page.rows) {
@@ -34,15 +33,15 @@ std::string results_html(const ResultsPage& page) {
     rows += "</tr>\n";
   }
   std::string html = kResultsHtml;
-  html =
-      replaced(std::move(html), "%REFRESH%",
-               page.refresh_s > 0 ? fmt::format("<meta http-equiv=\"refresh\" content=\"{}\">", page.refresh_s) : "");
-  html = replaced(std::move(html), "%TITLE%", html_escaped(page.title));
-  html = replaced(std::move(html), "%HEADING%", html_escaped(page.title));
-  html = replaced(std::move(html), "%COLUMNS%", columns);
-  html = replaced(std::move(html), "%SUMMARY%", summary);
-  html = replaced(std::move(html), "%CHARTS%", charts);
-  return replaced(std::move(html), "%ROWS%", rows);
+  fill(html, "<!--REFRESH-->",
+       page.refresh_s > 0 ? fmt::format("<meta http-equiv=\"refresh\" content=\"{}\">", page.refresh_s) : "");
+  fill(html, "<!--TITLE-->", html_escaped(page.title));
+  fill(html, "<!--COLUMNS-->", columns);
+  fill(html, "<!--SUMMARY-->", summary);
+  fill(html, "<!--CHARTS-->", charts);
+  fill(html, "<!--PAGES-->", pages);
+  fill(html, "<!--ROWS-->", rows);
+  return html;
 }
 
 }  // namespace isoshift

@@ -24,7 +24,8 @@ struct ResultsPage {
   std::vector<std::string> charts_svg;  // below them
   std::vector<std::string> columns;
   std::vector<Row> rows;
-  int refresh_s = 0;  // reload after so long; 0: never
+  std::vector<Cell> pages;  // others like this one
+  int refresh_s = 0;        // reload after so long; 0: never
 };
 
 std::string results_html(const ResultsPage& page);
