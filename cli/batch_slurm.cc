@@ -13,6 +13,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
+constexpr std::chrono::minutes kLongestSubmission(5);
+
 // A word as a POSIX shell takes it.
 std::string quoted(const std::string& word) {
   std::string text = "'";
@@ -23,7 +25,8 @@ std::string quoted(const std::string& word) {
 // What sbatch answers. Throws Error where it refuses.
 std::string submitted(std::vector<std::string> words) {
   words.insert(words.begin(), {"sbatch", "--parsable"});
-  const ChildEnd end = run_child(std::move(words));
+  const ChildEnd end = run_child(std::move(words), kLongestSubmission);
+  if (end.is_late) throw Error(fmt::format("sbatch: did not end within {} minutes", kLongestSubmission.count()));
   if (end.status != 0) throw Error(fmt::format("sbatch: {}", end.output.empty() ? "failed" : end.output));
   return end.output.substr(0, end.output.find(';'));  // before a cluster's name
 }

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 #include <poll.h>
 #include <signal.h>
-#include <spawn.h>
 #include <sys/prctl.h>
 #include <sys/socket.h>
 #include <sys/wait.h>
@@ -11,6 +10,7 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <chrono>
 #include <cstring>
 #include <iostream>
 #include <list>
@@ -24,6 +24,8 @@
 namespace isoshift {
 namespace {
 
+using Clock = std::chrono::steady_clock;
+
 constexpr char kStop = '!';  // begins a line that says why no case can be registered any more
 
 // A child on the other end of a socket that is its standard input and output.
@@ -34,23 +36,16 @@ class Worker {
     if (::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends) != 0)
       throw Error(fmt::format("no worker can be started: {}", std::strerror(errno)));
     socket_ = ends[0];
-    posix_spawn_file_actions_t actions;
-    posix_spawn_file_actions_init(&actions);
-    posix_spawn_file_actions_adddup2(&actions, ends[1], STDIN_FILENO);
-    posix_spawn_file_actions_adddup2(&actions, ends[1], STDOUT_FILENO);
     std::vector<std::string> words = {"isoshift"};
     words.insert(words.end(), arguments.begin(), arguments.end());
-    std::vector<char*> argv;
-    argv.reserve(words.size() + 1);
-    for (std::string& word : words) argv.push_back(word.data());
-    argv.push_back(nullptr);
-    const int failed = ::posix_spawn(&process_, this_program().c_str(), &actions, nullptr, argv.data(), environ);
-    posix_spawn_file_actions_destroy(&actions);
-    ::close(ends[1]);
-    if (failed != 0) {
-      ::close(socket_);
-      throw Error(fmt::format("no worker can be started: {}", std::strerror(failed)));
+    try {
+      process_ = start_child(this_program(), std::move(words), {.in = ends[1], .out = ends[1], .err = -1});
+    } catch (const Error&) {
+      ::close(ends[0]);
+      ::close(ends[1]);
+      throw;
     }
+    ::close(ends[1]);
   }
   ~Worker() {
     ::close(socket_);
@@ -69,6 +64,7 @@ class Worker {
     const std::string line = job.name + "\n";
     last_ct_ = job.ct_key;
     job_ = std::move(job);
+    deadline_ = Clock::now() + kLongestRegistration;
     ::send(socket_, line.data(), line.size(), MSG_NOSIGNAL);  // one that died is found when it is read from
   }
 
@@ -87,6 +83,12 @@ class Worker {
   }
   bool is_ready() const { return is_ready_; }
 
+  void kill_if_late() {
+    if (!job_ || is_late_ || Clock::now() < deadline_) return;
+    is_late_ = true;
+    ::kill(process_, SIGKILL);
+  }
+
   // Of one that has died.
   struct Death {
     std::string why;
@@ -95,6 +97,7 @@ class Worker {
   Death death() {
     int status = 0;
     ::waitpid(std::exchange(process_, 0), &status, 0);
+    if (is_late_) return {fmt::format("it did not end within {} minutes", kLongestRegistration.count()), false};
     if (WIFSIGNALED(status))
       return {fmt::format("the program was ended by signal {} ({})", WTERMSIG(status), ::strsignal(WTERMSIG(status))),
               WTERMSIG(status) == SIGKILL || WTERMSIG(status) == SIGTERM};
@@ -107,6 +110,8 @@ class Worker {
   bool is_ready_ = false;
   std::string heard_;
   std::optional<BatchJob> job_;
+  Clock::time_point deadline_;  // of its job
+  bool is_late_ = false;
   std::string last_ct_;
 };
 
@@ -149,6 +154,7 @@ void run_in_workers(std::vector<BatchJob> all, int count, const std::vector<std:
     auto event = polled.begin();
     for (auto worker = workers.begin(); worker != workers.end(); ++event) {
       const auto now = worker++;
+      (*now)->kill_if_late();
       if (event->revents == 0) continue;
       const std::optional<BatchJob> job = (*now)->job();
       const bool is_alive = (*now)->hear();

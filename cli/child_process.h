@@ -1,6 +1,9 @@
 #pragma once
 // Another program, run to its end.
 
+#include <sys/types.h>
+
+#include <chrono>
 #include <filesystem>
 #include <string>
 #include <vector>
@@ -11,12 +14,25 @@ namespace isoshift {
 const std::filesystem::path& this_program();
 void use_program(std::filesystem::path program);
 
+// What a registration may take: one that hangs holds up no other for longer.
+inline constexpr std::chrono::minutes kLongestRegistration(30);
+
+// Descriptors that become a child's standard streams; -1: those of this process.
+struct ChildStreams {
+  int in = -1, out = -1, err = -1;
+};
+
+// Starts a program, searched for in PATH. The first word is what it is told that its name is. Throws Error where it
+// cannot be run.
+pid_t start_child(const std::string& program, std::vector<std::string> words, const ChildStreams& streams);
+
 struct ChildEnd {
-  int status = 0;      // exit status; 128 and the signal for one that a signal ended
-  std::string output;  // what it printed, errors too, without the last line's end
+  int status = 0;        // exit status; 128 and the signal for one that a signal ended
+  std::string output;    // what it printed, errors too, without the last line's end
+  bool is_late = false;  // it was killed, since it did not end
 };
 
 // The first word is the program, searched for in PATH. Throws Error where it cannot be run.
-ChildEnd run_child(std::vector<std::string> words);
+ChildEnd run_child(std::vector<std::string> words, std::chrono::milliseconds limit);
 
 }  // namespace isoshift

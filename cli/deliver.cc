@@ -10,10 +10,9 @@
 
 namespace isoshift {
 
-bool Deliverer::deliver(Console& console) {
+void Deliverer::deliver(Console& console) {
   constexpr std::chrono::seconds kFirstPause(2), kLongestPause(300);
   const auto now = std::chrono::steady_clock::now();
-  bool has_sent = false;
   std::set<std::string> failing;  // in this round: the next of its objects has its turn in the next one
   for (const Delivery& delivery : tree_.pending()) {
     const auto peer = std::ranges::find(watch_.peers, delivery.peer, &DicomPeer::name);
@@ -24,11 +23,13 @@ bool Deliverer::deliver(Console& console) {
       if (peer == watch_.peers.end())
         throw Error(fmt::format("peer {}: the watch file does not name it", delivery.peer));
       const std::filesystem::path file = tree_.checked_file(delivery);
+      const bool may_be_there = tree_.is_in_doubt(delivery);
       tree_.prepare_to_send(delivery);
-      tree_.mark_sent(delivery, send_object(file, *peer));
-      console.err << fmt::format("session {}: {} sent to {}\n", delivery.session, delivery.object.file, delivery.peer);
+      const std::string answer = send_object(file, *peer, may_be_there);
+      tree_.mark_sent(delivery, answer);
+      console.err << fmt::format("session {}: {} sent to {}{}\n", delivery.session, delivery.object.file, delivery.peer,
+                                 answer.empty() ? "" : ": " + answer);
       pauses_.erase(key);
-      has_sent = true;
     } catch (const std::exception& error) {
       failing.insert(delivery.peer);
       pause.length = std::clamp(2 * pause.length, kFirstPause, kLongestPause);
@@ -37,7 +38,6 @@ bool Deliverer::deliver(Console& console) {
                                  delivery.object.file, pause.length.count(), error.what());
     }
   }
-  return has_sent;
 }
 
 }  // namespace isoshift

@@ -16,8 +16,8 @@ class Deliverer {
  public:
   Deliverer(const ResultsTree& tree, const WatchFile& watch) : tree_(tree), watch_(watch) {}
 
-  // Tries all that is due. True: something was sent. Only for whoever holds the lock of the tree.
-  bool deliver(Console& console);
+  // Tries all that is due. Only for whoever holds the lock of the tree.
+  void deliver(Console& console);
 
  private:
   struct Pause {

@@ -1,16 +1,13 @@
 // isoshift watch: registers what comes into a treatment room, and holds the results until they are released.
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
-#include <sys/stat.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <chrono>
-#include <fstream>
 #include <iterator>
 #include <map>
 #include <memory>
+#include <set>
 #include <thread>
 
 #include "cli/child_process.h"
@@ -19,20 +16,17 @@
 #include "cli/graceful_end.h"
 #include "cli/inbox.h"
 #include "cli/register_command.h"
+#include "cli/session_index.h"
 #include "geometry/error.h"
-#include "io/file_lock.h"
-#include "io/output_folder.h"
-#include "io/report/formats.h"
 #include "io/report/result_folder.h"
-#include "io/report/results_page.h"
 #include "io/results_tree.h"
+#include "io/session_files.h"
 #include "io/watch_file.h"
 
 namespace isoshift {
 namespace {
 
 using Clock = std::chrono::steady_clock;
-constexpr const char* kLockFile = ".watch.lock";
 
 // Flags of isoshift register that a watch file names must be some, and none of those that watch sets itself.
 RegisterOptions checked_registration_flags(const WatchFile& watch) {
@@ -60,15 +54,16 @@ class Watch {
         tree_(watch.results),
         inbox_(watch, watch.results / "objects"),
         deliverer_(tree_, watch),
+        index_(tree_, watch.site.name),
         takes_other_xrays_(takes_other_xrays) {}
 
   void run() {
-    const auto lock = FileLock::try_take(tree_.path() / kLockFile);
+    const auto lock = tree_.try_lock();
     if (!lock) throw Error(fmt::format("{}: another isoshift watch is working here", tree_.path().string()));
     const GracefulEnd end;
     tree_.clean();
     for (const std::string& name : tree_.sessions()) take_result(name);
-    tree_.audit("started", {{"sessions", results_.size()}});
+    tree_.audit("started", {{"sessions", index_.size()}});
     console_.err << fmt::format("watching {}; results in {}\n",
                                 watch_.orthanc ? watch_.orthanc->url : watch_.folder.string(), tree_.path().string());
     while (!end.is_asked_for()) {
@@ -77,26 +72,21 @@ class Watch {
       attempt("registering", [&] { register_complete(end); });
       attempt("releasing", [&] { release_automatically(); });
       attempt("sending", [&] { deliverer_.deliver(console_); });
-      attempt("writing the index", [&] { write_index(); });
+      attempt("writing the index", [&] { index_.update(waiting_); });
       std::this_thread::sleep_for(std::chrono::milliseconds(500));
     }
     tree_.audit("stopped", nlohmann::ordered_json::object());
   }
 
  private:
-  // What is not registered yet, and why.
-  struct Waiting {
-    SessionFiles session;
-    std::string why;
-    bool failed = false;
-  };
   struct Failure {
     std::string why;
     Clock::time_point at;
-    std::optional<Clock::time_point> news;  // of the patient, when it failed
+    Clock::time_point news;  // of the patient, when it failed
     std::chrono::seconds pause{0};
   };
   static constexpr std::chrono::seconds kFirstPause{30}, kLongestPause{600};
+  static constexpr std::chrono::days kKeptFor{60};  // objects of a patient of whom nothing comes any more
 
   // Nothing that fails now ends the watch: a full disk, a server that is down. Each kind of trouble is said once.
   bool attempt(const std::string& what, const std::function<void()>& work) {
@@ -115,45 +105,54 @@ class Watch {
     Notes notes;
     inbox_.update(notes);
     for (const std::string& warning : notes.warnings) console_.err << "warning: " << warning << "\n";
+    if (Clock::now() < next_forgetting_) return;
+    inbox_.forget_before(std::filesystem::file_time_type::clock::now() - kKeptFor);
+    next_forgetting_ = Clock::now() + std::chrono::days(1);
   }
 
-  void take_result(const std::string& name) {
-    const std::filesystem::path path = tree_.session(name) / kResultFile;
-    std::ifstream file(path, std::ios::binary);
-    SetupReport report = report_from_json({std::istreambuf_iterator<char>(file), {}}, path.string());
+  Verdict take_result(const std::string& name) {
+    const SetupReport report = read_report(tree_.session(name));
     for (const SetupReport::View& view : report.views) registered_.insert(view.sop_instance_uid);
-    results_.insert_or_assign(name, std::move(report));
+    index_.add(name, report);
+    if (watch_.site.automatic_release && report.verdict == Verdict::kAccepted) accepted_.insert(name);
+    return report.verdict;
   }
 
   void register_complete(const GracefulEnd& end) {
-    StudyFiles files = inbox_.files();
-    const auto is_done = [&](const auto& image) { return registered_.contains(image.sop_instance_uid); };
-    std::erase_if(files.images, is_done);
-    std::erase_if(files.other_xrays, is_done);
     waiting_.clear();
+    std::set<std::string> found;
     bool has_retried = false;  // what has failed before does not hold up what is new
-    for (SessionFiles& session : sessions_of(files, takes_other_xrays_)) {
-      if (end.is_asked_for()) return;
-      const StudyFiles own = files_for(session, files);
-      const bool has_failed = failures_.contains(session.name);
-      std::string why = reason_to_wait(session, own);
-      if (why.empty() && has_failed && std::exchange(has_retried, true)) why = failures_.at(session.name).why;
-      if (why.empty()) why = registered(session, own);
-      if (why.empty()) continue;
-      const bool failed = failures_.contains(session.name);
-      waiting_.push_back({std::move(session), std::move(why), failed});
+    for (const auto& [name, patient] : inbox_.patients()) {
+      StudyFiles xrays;
+      const auto is_new = [&](const auto& image) { return !registered_.contains(image.sop_instance_uid); };
+      std::ranges::copy_if(patient.files.images, std::back_inserter(xrays.images), is_new);
+      std::ranges::copy_if(patient.files.other_xrays, std::back_inserter(xrays.other_xrays), is_new);
+      for (const SessionFiles& session : sessions_of(xrays, takes_other_xrays_)) {
+        if (end.is_asked_for()) return;
+        found.insert(session.name);
+        const StudyFiles own = files_for(session, patient.files);
+        const bool has_failed = failures_.contains(session.name);
+        std::string why = reason_to_wait(session, own, patient.last);
+        if (why.empty() && has_failed && std::exchange(has_retried, true)) why = failures_.at(session.name).why;
+        if (why.empty()) why = registered(session, own, patient.last);
+        if (!why.empty())
+          waiting_.push_back({session.name, session.patient, std::move(why), failures_.contains(session.name)});
+      }
     }
+    std::erase_if(failures_, [&](const auto& failure) { return !found.contains(failure.first); });
   }
 
   // Empty: it can be registered now.
-  std::string reason_to_wait(const SessionFiles& session, const StudyFiles& own) const {
+  std::string reason_to_wait(const SessionFiles& session, const StudyFiles& own, Clock::time_point last) {
     const SiteFile::Sessions& rule = *watch_.site.sessions;
     if (static_cast<int>(session.images.size()) < rule.views)
       return fmt::format("{} of {} X-rays", session.images.size(), rule.views);
-    if (const auto missing = missing_parts(own); !missing.empty()) return "waits for " + missing.front();
-    const auto last = inbox_.last_of(session.patient);
-    if (!inbox_.is_settled() || Clock::now() - std::max(last.value_or(steady_since_), steady_since_) <
-                                    std::chrono::duration<double>(rule.quiet_s))
+    if (const auto missing = missing_parts(own); !missing.empty()) {
+      inbox_.ask_for_rest(session.patient);
+      return "waits for " + missing.front();
+    }
+    if (!inbox_.is_settled() ||
+        Clock::now() - std::max(last, steady_since_) < std::chrono::duration<double>(rule.quiet_s))
       return "more may come";
     const auto failure = failures_.find(session.name);
     if (failure == failures_.end()) return "";
@@ -162,7 +161,7 @@ class Watch {
   }
 
   // Registers in a process of its own, whatever it meets there. Returns why there is no result.
-  std::string registered(const SessionFiles& session, const StudyFiles& own) {
+  std::string registered(const SessionFiles& session, const StudyFiles& own, Clock::time_point last) {
     std::string why;
     const auto has_result = [&] { return std::filesystem::exists(tree_.session(session.name) / kResultFile); };
     try {
@@ -176,8 +175,10 @@ class Watch {
       words.insert(words.end(),
                    {"--site", watch_.site.path.string(), "--output", tree_.session(session.name).string()});
       words.insert(words.end(), watch_.registration.begin(), watch_.registration.end());
-      const ChildEnd end = run_child(std::move(words));
-      if (!has_result() && end.status == kExitFailed)
+      const ChildEnd end = run_child(std::move(words), kLongestRegistration);
+      if (end.is_late)
+        why = fmt::format("the registration did not end within {} minutes", kLongestRegistration.count());
+      else if (!has_result() && end.status == kExitFailed)
         why = end.output.substr(std::min(end.output.size(), end.output.rfind("error: ")));
       else if (!has_result())
         why = fmt::format("the registration ended with status {} and left no result", end.status);
@@ -189,7 +190,7 @@ class Watch {
       const bool is_new = std::exchange(failure.why, why) != why;
       failure.pause = is_new ? kFirstPause : std::min(2 * failure.pause, kLongestPause);
       failure.at = Clock::now();
-      failure.news = inbox_.last_of(session.patient);
+      failure.news = last;
       if (is_new) {
         console_.err << fmt::format("session {}: {}\n", session.name, why);
         tree_.audit("failed", {{"session", session.name}});
@@ -197,110 +198,39 @@ class Watch {
       return why;
     }
     failures_.erase(session.name);
-    take_result(session.name);
-    const std::string verdict(to_string(results_.at(session.name).verdict));
+    const std::string verdict(to_string(take_result(session.name)));
     console_.err << fmt::format("session {}: {}\n", session.name, verdict);
     tree_.audit("registered", {{"session", session.name}, {"verdict", verdict}});
     return "";
   }
 
   void release_automatically() {
-    if (!watch_.site.automatic_release) return;
-    for (const auto& [name, report] : results_)
-      if (report.verdict == Verdict::kAccepted && !tree_.release_of(name))
-        tree_.release(name,
+    while (!accepted_.empty()) {
+      const std::string& session = *accepted_.begin();
+      if (!tree_.is_released(session))
+        tree_.release(session,
                       fmt::format("automatic, allowed by {} on {}", watch_.site.automatic_release->by,
                                   watch_.site.automatic_release->on),
-                      names_of_peers(watch_));
+                      watch_.names_of_peers());
+      accepted_.erase(accepted_.begin());
+    }
   }
 
-  std::string status_of(const std::string& name, const std::vector<Delivery>& pending) const {
-    const auto release = tree_.release_of(name);
-    if (!release) return results_.at(name).verdict == Verdict::kRejected ? "rejected" : "held";
-    const auto left = std::ranges::count(pending, name, &Delivery::session);
-    return fmt::format("released by {} on {}{}", release->by, release->on,
-                       left > 0 ? fmt::format("; {} to be sent", left) : "; sent");
-  }
-
-  void write_index() {
-    const std::vector<Delivery> pending = tree_.pending();
-    ResultsPage page{.title = fmt::format("isoshift: sessions of {}", watch_.site.name), .refresh_s = 10};
-    page.columns = {"Session", "Patient", "Acquired", "Verdict", "Action", "State"};
-    for (const Waiting& waiting : waiting_)
-      page.rows.push_back({.verdict = waiting.failed ? "failed" : "waiting",
-                           .cells = {{.text = waiting.session.name},
-                                     {.text = waiting.session.patient.substr(0, waiting.session.patient.find('\\'))},
-                                     {.text = ""},
-                                     {.text = waiting.failed ? "failed" : "waiting"},
-                                     {.text = ""},
-                                     {.text = waiting.why}}});
-    std::vector<std::pair<std::string, const SetupReport*>> newest;
-    for (const auto& [name, report] : results_) newest.emplace_back(name, &report);
-    std::ranges::stable_sort(newest, std::ranges::greater(),
-                             [](const auto& one) { return one.second->views.front().acquired; });
-    for (const auto& [name, report] : newest)
-      page.rows.push_back(
-          {.verdict = std::string(to_string(report->verdict)),
-           .cells = {{.text = name, .link = "sessions/" + name + "/report.html"},
-                     {.text = fmt::format("{} ({})", report->identity.patient_name, report->identity.patient_id)},
-                     {.text = report->views.front().acquired},
-                     {.text = std::string(to_string(report->verdict))},
-                     {.text = std::string(to_string(shown_shift(*report).action))},
-                     {.text = status_of(name, pending)}}});
-    page.summary = {
-        fmt::format("{} sessions registered, {} waiting. Nothing is sent before somebody releases it: isoshift "
-                    "release SESSION --by NAME",
-                    results_.size(), waiting_.size())};
-    std::string html = results_html(page);
-    if (html == index_) return;
-    replace_text(tree_.path() / "index.html", html);
-    index_ = std::move(html);
-  }
-
- public:
-  static std::vector<std::string> names_of_peers(const WatchFile& watch) {
-    std::vector<std::string> names;
-    for (const DicomPeer& peer : watch.peers) names.push_back(peer.name);
-    return names;
-  }
-
- private:
   const WatchFile& watch_;
   Console& console_;
   ResultsTree tree_;
   Inbox inbox_;
   Deliverer deliverer_;
-  std::map<std::string, SetupReport> results_;  // by session, without pictures
-  std::set<std::string> registered_;            // SOPInstanceUIDs of their X-rays
-  std::vector<Waiting> waiting_;
-  std::map<std::string, Failure> failures_;
+  SessionIndex index_;
+  std::set<std::string> registered_;  // SOPInstanceUIDs of X-rays that have a result
+  std::set<std::string> accepted_;    // sessions to be released without a person
+  std::vector<WaitingSession> waiting_;
+  std::map<std::string, Failure> failures_;  // by session
   std::map<std::string, std::string> troubles_;
-  std::string index_;
   Clock::time_point steady_since_ = Clock::now();  // everything that came has been seen
-  bool takes_other_xrays_;                         // a machine profile supplies their geometry
+  Clock::time_point next_forgetting_ = Clock::now();
+  bool takes_other_xrays_;  // a machine profile supplies their geometry
 };
-
-void run_release(const std::filesystem::path& file, const std::string& session, const std::string& by,
-                 Console& console) {
-  if (by.find_first_not_of(' ') == std::string::npos) throw UsageError("--by: expected the name of who releases it");
-  const WatchFile watch = read_watch_file(file);
-  // What another user writes the watch could not read.
-  struct stat of_results {};
-  if (::stat(watch.results.c_str(), &of_results) == 0 && of_results.st_uid != ::geteuid())
-    throw Error(fmt::format("{}: belongs to another user, who runs isoshift watch: release as that one (sudo -u USER)",
-                            watch.results.string()));
-  const ResultsTree tree(watch.results);
-  const Release release = tree.release(session, by, Watch::names_of_peers(watch));
-  for (const Release::Object& object : release.objects)
-    console.out << fmt::format("{} goes to {}\n", object.file,
-                               release.peers.empty() ? "nobody: the watch file names no peers"
-                                                     : fmt::format("{}", fmt::join(release.peers, ", ")));
-  if (release.objects.size() == 1) console.out << "the session holds no registration object\n";
-  if (const auto lock = FileLock::try_take(tree.path() / kLockFile))
-    Deliverer(tree, watch).deliver(console);  // nobody else does
-  const auto left = std::ranges::count(tree.pending(), session, &Delivery::session);
-  console.out << (left == 0 ? "sent\n" : "isoshift watch sends it, as often as it takes\n");
-}
 
 }  // namespace
 
@@ -318,25 +248,6 @@ void add_watch_command(CLI::App& app, Console& console, int& exit_status) {
     const WatchFile watch = read_watch_file(*file);
     const bool has_machine = !checked_registration_flags(watch).study.machine.empty();
     Watch(watch, has_machine, console).run();
-    exit_status = kExitAccepted;
-  });
-}
-
-void add_release_command(CLI::App& app, Console& console, int& exit_status) {
-  struct Options {
-    std::filesystem::path watch = "/etc/isoshift/watch.json";
-    std::string session, by;
-  };
-  auto options = std::make_shared<Options>();
-  CLI::App* command = app.add_subcommand("release", "Send a result of watch to its peers");
-  command->footer(
-      "\nExample:\n  isoshift release 3fa94c1e02b7 --by \"J. Doe\"\n\n"
-      "Records who released what, then sends spatial_registration.dcm, where there is one, and report.dcm.");
-  command->add_option("session", options->session, "As index.html names it")->required()->type_name("SESSION");
-  command->add_option("--by", options->by, "Who has looked at it and releases it")->required()->type_name("NAME");
-  command->add_option("--watch", options->watch, "The watch file")->type_name("FILE")->capture_default_str();
-  command->callback([options, &console, &exit_status] {
-    run_release(options->watch, options->session, options->by, console);
     exit_status = kExitAccepted;
   });
 }

@@ -17,6 +17,24 @@ std::size_t append(char* bytes, std::size_t size, std::size_t count, void* to) {
   return size * count;
 }
 
+// An identifier; it may become the name of a file. Throws Error for anything else.
+std::string id_of(const nlohmann::json& one) {
+  auto id = one.at("ID").get<std::string>();
+  if (id.empty() || id.find_first_not_of("0123456789abcdef-") != std::string::npos)
+    throw Error(fmt::format("Orthanc: {} is no identifier of Orthanc's", id));
+  return id;
+}
+
+// What a server answered, as `read` has it. Throws Error where it is something else.
+template <typename Read>
+auto parsed(const std::string& body, const std::string& url, const char* expected, const Read& read) {
+  try {
+    return read(nlohmann::json::parse(body));
+  } catch (const nlohmann::json::exception&) {
+    throw Error(fmt::format("Orthanc at {}: answered something else than {}", url, expected));
+  }
+}
+
 }  // namespace
 
 Orthanc::Orthanc(OrthancServer server) : server_(std::move(server)), curl_(curl_easy_init()) {
@@ -51,20 +69,29 @@ Orthanc::Answer Orthanc::get(const std::string& path) const {
 
 Orthanc::Changes Orthanc::changes_since(std::int64_t last) const {
   const Answer answer = get(fmt::format("/changes?since={}&limit=200", last));
-  try {
-    const nlohmann::json json = nlohmann::json::parse(answer.body);
+  return parsed(answer.body, server_.url, "a list of changes", [](const nlohmann::json& json) {
     Changes changes{.instances = {}, .last = json.at("Last").get<std::int64_t>(), .done = json.at("Done").get<bool>()};
     for (const nlohmann::json& change : json.at("Changes"))
-      if (change.at("ChangeType") == "NewInstance") changes.instances.push_back(change.at("ID").get<std::string>());
+      if (change.at("ChangeType") == "NewInstance") changes.instances.push_back(id_of(change));
     return changes;
-  } catch (const nlohmann::json::exception&) {
-    throw Error(fmt::format("Orthanc at {}: /changes answered something else than a list of changes", server_.url));
-  }
+  });
 }
 
 std::string Orthanc::file_of(const std::string& instance) const {
   Answer answer = get("/instances/" + instance + "/file");
   return answer.status == kNotFound ? "" : std::move(answer.body);
+}
+
+std::vector<std::string> Orthanc::instances_beside(const std::string& instance) const {
+  const Answer patient = get("/instances/" + instance + "/patient");
+  if (patient.status == kNotFound) return {};
+  const Answer all = get("/patients/" + parsed(patient.body, server_.url, "a patient", id_of) + "/instances");
+  if (all.status == kNotFound) return {};
+  return parsed(all.body, server_.url, "a list of instances", [](const nlohmann::json& json) {
+    std::vector<std::string> instances;
+    for (const nlohmann::json& one : json) instances.push_back(id_of(one));
+    return instances;
+  });
 }
 
 }  // namespace isoshift

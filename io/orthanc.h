@@ -28,6 +28,9 @@ class Orthanc {
   // The file as it was received; empty for one that has been deleted since.
   std::string file_of(const std::string& instance) const;
 
+  // All instances of the patient whose one of them is; none if it has been deleted since.
+  std::vector<std::string> instances_beside(const std::string& instance) const;
+
  private:
   struct Answer {
     long status = 0;

@@ -1,17 +1,16 @@
 #include "io/results_tree.h"
 
 #include <fcntl.h>
-#include <fmt/chrono.h>
 #include <fmt/format.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <cerrno>
-#include <chrono>
 #include <cstring>
 
 #include "geometry/error.h"
 #include "io/json_file.h"
+#include "io/local_time.h"
 #include "io/output_folder.h"
 #include "io/report/result_folder.h"
 #include "io/sha256.h"
@@ -21,11 +20,6 @@ namespace {
 
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
-
-std::string now() {
-  return fmt::format("{:%Y-%m-%dT%H:%M:%S%z}",
-                     fmt::localtime(std::chrono::system_clock::to_time_t(std::chrono::system_clock::now())));
-}
 
 fs::path release_file(const fs::path& tree, const std::string& session) {
   return tree / "released" / (session + ".json");
@@ -40,6 +34,10 @@ ResultsTree::ResultsTree(fs::path path) : path_(std::move(path)) {
     if (error) throw Error(fmt::format("{}: cannot be made: {}", (path_ / folder).string(), error.message()));
   }
 }
+
+std::optional<FileLock> ResultsTree::try_lock() const { return FileLock::try_take(path_ / ".watch.lock"); }
+
+bool ResultsTree::is_released(const std::string& session) const { return fs::exists(release_file(path_, session)); }
 
 std::vector<std::string> ResultsTree::sessions() const {
   std::vector<std::string> names;
@@ -56,9 +54,8 @@ void ResultsTree::clean() const {
 }
 
 std::optional<Release> ResultsTree::release_of(const std::string& session) const {
-  const fs::path file = release_file(path_, session);
-  if (!fs::exists(file)) return std::nullopt;
-  const nlohmann::json json = read_json_file(file).json;
+  if (!is_released(session)) return std::nullopt;
+  const nlohmann::json json = read_json_file(release_file(path_, session)).json;
   Release release{
       .session = session, .by = json.at("by"), .on = json.at("on"), .objects = {}, .peers = json.at("peers")};
   for (const auto& object : json.at("objects")) release.objects.push_back({object.at("file"), object.at("sha256")});
@@ -72,7 +69,7 @@ Release ResultsTree::release(const std::string& session, const std::string& by,
     throw Error(fmt::format("{}: holds no session {}", path_.string(), session));
   const std::string verdict = read_json_file(folder / kResultFile).json.at("verdict");
   if (verdict == "rejected") throw Error(fmt::format("session {}: was rejected: there is nothing to release", session));
-  Release release{.session = session, .by = by, .on = now(), .objects = {}, .peers = peers};
+  Release release{.session = session, .by = by, .on = local_time(), .objects = {}, .peers = peers};
   Json objects = Json::array();
   for (const char* file : {kRegistrationFile, "report.dcm"}) {
     if (!fs::exists(folder / file)) continue;
@@ -111,18 +108,23 @@ fs::path ResultsTree::sent_file(const Delivery& delivery) const {
 std::vector<Delivery> ResultsTree::pending() const {
   std::vector<Delivery> pending;
   for (const auto& entry : fs::directory_iterator(path_ / "released")) {
-    if (entry.path().extension() != ".json" || entry.path().filename().string().starts_with('.')) continue;
+    const std::string session = entry.path().stem().string();
+    if (entry.path().extension() != ".json" || session.starts_with('.') || delivered_.contains(session)) continue;
     Release release;
     try {
-      release = release_of(entry.path().stem().string()).value();
+      release = release_of(session).value();
     } catch (const std::exception&) {
       continue;  // whoever shows its state says that it cannot be read
     }
+    bool is_delivered = true;
     for (const std::string& peer : release.peers)
       for (const Release::Object& object : release.objects) {
-        const Delivery delivery{.session = release.session, .peer = peer, .object = object};
-        if (!fs::exists(sent_file(delivery))) pending.push_back(delivery);
+        Delivery delivery{.session = session, .peer = peer, .object = object};
+        if (fs::exists(sent_file(delivery))) continue;
+        is_delivered = false;
+        pending.push_back(std::move(delivery));
       }
+    if (is_delivered) delivered_.insert(session);
   }
   std::ranges::sort(pending, {}, [](const Delivery& one) { return std::pair(one.session, one.peer); });
   return pending;
@@ -140,8 +142,10 @@ fs::path ResultsTree::prepared_file(const Delivery& delivery) const {
 }
 
 void ResultsTree::prepare_to_send(const Delivery& delivery) const {
-  replace_text(prepared_file(delivery), Json{{"on", now()}, {"object", delivery.object.sha256}}.dump() + "\n");
+  replace_text(prepared_file(delivery), Json{{"on", local_time()}, {"object", delivery.object.sha256}}.dump() + "\n");
 }
+
+bool ResultsTree::is_in_doubt(const Delivery& delivery) const { return fs::exists(prepared_file(delivery)); }
 
 void ResultsTree::mark_sent(const Delivery& delivery, const std::string& answer) const {
   fs::rename(prepared_file(delivery), sent_file(delivery));
@@ -152,7 +156,7 @@ void ResultsTree::mark_sent(const Delivery& delivery, const std::string& answer)
 }
 
 void ResultsTree::audit(const std::string& event, const Json& details) const {
-  Json line = {{"on", now()}, {"event", event}};
+  Json line = {{"on", local_time()}, {"event", event}};
   line.update(details);
   unwritten_ += line.dump() + "\n";
   const int descriptor = ::open((path_ / "audit.jsonl").c_str(), O_WRONLY | O_APPEND | O_CREAT | O_CLOEXEC, 0640);

@@ -10,8 +10,11 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
+
+#include "io/file_lock.h"
 
 namespace isoshift {
 
@@ -39,20 +42,26 @@ class ResultsTree {
   std::filesystem::path session(const std::string& name) const { return path_ / "sessions" / name; }
   std::vector<std::string> sessions() const;  // that have a result
 
+  // For whoever registers and sends: nothing where somebody else does.
+  std::optional<FileLock> try_lock() const;
+
   // Removes what a killed process left half written. Only for whoever holds the lock of the tree.
   void clean() const;
 
+  bool is_released(const std::string& session) const;
   std::optional<Release> release_of(const std::string& session) const;
   // Records who releases a session, with the objects that it holds. Throws Error for one that is not there, that was
   // rejected, or that has been released before.
   Release release(const std::string& session, const std::string& by, const std::vector<std::string>& peers) const;
 
-  // What was released and no peer has answered for.
+  // What was released and no peer has answered for. What has been delivered once is not read again.
   std::vector<Delivery> pending() const;
   // The file, if it is what was released. Throws Error if it has changed since.
   std::filesystem::path checked_file(const Delivery& delivery) const;
   // Writes what mark_sent() only has to put in place: with a full disk nothing is sent that cannot be marked.
   void prepare_to_send(const Delivery& delivery) const;
+  // It was prepared and not marked: the peer may have it.
+  bool is_in_doubt(const Delivery& delivery) const;
   void mark_sent(const Delivery& delivery, const std::string& answer) const;
 
   // One line, flushed. What cannot be written now is with the next one.
@@ -63,7 +72,8 @@ class ResultsTree {
   std::filesystem::path prepared_file(const Delivery& delivery) const;
 
   std::filesystem::path path_;
-  mutable std::string unwritten_;  // of the audit log
+  mutable std::set<std::string> delivered_;  // sessions, to all of their peers
+  mutable std::string unwritten_;            // of the audit log
 };
 
 }  // namespace isoshift

@@ -124,4 +124,10 @@ WatchFile read_watch_file(const fs::path& path) {
   return watch;
 }
 
+std::vector<std::string> WatchFile::names_of_peers() const {
+  std::vector<std::string> names;
+  for (const DicomPeer& peer : peers) names.push_back(peer.name);
+  return names;
+}
+
 }  // namespace isoshift

@@ -37,6 +37,8 @@ struct WatchFile {
   SiteFile site;                          // with its rule for sessions
   std::vector<std::string> registration;  // flags of isoshift register
   std::vector<DicomPeer> peers;
+
+  std::vector<std::string> names_of_peers() const;
 };
 
 // Paths are relative to the file's folder. Throws Error naming the file, the place in it and what is expected there.

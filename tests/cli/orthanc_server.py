@@ -26,13 +26,14 @@ class Orthanc:
         folder.mkdir()
         self.log = folder / "log"
         self.configuration = folder / "orthanc.json"
-        self.configuration.write_text(json.dumps({
+        self.settings = {
             "HttpPort": self.http, "DicomPort": self.dicom, "DicomAet": title, "RemoteAccessAllowed": False,
             "DicomAlwaysAllowStore": True, "DicomCheckCalledAet": True, "StorageDirectory": str(folder / "storage"),
-            "IndexDirectory": str(folder / "storage"), **more}))
+            "IndexDirectory": str(folder / "storage"), **more}
         self.server = None
 
     def start(self):
+        self.configuration.write_text(json.dumps(self.settings))
         self.server = subprocess.Popen(["/usr/sbin/Orthanc", str(self.configuration)], stdout=self.log.open("a"), stderr=subprocess.STDOUT)
         for _ in range(300):
             if self.server.poll() is not None:

@@ -1,0 +1,117 @@
+#include "cli/session_index.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "io/output_folder.h"
+#include "io/report/results_page.h"
+#include "io/sha256.h"
+
+namespace isoshift {
+namespace {
+
+constexpr std::size_t kNewest = 500;  // sessions in index.html
+constexpr int kRefreshS = 10;
+constexpr std::size_t kMonthLength = std::string_view("2026-03").size();
+
+// A page's file, "sessions-2026-03.html".
+std::string page_of_month(const std::string& month) { return "sessions-" + month + ".html"; }
+
+ResultsPage::Row row_of(const WaitingSession& waiting) {
+  const std::string verdict = waiting.has_failed ? "failed" : "waiting";
+  return {.verdict = verdict,
+          .cells = {{.text = waiting.name},
+                    {.text = waiting.patient.substr(0, waiting.patient.find('\\'))},
+                    {.text = ""},
+                    {.text = verdict},
+                    {.text = ""},
+                    {.text = waiting.why}}};
+}
+
+}  // namespace
+
+void SessionIndex::add(const std::string& session, const SetupReport& report) {
+  sessions_.push_back({.name = session,
+                       .patient = fmt::format("{} ({})", report.identity.patient_name, report.identity.patient_id),
+                       .acquired = report.views.front().acquired,
+                       .verdict = std::string(to_string(report.verdict)),
+                       .action = std::string(to_string(shown_shift(report).action)),
+                       .state = ""});
+  std::ranges::stable_sort(sessions_, std::ranges::greater(), &Session::acquired);
+  is_written_ = false;
+}
+
+// Whether any is another one now.
+bool SessionIndex::update_states() {
+  const std::vector<Delivery> pending = tree_.pending();
+  bool has_changed = false;
+  for (Session& session : sessions_) {
+    if (session.is_over) continue;
+    std::string state = "held";
+    session.is_over = session.verdict == to_string(Verdict::kRejected);
+    if (session.is_over) {
+      state = "rejected";
+    } else if (tree_.is_released(session.name)) {
+      try {
+        const Release release = tree_.release_of(session.name).value();
+        const auto left = std::ranges::count(pending, session.name, &Delivery::session);
+        session.is_over = left == 0;
+        state = fmt::format("released by {} on {}", release.by, release.on);
+        if (left > 0) state += fmt::format("; {} to be sent", left);
+        if (left == 0 && !release.peers.empty()) state += "; sent";
+      } catch (const std::exception& error) {
+        state = error.what();
+      }
+    }
+    has_changed |= std::exchange(session.state, state) != state;
+  }
+  return has_changed;
+}
+
+void SessionIndex::write(const std::string& page, const std::string& html) {
+  std::string content = sha256_of(html);
+  if (written_[page] == content) return;
+  replace_text(tree_.path() / page, html);
+  written_[page] = std::move(content);
+}
+
+void SessionIndex::update(const std::vector<WaitingSession>& waiting) {
+  const bool has_changed = update_states();
+  if (is_written_ && !has_changed && waiting == waiting_) return;
+  is_written_ = false;  // until all of it is
+  waiting_ = waiting;
+  const std::string title = fmt::format("isoshift: sessions of {}", site_);
+  ResultsPage newest{.title = title, .refresh_s = kRefreshS};
+  newest.columns = {"Session", "Patient", "Acquired", "Verdict", "Action", "State"};
+  newest.summary = {
+      fmt::format("{} sessions registered, {} waiting. Nothing is sent before somebody releases it: isoshift "
+                  "release SESSION --by NAME",
+                  sessions_.size(), waiting.size())};
+  for (const WaitingSession& one : waiting) newest.rows.push_back(row_of(one));
+  std::map<std::string, ResultsPage, std::greater<>> months;
+  for (const Session& session : sessions_) {
+    ResultsPage::Row row{.verdict = session.verdict,
+                         .cells = {{.text = session.name, .link = "sessions/" + session.name + "/report.html"},
+                                   {.text = session.patient},
+                                   {.text = session.acquired},
+                                   {.text = session.verdict},
+                                   {.text = session.action},
+                                   {.text = session.state}}};
+    if (newest.rows.size() < waiting.size() + kNewest) newest.rows.push_back(row);
+    const std::string month = session.acquired.empty() ? "undated" : session.acquired.substr(0, kMonthLength);
+    ResultsPage& page = months[month];
+    if (page.rows.empty()) {
+      page.title = fmt::format("{}, {}", title, month);
+      page.columns = newest.columns;
+      page.pages = {{.text = "newest", .link = "index.html"}};
+      newest.pages.push_back({.text = month, .link = page_of_month(month)});
+    }
+    page.rows.push_back(std::move(row));
+  }
+  for (const auto& [month, page] : months) write(page_of_month(month), results_html(page));
+  write("index.html", results_html(newest));
+  is_written_ = true;
+}
+
+}  // namespace isoshift

@@ -1,0 +1,47 @@
+#pragma once
+// The pages that list the sessions of a results tree: index.html with what waits and the newest, and a page per month
+// with all of it.
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include "io/report/setup_report.h"
+#include "io/results_tree.h"
+
+namespace isoshift {
+
+// X-rays without a result, and why.
+struct WaitingSession {
+  std::string name, patient, why;
+  bool has_failed = false;
+  bool operator==(const WaitingSession&) const = default;
+};
+
+class SessionIndex {
+ public:
+  SessionIndex(const ResultsTree& tree, std::string site) : tree_(tree), site_(std::move(site)) {}
+
+  void add(const std::string& session, const SetupReport& report);
+  std::size_t size() const { return sessions_.size(); }
+
+  // Looks what has been released and sent, and writes the pages that are no longer true.
+  void update(const std::vector<WaitingSession>& waiting);
+
+ private:
+  struct Session {
+    std::string name, patient, acquired, verdict, action, state;
+    bool is_over = false;  // nothing becomes of it any more
+  };
+  bool update_states();
+  void write(const std::string& page, const std::string& html);
+
+  const ResultsTree& tree_;
+  std::string site_;
+  std::vector<Session> sessions_;
+  std::vector<WaitingSession> waiting_;
+  bool is_written_ = false;
+  std::map<std::string, std::string> written_;  // SHA-256 of pages
+};
+
+}  // namespace isoshift
