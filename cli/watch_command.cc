@@ -62,7 +62,7 @@ class Watch {
     if (!lock) throw Error(fmt::format("{}: another isoshift watch is working here", tree_.path().string()));
     const GracefulEnd end;
     tree_.clean();
-    for (const std::string& name : tree_.sessions()) take_result(name);
+    take_results();
     tree_.audit("started", {{"sessions", index_.size()}});
     console_.err << fmt::format("watching {}; results in {}\n",
                                 watch_.orthanc ? watch_.orthanc->url : watch_.folder.string(), tree_.path().string());
@@ -108,6 +108,15 @@ class Watch {
     if (Clock::now() < next_forgetting_) return;
     inbox_.forget_before(std::filesystem::file_time_type::clock::now() - kKeptFor);
     next_forgetting_ = Clock::now() + std::chrono::days(1);
+  }
+
+  void take_results() {
+    const std::vector<std::string> sessions = tree_.sessions();
+    ProgressBar progress(console_, "reading sessions");
+    for (std::size_t n = 0; n < sessions.size(); ++n) {
+      take_result(sessions[n]);
+      progress.update(n + 1, sessions.size());
+    }
   }
 
   Verdict take_result(const std::string& name) {

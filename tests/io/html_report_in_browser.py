@@ -1,25 +1,16 @@
 """Opens report.html in headless Chromium, moves the slider and the switches by keyboard, and looks at what is drawn.
 
 html_report_in_browser.py REPORT.html [SCREENSHOT.png]"""
-import pathlib
 import sys
-import tempfile
 
-from selenium import webdriver
 from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
-from selenium.webdriver.chrome.service import Service
 from selenium.webdriver.support.ui import WebDriverWait
 
-options = webdriver.ChromeOptions()
-options.binary_location = "/usr/bin/chromium"
-for argument in ("--headless=new", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage", "--window-size=1200,1600",
-                 "--user-data-dir=" + tempfile.mkdtemp(prefix="isoshift-browser-")):
-    options.add_argument(argument)
-options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
-browser = webdriver.Chrome(service=Service("/usr/bin/chromedriver"), options=options)
+from browser import open_page, problems
+
+browser = open_page(sys.argv[1], 1200, 1600)
 try:
-    browser.get(pathlib.Path(sys.argv[1]).resolve().as_uri())
     WebDriverWait(browser, 20).until(lambda b: b.find_elements(By.CSS_SELECTOR, "figure canvas[data-state]"))
     canvas = browser.find_element(By.CSS_SELECTOR, "figure canvas")
 
@@ -56,7 +47,7 @@ try:
     assert press(marks, Keys.SPACE)[1] != marked
     if len(sys.argv) > 2:
         browser.save_screenshot(sys.argv[2])
-    problems = [entry["message"] for entry in browser.get_log("browser") if entry["level"] in ("SEVERE", "WARNING")]
-    assert not problems, problems
+    found = problems(browser)
+    assert not found, found
 finally:
     browser.quit()

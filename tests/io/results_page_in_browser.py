@@ -1,25 +1,15 @@
 """Opens index.html of a batch in headless Chromium, sorts and filters it.
 
 results_page_in_browser.py INDEX.html"""
-import pathlib
 import sys
-import tempfile
 
-from selenium import webdriver
-from selenium.webdriver.chrome.service import Service
 from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
 
-options = webdriver.ChromeOptions()
-options.binary_location = "/usr/bin/chromium"
-for argument in ("--headless=new", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage", "--window-size=1400,900",
-                 "--user-data-dir=" + tempfile.mkdtemp(prefix="isoshift-browser-")):
-    options.add_argument(argument)
-options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
-browser = webdriver.Chrome(service=Service("/usr/bin/chromedriver"), options=options)
-try:
-    browser.get(pathlib.Path(sys.argv[1]).resolve().as_uri())
+from browser import open_page, problems
 
+browser = open_page(sys.argv[1], 1400, 900)
+try:
     def shown():
         return [row for row in browser.find_elements(By.CSS_SELECTOR, "tbody tr") if row.is_displayed()]
 
@@ -44,7 +34,7 @@ try:
     link = shown()[0].find_element(By.TAG_NAME, "a")
     link.click()
     assert browser.title, "the report did not open"
-    problems = [entry for entry in browser.get_log("browser") if entry["level"] == "SEVERE"]
-    assert not problems, problems
+    found = problems(browser)
+    assert not found, found
 finally:
     browser.quit()
