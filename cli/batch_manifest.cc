@@ -234,9 +234,9 @@ std::vector<BatchCase> scan_cases(const fs::path& folder, bool other_xrays, Note
                        .images = parts.images,
                        .anatomy = ""});
     } catch (const Error& error) {
-      notes.warnings.push_back(fmt::format("{} and {} more X-rays make no case: {}",
-                                           session.images.front().file.string(), session.images.size() - 1,
-                                           error.what()));
+      notes.warnings.push_back(fmt::format(
+          "{} and {} more X-rays make no case: {}\n       Or a manifest says what the files do not: --scan writes one",
+          session.images.front().file.string(), session.images.size() - 1, error.what()));
     }
   }
   if (cases.empty()) throw Error(fmt::format("{}: holds no case: X-rays with a CT and a plan", folder.string()));

@@ -8,6 +8,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <cstring>
@@ -18,24 +19,15 @@
 namespace isoshift {
 namespace {
 
-std::filesystem::path program = "/proc/self/exe";
+using namespace std::chrono_literals;
+using Clock = std::chrono::steady_clock;
 
-class Descriptor {
- public:
-  explicit Descriptor(int number) : number_(number) {}
-  ~Descriptor() { ::close(number_); }
-  Descriptor(const Descriptor&) = delete;
-  Descriptor& operator=(const Descriptor&) = delete;
-  int number() const { return number_; }
-
- private:
-  int number_;
-};
+std::filesystem::path own_program = "/proc/self/exe";
 
 }  // namespace
 
-const std::filesystem::path& this_program() { return program; }
-void use_program(std::filesystem::path other) { program = std::move(other); }
+const std::filesystem::path& this_program() { return own_program; }
+void use_program(std::filesystem::path other) { own_program = std::move(other); }
 
 pid_t start_child(const std::string& program, std::vector<std::string> words, const ChildStreams& streams) {
   posix_spawn_file_actions_t actions;
@@ -54,37 +46,62 @@ pid_t start_child(const std::string& program, std::vector<std::string> words, co
   return process;
 }
 
-ChildEnd run_child(std::vector<std::string> words, std::chrono::milliseconds limit) {
+Child::Child(std::vector<std::string> words, std::chrono::milliseconds limit) : deadline_(Clock::now() + limit) {
   std::array<int, 2> ends{};
   if (::pipe2(ends.data(), O_CLOEXEC) != 0)
     throw Error(fmt::format("{}: cannot be run: {}", words.front(), std::strerror(errno)));
-  const Descriptor reading(ends[0]);
-  pid_t process = 0;
-  {
-    const Descriptor writing(ends[1]);
+  try {
     const std::string program = words.front();
-    process = start_child(program, std::move(words), {.in = -1, .out = writing.number(), .err = writing.number()});
+    process_ = start_child(program, std::move(words), {.in = -1, .out = ends[1], .err = ends[1]});
+  } catch (const Error&) {
+    ::close(ends[0]);
+    ::close(ends[1]);
+    throw;
   }
-  using Clock = std::chrono::steady_clock;
-  const Clock::time_point deadline = Clock::now() + limit;
-  ChildEnd end;
-  std::array<char, 512> buffer{};
+  ::close(ends[1]);
+  output_ = ends[0];
+}
+
+Child::~Child() {
+  ::close(output_);
+  if (process_ == 0) return;
+  ::kill(process_, SIGTERM);
+  ::waitpid(process_, nullptr, 0);
+}
+
+bool Child::hear(Clock::time_point until) {
   for (;;) {
-    const auto left = std::chrono::ceil<std::chrono::milliseconds>(deadline - Clock::now());
-    pollfd polled{.fd = reading.number(), .events = POLLIN, .revents = 0};
-    const int ready = left.count() <= 0 ? 0 : ::poll(&polled, 1, static_cast<int>(left.count()));
+    const auto left = std::max(std::chrono::ceil<std::chrono::milliseconds>(until - Clock::now()), 0ms);
+    pollfd polled{.fd = output_, .events = POLLIN, .revents = 0};
+    const int ready = ::poll(&polled, 1, static_cast<int>(left.count()));
     if (ready < 0 && errno == EINTR) continue;
-    const ssize_t count = ready > 0 ? ::read(reading.number(), buffer.data(), buffer.size()) : 0;
-    end.is_late = ready == 0;
-    if (count <= 0) break;
-    end.output.append(buffer.data(), static_cast<std::size_t>(count));
+    if (ready == 0) return true;
+    std::array<char, 512> buffer{};
+    const ssize_t count = ::read(output_, buffer.data(), buffer.size());
+    if (count <= 0) return false;
+    end_.output.append(buffer.data(), static_cast<std::size_t>(count));
   }
-  if (end.is_late) ::kill(process, SIGKILL);
-  int status = 0;
-  ::waitpid(process, &status, 0);
-  end.status = WIFSIGNALED(status) ? 128 + WTERMSIG(status) : WEXITSTATUS(status);
-  while (end.output.ends_with('\n')) end.output.pop_back();
-  return end;
+}
+
+std::optional<ChildEnd> Child::end(std::chrono::milliseconds patience) {
+  if (process_ != 0) {
+    if (hear(std::min(Clock::now() + patience, deadline_))) {
+      if (Clock::now() < deadline_) return std::nullopt;
+      end_.is_late = true;
+      ::kill(process_, SIGKILL);
+    }
+    int status = 0;
+    ::waitpid(std::exchange(process_, 0), &status, 0);
+    end_.status = WIFSIGNALED(status) ? 128 + WTERMSIG(status) : WEXITSTATUS(status);
+    while (end_.output.ends_with('\n')) end_.output.pop_back();
+  }
+  return end_;
+}
+
+ChildEnd run_child(std::vector<std::string> words, std::chrono::milliseconds limit) {
+  Child child(std::move(words), limit);
+  for (;;)
+    if (std::optional<ChildEnd> end = child.end(limit)) return *std::move(end);
 }
 
 }  // namespace isoshift

@@ -5,6 +5,7 @@
 
 #include <chrono>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -14,7 +15,7 @@ namespace isoshift {
 const std::filesystem::path& this_program();
 void use_program(std::filesystem::path program);
 
-// What a registration may take: one that hangs holds up no other for longer.
+// What a registration may take. One that takes longer hangs.
 inline constexpr std::chrono::minutes kLongestRegistration(30);
 
 // Descriptors that become a child's standard streams; -1: those of this process.
@@ -32,7 +33,29 @@ struct ChildEnd {
   bool is_late = false;  // it was killed, since it did not end
 };
 
-// The first word is the program, searched for in PATH. Throws Error where it cannot be run.
+// A program that runs beside this one, and is ended with it.
+class Child {
+ public:
+  // The first word is the program, searched for in PATH. Throws Error where it cannot be run.
+  Child(std::vector<std::string> words, std::chrono::milliseconds limit);
+  ~Child();
+  Child(const Child&) = delete;
+  Child& operator=(const Child&) = delete;
+
+  // Its end, once it has come; waits for it that long.
+  std::optional<ChildEnd> end(std::chrono::milliseconds patience);
+
+ private:
+  // Takes what it has printed. Whether it goes on.
+  bool hear(std::chrono::steady_clock::time_point until);
+
+  int output_ = -1;
+  pid_t process_ = 0;
+  std::chrono::steady_clock::time_point deadline_;
+  ChildEnd end_;
+};
+
+// Runs one to its end.
 ChildEnd run_child(std::vector<std::string> words, std::chrono::milliseconds limit);
 
 }  // namespace isoshift

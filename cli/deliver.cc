@@ -3,39 +3,49 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <set>
 
-#include "geometry/error.h"
 #include "io/dicom_send.h"
 
 namespace isoshift {
 
+std::chrono::seconds Deliverer::pause(const std::string& what) {
+  constexpr std::chrono::seconds kFirst(2), kLongest(300);
+  Pause& pause = pauses_[what];
+  pause.length = std::clamp(2 * pause.length, kFirst, kLongest);
+  pause.until = std::chrono::steady_clock::now() + pause.length;
+  return pause.length;
+}
+
 void Deliverer::deliver(Console& console) {
-  constexpr std::chrono::seconds kFirstPause(2), kLongestPause(300);
-  const auto now = std::chrono::steady_clock::now();
-  std::set<std::string> failing;  // in this round: the next of its objects has its turn in the next one
+  const auto is_due = [&](const std::string& what) {
+    const auto pause = pauses_.find(what);
+    return pause == pauses_.end() || pause->second.until <= std::chrono::steady_clock::now();
+  };
   for (const Delivery& delivery : tree_.pending()) {
-    const auto peer = std::ranges::find(watch_.peers, delivery.peer, &DicomPeer::name);
-    const std::string key = fmt::format("{}/{}/{}", delivery.session, delivery.peer, delivery.object.file);
-    Pause& pause = pauses_[key];
-    if (now < pause.until || failing.contains(delivery.peer)) continue;
+    const auto& [session, peer_name, object] = delivery;
+    const std::string key = fmt::format("{}/{}/{}", peer_name, session, object.file);
+    if (!is_due(peer_name) || !is_due(key)) continue;
+    const auto say_failed = [&](const std::exception& error, std::chrono::seconds pause) {
+      console.err << fmt::format("session {}: {} not sent, tried again in {} s: {}\n", delivery.session,
+                                 delivery.object.file, pause.count(), error.what());
+    };
     try {
+      const auto peer = std::ranges::find(watch_.peers, peer_name, &DicomPeer::name);
       if (peer == watch_.peers.end())
-        throw Error(fmt::format("peer {}: the watch file does not name it", delivery.peer));
+        throw PeerError(fmt::format("peer {}: the watch file does not name it", peer_name));
       const std::filesystem::path file = tree_.checked_file(delivery);
       const bool may_be_there = tree_.is_in_doubt(delivery);
       tree_.prepare_to_send(delivery);
       const std::string answer = send_object(file, *peer, may_be_there);
       tree_.mark_sent(delivery, answer);
-      console.err << fmt::format("session {}: {} sent to {}{}\n", delivery.session, delivery.object.file, delivery.peer,
+      console.err << fmt::format("session {}: {} sent to {}{}\n", session, object.file, peer_name,
                                  answer.empty() ? "" : ": " + answer);
+      pauses_.erase(peer_name);
       pauses_.erase(key);
+    } catch (const PeerError& error) {
+      say_failed(error, pause(peer_name));
     } catch (const std::exception& error) {
-      failing.insert(delivery.peer);
-      pause.length = std::clamp(2 * pause.length, kFirstPause, kLongestPause);
-      pause.until = now + pause.length;
-      console.err << fmt::format("session {}: {} not sent, tried again in {} s: {}\n", delivery.session,
-                                 delivery.object.file, pause.length.count(), error.what());
+      say_failed(error, pause(key));
     }
   }
 }

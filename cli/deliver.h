@@ -14,7 +14,7 @@ namespace isoshift {
 // What could not be sent is tried again, after longer and longer times.
 class Deliverer {
  public:
-  Deliverer(const ResultsTree& tree, const WatchFile& watch) : tree_(tree), watch_(watch) {}
+  explicit Deliverer(const WatchFile& watch) : tree_(watch.results), watch_(watch) {}
 
   // Tries all that is due. Only for whoever holds the lock of the tree.
   void deliver(Console& console);
@@ -24,10 +24,11 @@ class Deliverer {
     std::chrono::seconds length{0};
     std::chrono::steady_clock::time_point until;
   };
+  std::chrono::seconds pause(const std::string& what);
 
-  const ResultsTree& tree_;
+  ResultsTree tree_;
   const WatchFile& watch_;
-  std::map<std::string, Pause> pauses_;  // by session, peer and file
+  std::map<std::string, Pause> pauses_;  // of peers, and of objects that one refuses
 };
 
 }  // namespace isoshift

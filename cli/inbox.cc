@@ -4,10 +4,12 @@
 
 #include <algorithm>
 #include <fstream>
-#include <set>
+#include <iterator>
+#include <nlohmann/json.hpp>
 
 #include "geometry/error.h"
 #include "io/dicom_dataset.h"
+#include "io/json_file.h"
 #include "io/output_folder.h"
 #include "io/sha256.h"
 
@@ -15,8 +17,10 @@ namespace isoshift {
 namespace {
 
 namespace fs = std::filesystem;
+using namespace std::chrono_literals;
 
-constexpr const char *kLastChange = ".last-change", *kSuffix = ".dcm";
+constexpr const char *kState = ".orthanc.json", *kSuffix = ".dcm";
+constexpr std::chrono::seconds kLongestWait(60), kFirstPause(1), kLongestPause(600);
 
 // Whether it is there and can be read to its end.
 bool is_whole(const fs::path& file) {
@@ -45,17 +49,43 @@ Inbox::Inbox(const WatchFile& watch, fs::path objects) : watch_(watch), objects_
   if (!watch_.orthanc) return;
   orthanc_ = std::make_unique<Orthanc>(*watch_.orthanc);
   fs::create_directories(objects_);
-  std::ifstream(objects_ / kLastChange) >> last_change_;
-  saved_change_ = last_change_;
+  if (!fs::exists(objects_ / kState)) return;
+  const nlohmann::json state = read_json_file(objects_ / kState).json;
+  last_change_ = state.at("last_change");
+  for (const std::string instance : state.at("not_fetched")) unfetched_[instance];
 }
 
 std::optional<Inbox::Known> Inbox::known_in(const StudyFiles& one) {
-  if (!one.cts.empty()) return Known{one.cts.front().patient, *one.cts.front().sop_instance_uids.begin()};
-  if (!one.plans.empty()) return Known{one.plans.front().patient, one.plans.front().sop_instance_uid};
-  if (!one.structures.empty()) return Known{one.structures.front().patient, one.structures.front().sop_instance_uid};
-  for (const auto& images : {one.images, one.other_xrays})
-    if (!images.empty()) return Known{images.front().patient, images.front().sop_instance_uid};
+  const auto known = [](const auto& entry) { return Known{patient_id_of(entry.patient), entry.sop_instance_uid}; };
+  if (!one.cts.empty())
+    return Known{patient_id_of(one.cts.front().patient), *one.cts.front().sop_instance_uids.begin()};
+  if (!one.plans.empty()) return known(one.plans.front());
+  if (!one.structures.empty()) return known(one.structures.front());
+  if (!one.images.empty()) return known(one.images.front());
+  if (!one.other_xrays.empty()) return known(one.other_xrays.front());
   return std::nullopt;
+}
+
+// What is there of a file may tell already whose it is.
+Inbox::Growing Inbox::growing(const fs::path& file, const Version& version) {
+  Growing growing{.version = version, .since = Clock::now(), .patient_id = ""};
+  try {
+    StudyFiles one;
+    add_file(file, one);
+    if (const auto known = known_in(one)) growing.patient_id = known->patient_id;
+  } catch (const Error&) {
+    // It does not yet.
+  }
+  return growing;
+}
+
+bool Inbox::is_coming(const std::string& patient_id) const {
+  const auto now = Clock::now();
+  const auto is_near = [&](const auto& entry) { return now - entry.second.since < kLongestWait; };
+  const auto is_of_this = [&](const auto& entry) {
+    return entry.second.patient_id.empty() ? is_near(entry) : entry.second.patient_id == patient_id;
+  };
+  return !has_all_changes_ || std::ranges::any_of(growing_, is_of_this) || std::ranges::any_of(unfetched_, is_near);
 }
 
 void Inbox::update(Notes& notes) {
@@ -72,29 +102,41 @@ void Inbox::update_folder(Notes& notes) {
     if (!std::ranges::binary_search(files, file)) gone.push_back(file);
   for (const fs::path& file : gone) {
     done_.erase(file);
+    std::erase_if(copies_of_, [&](const auto& copy) { return copy.second == file; });
     forget(file);
   }
-  std::map<fs::path, Version> still_growing;
+  std::map<fs::path, Growing> still_growing;
   for (const fs::path& file : files) {
     std::error_code error;
     const Version version{fs::file_size(file, error), fs::last_write_time(file, error)};
-    const auto done = done_.find(file), before = growing_.find(file);
-    if (error || (done != done_.end() && done->second == version)) continue;
-    if (before == growing_.end() || before->second != version) {
-      still_growing[file] = version;
+    const auto done = done_.find(file), end = done_.end();
+    if (error || (done != end && done->second == version)) continue;
+    if (!std::ifstream(file)) {
+      if (unopened_.insert(file).second) notes.warnings.push_back(fmt::format("{}: cannot be opened", file.string()));
       continue;
     }
-    done_[file] = version;
-    take(file, notes);
+    unopened_.erase(file);
+    if (version.size > 0 && !begins_like_dicom(file)) {
+      done_[file] = version;
+      forget(file);
+      continue;
+    }
+    const auto before = growing_.find(file);
+    if (before != growing_.end() && before->second.version == version) {
+      done_[file] = version;
+      take(file, notes);
+      continue;
+    }
+    Growing& now = still_growing[file] = growing(file, version);
+    if (before != growing_.end()) now.since = before->second.since;
   }
   growing_ = std::move(still_growing);
 }
 
-// The server's files are written first, then the number of the change that was the last: whoever is stopped between
-// asks for some again.
+// The objects are written first, then what is known of the server's changes: whoever is stopped between asks for some
+// again.
 void Inbox::update_orthanc(Notes& notes) {
-  if (!has_read_objects_)
-    for (const fs::path& file : files_below({objects_})) take(file, notes);  // of an earlier run
+  if (!has_read_objects_) read_objects(notes);
   has_read_objects_ = true;
   has_all_changes_ = false;
   const Orthanc::Changes changes = orthanc_->changes_since(last_change_);
@@ -102,40 +144,67 @@ void Inbox::update_orthanc(Notes& notes) {
     last_change_ = 0;
     return;
   }
-  for (const std::string& instance : changes.instances) unfetched_.emplace(instance, 0);
-  for (auto& [patient, is_done] : rest_)
-    if (!is_done) find_rest(patient), is_done = true;
-  for (const auto& [instance, tries] : std::map(unfetched_)) fetch(instance, notes);
+  for (const std::string& instance : changes.instances) unfetched_[instance] = {.count = 0, .since = Clock::now()};
+  for (auto& [patient_id, when] : rest_)
+    if (when <= Clock::now()) find_rest(patient_id, notes);
+  for (const auto& [instance, attempts] : std::map(unfetched_))
+    if (attempts.next <= Clock::now()) fetch(instance, notes);
   has_all_changes_ = changes.done;
   last_change_ = changes.last;
-  if (!unfetched_.empty() || last_change_ == saved_change_) return;
-  replace_text(objects_ / kLastChange, fmt::format("{}\n", last_change_));
-  saved_change_ = last_change_;
+  save_state();
 }
 
-// One that the server does not give is tried some times more, and holds up no other.
+void Inbox::save_state() {
+  nlohmann::json state = {{"last_change", last_change_}, {"not_fetched", nlohmann::json::array()}};
+  for (const auto& [instance, attempts] : unfetched_) state["not_fetched"].push_back(instance);
+  std::string text = state.dump() + "\n";
+  if (text == saved_state_) return;
+  replace_text(objects_ / kState, text);
+  saved_state_ = std::move(text);
+}
+
+// What an earlier run fetched, without what it was writing when it was killed.
+void Inbox::read_objects(Notes& notes) {
+  for (const auto& entry : fs::directory_iterator(objects_))
+    if (entry.path().filename().string().starts_with('.') && entry.path().filename() != kState)
+      fs::remove(entry.path());
+  for (const fs::path& object : files_below({objects_})) keep(object, notes);
+}
+
+// One that the server does not give is tried again, after longer and longer times, and holds up no other.
 void Inbox::fetch(const std::string& instance, Notes& notes) {
-  constexpr int kMostTries = 5;
   const fs::path file = objects_ / (instance + kSuffix);
+  std::string content;
   try {
-    const std::string content = orthanc_->file_of(instance);
-    if (!content.empty() && (!fs::exists(file) || sha256_of_file(file) != sha256_of(content))) {
-      replace_text(file, content);
-      take(file, notes);
-    }
-    unfetched_.erase(instance);
+    content = orthanc_->file_of(instance);
   } catch (const Error& error) {
-    if (++unfetched_[instance] < kMostTries) return;
-    notes.warnings.push_back(fmt::format("left out: an instance that the server does not give: {}", error.what()));
-    unfetched_.erase(instance);
+    Attempts& attempts = unfetched_[instance];
+    attempts.next = Clock::now() + std::min(kFirstPause * (1 << std::min(attempts.count, 10)), kLongestPause);
+    constexpr int kSaid = 5;
+    if (++attempts.count == kSaid)
+      notes.warnings.push_back(fmt::format("an instance that the server does not give: {}", error.what()));
+    return;
   }
+  if (!content.empty() && (!fs::exists(file) || sha256_of_file(file) != sha256_of(content))) {
+    replace_text(file, content);
+    keep(file, notes);
+  }
+  unfetched_.erase(instance);
 }
 
-void Inbox::find_rest(const std::string& patient) {
-  const auto one = std::ranges::find(known_, patient, [](const auto& entry) { return entry.second.patient; });
+void Inbox::find_rest(const std::string& patient_id, Notes& notes) {
+  Clock::time_point& next = rest_[patient_id];
+  next = Clock::time_point::max();
+  const auto one = std::ranges::find(known_, patient_id, [](const auto& entry) { return entry.second.patient_id; });
   if (one == known_.end()) return;
-  for (const std::string& instance : orthanc_->instances_beside(one->first.stem().string()))
-    if (!fs::exists(objects_ / (instance + kSuffix))) unfetched_.emplace(instance, 0);
+  try {
+    for (const std::string& instance : orthanc_->instances_beside(one->first.stem().string()))
+      if (!fs::exists(objects_ / (instance + kSuffix)))
+        unfetched_.emplace(instance, Attempts{.count = 0, .since = Clock::now()});
+  } catch (const Error& error) {
+    next = Clock::now() + 1min;
+    notes.warnings.push_back(error.what());
+  }
 }
 
 void Inbox::forget_before(fs::file_time_type time) {
@@ -145,12 +214,12 @@ void Inbox::forget_before(fs::file_time_type time) {
   for (const auto& [file, known] : known_) {
     std::error_code gone;
     if (fs::last_write_time(file, gone) >= time && !gone)
-      others.insert(known.patient);
+      others.insert(known.patient_id);
     else
-      old[known.patient].push_back(file);
+      old[known.patient_id].push_back(file);
   }
-  for (const auto& [patient, files] : old) {
-    if (others.contains(patient)) continue;
+  for (const auto& [patient_id, files] : old) {
+    if (others.contains(patient_id)) continue;
     for (const fs::path& file : files) {
       fs::remove(file);
       forget(file);
@@ -161,18 +230,23 @@ void Inbox::forget_before(fs::file_time_type time) {
 void Inbox::forget(const fs::path& file) {
   const auto known = known_.find(file);
   if (known == known_.end()) return;
-  const auto& [patient, uid] = known->second;
+  const auto& [patient_id, uid] = known->second;
   const auto copies = copies_of_.equal_range(uid);
-  for (auto copy = copies.first; copy != copies.second; ++copy)
-    done_.erase(copy->second);  // one of them takes its place
+  for (auto copy = copies.first; copy != copies.second; ++copy) done_.erase(copy->second);  // one takes its place
   copies_of_.erase(copies.first, copies.second);
   file_of_uid_.erase(uid);
-  StudyFiles& files = patients_.at(patient).files;
+  StudyFiles& files = patients_.at(patient_id).files;
   remove_from(files, file, uid);
   if (files.cts.empty() && files.plans.empty() && files.structures.empty() && files.images.empty() &&
       files.other_xrays.empty())
-    patients_.erase(patient);
+    patients_.erase(patient_id);
   known_.erase(known);
+}
+
+// An object of which nothing is made goes again: the server has it.
+void Inbox::keep(const fs::path& object, Notes& notes) {
+  take(object, notes);
+  if (!known_.contains(object)) fs::remove(object);
 }
 
 void Inbox::take(const fs::path& file, Notes& notes) {
@@ -189,7 +263,7 @@ void Inbox::take(const fs::path& file, Notes& notes) {
   if (const auto earlier = file_of_uid_.find(found->uid); earlier != file_of_uid_.end()) {
     const fs::path before = earlier->second;
     if (is_whole(before)) {
-      patients_.at(known_.at(before).patient).last = Clock::now();
+      patients_.at(known_.at(before).patient_id).last = Clock::now();
       copies_of_.emplace(found->uid, file);
       if (sha256_of_file(before) != sha256_of_file(file))
         notes.warnings.push_back(fmt::format("{}: left out: differs from {}, which has the same SOPInstanceUID",
@@ -197,11 +271,12 @@ void Inbox::take(const fs::path& file, Notes& notes) {
       return;
     }
     forget(before);
+    if (orthanc_) fs::remove(before);
   }
   file_of_uid_[found->uid] = file;
   known_[file] = *found;
-  rest_.erase(found->patient);
-  Patient& patient = patients_[found->patient];
+  rest_.erase(found->patient_id);
+  Patient& patient = patients_[found->patient_id];
   patient.last = Clock::now();
   merge(std::move(one), patient.files);
 }

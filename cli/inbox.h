@@ -7,6 +7,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 
 #include "io/notes.h"
@@ -28,19 +29,19 @@ class Inbox {
   Inbox(const WatchFile& watch, std::filesystem::path objects);
 
   // Takes what has come since the last call, and forgets what is there no more. A file counts once it has not changed
-  // between two calls. Throws Error for a server that does not answer; the next call goes on.
+  // between two calls. Throws Error for a server that does not answer or a disk that is full; the next call goes on.
   void update(Notes& notes);
 
-  // Nothing more is known to be on its way: files that grow, changes that the server has not told, instances that it
-  // did not give.
-  bool is_settled() const { return growing_.empty() && unfetched_.empty() && has_all_changes_; }
-
-  // By what StudyFiles calls a patient.
+  // By PatientID.
   const std::map<std::string, Patient>& patients() const { return patients_; }
+
+  // Something of this patient, or of nobody knows whom, is on its way: files that grow, changes that the server has not
+  // told, instances that it did not give yet. What is of nobody knows whom counts for a minute.
+  bool is_coming(const std::string& patient_id) const;
 
   // The next update asks a server what else it has of a patient, once after each object that comes: what was forgotten
   // is fetched again.
-  void ask_for_rest(const std::string& patient) { rest_.emplace(patient, false); }
+  void ask_for_rest(const std::string& patient_id) { rest_.emplace(patient_id, Clock::time_point()); }
 
   // Removes the objects of patients of whom nothing has come since; a server is asked for them again where they are
   // needed. What lies in a folder is not touched.
@@ -52,15 +53,29 @@ class Inbox {
     std::filesystem::file_time_type written;
     bool operator==(const Version&) const = default;
   };
+  struct Growing {
+    Version version;
+    Clock::time_point since;
+    std::string patient_id;  // empty: unknown
+  };
   struct Known {
-    std::string patient, uid;  // SOPInstanceUID
+    std::string patient_id, uid;  // SOPInstanceUID
+  };
+  struct Attempts {
+    int count = 0;
+    Clock::time_point since, next;
   };
   // Of one file; nothing for one that is no part of a study.
   static std::optional<Known> known_in(const StudyFiles& one);
+  static Growing growing(const std::filesystem::path& file, const Version& version);
+
   void update_folder(Notes& notes);
   void update_orthanc(Notes& notes);
-  void find_rest(const std::string& patient);
+  void read_objects(Notes& notes);
   void fetch(const std::string& instance, Notes& notes);
+  void find_rest(const std::string& patient_id, Notes& notes);
+  void save_state();
+  void keep(const std::filesystem::path& object, Notes& notes);
   void take(const std::filesystem::path& file, Notes& notes);
   void forget(const std::filesystem::path& file);
 
@@ -71,11 +86,18 @@ class Inbox {
   std::map<std::filesystem::path, Known> known_;
   std::map<std::string, std::filesystem::path> file_of_uid_;     // of those known
   std::multimap<std::string, std::filesystem::path> copies_of_;  // of a SOPInstanceUID, left out
-  std::map<std::filesystem::path, Version> done_, growing_;      // in a folder
-  std::map<std::string, int> unfetched_;                         // instances, and how often that was tried
-  std::map<std::string, bool> rest_;                             // patients to be asked for, and whether that was done
+
+  // Of a folder.
+  std::map<std::filesystem::path, Version> done_;
+  std::map<std::filesystem::path, Growing> growing_;
+  std::set<std::filesystem::path> unopened_;
+
+  // Of a server.
+  std::int64_t last_change_ = 0;
+  std::map<std::string, Attempts> unfetched_;      // instances
+  std::map<std::string, Clock::time_point> rest_;  // patients to be asked for, and when
   bool has_all_changes_ = true, has_read_objects_ = false;
-  std::int64_t last_change_ = 0, saved_change_ = 0;
+  std::string saved_state_;
 };
 
 }  // namespace isoshift

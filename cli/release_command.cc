@@ -5,7 +5,6 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include <algorithm>
 #include <memory>
 
 #include "cli/commands.h"
@@ -33,10 +32,15 @@ void run_release(const std::filesystem::path& file, const std::string& session, 
                                release.peers.empty() ? "nobody: the watch file names no peers"
                                                      : fmt::format("{}", fmt::join(release.peers, ", ")));
   if (release.objects.size() == 1) console.out << "the session holds no registration object\n";
-  if (const auto lock = tree.try_lock()) Deliverer(tree, watch).deliver(console);  // nobody else does
+  const auto lock = tree.try_lock();
+  if (lock) Deliverer(watch).deliver(console);  // nobody else does
   if (release.peers.empty()) return;
-  const auto left = std::ranges::count(tree.pending(), session, &Delivery::session);
-  console.out << (left == 0 ? "sent\n" : "isoshift watch sends it, as often as it takes\n");
+  if (tree.pending_of(release).empty())
+    console.out << "sent\n";
+  else if (lock)
+    console.out << "not sent yet: isoshift watch, which does not run now, sends it, as often as it takes\n";
+  else
+    console.out << "isoshift watch sends it, as often as it takes\n";
 }
 
 }  // namespace

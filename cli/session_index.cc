@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <regex>
 
 #include "io/output_folder.h"
 #include "io/report/results_page.h"
@@ -13,7 +14,13 @@ namespace {
 
 constexpr std::size_t kNewest = 500;  // sessions in index.html
 constexpr int kRefreshS = 10;
-constexpr std::size_t kMonthLength = std::string_view("2026-03").size();
+
+// "2026-03" of "2026-03-01 10:15:00".
+std::string month_of(const std::string& acquired) {
+  static const std::regex pattern("[0-9]{4}-[0-9]{2}");
+  std::string month = acquired.substr(0, std::string_view("2026-03").size());
+  return std::regex_match(month, pattern) ? month : "undated";
+}
 
 // A page's file, "sessions-2026-03.html".
 std::string page_of_month(const std::string& month) { return "sessions-" + month + ".html"; }
@@ -22,7 +29,7 @@ ResultsPage::Row row_of(const WaitingSession& waiting) {
   const std::string verdict = waiting.has_failed ? "failed" : "waiting";
   return {.verdict = verdict,
           .cells = {{.text = waiting.name},
-                    {.text = waiting.patient.substr(0, waiting.patient.find('\\'))},
+                    {.text = waiting.patient_id},
                     {.text = ""},
                     {.text = verdict},
                     {.text = ""},
@@ -32,19 +39,19 @@ ResultsPage::Row row_of(const WaitingSession& waiting) {
 }  // namespace
 
 void SessionIndex::add(const std::string& session, const SetupReport& report) {
-  sessions_.push_back({.name = session,
-                       .patient = fmt::format("{} ({})", report.identity.patient_name, report.identity.patient_id),
-                       .acquired = report.views.front().acquired,
-                       .verdict = std::string(to_string(report.verdict)),
-                       .action = std::string(to_string(shown_shift(report).action)),
-                       .state = ""});
-  std::ranges::stable_sort(sessions_, std::ranges::greater(), &Session::acquired);
+  Session added{.name = session,
+                .patient = fmt::format("{} ({})", report.identity.patient_name, report.identity.patient_id),
+                .acquired = report.views.front().acquired,
+                .verdict = std::string(to_string(report.verdict)),
+                .action = std::string(to_string(shown_shift(report).action)),
+                .state = ""};
+  sessions_.insert(std::ranges::upper_bound(sessions_, added.acquired, std::ranges::greater(), &Session::acquired),
+                   std::move(added));
   is_written_ = false;
 }
 
 // Whether any is another one now.
 bool SessionIndex::update_states() {
-  const std::vector<Delivery> pending = tree_.pending();
   bool has_changed = false;
   for (Session& session : sessions_) {
     if (session.is_over) continue;
@@ -55,7 +62,7 @@ bool SessionIndex::update_states() {
     } else if (tree_.is_released(session.name)) {
       try {
         const Release release = tree_.release_of(session.name).value();
-        const auto left = std::ranges::count(pending, session.name, &Delivery::session);
+        const auto left = tree_.pending_of(release).size();
         session.is_over = left == 0;
         state = fmt::format("released by {} on {}", release.by, release.on);
         if (left > 0) state += fmt::format("; {} to be sent", left);
@@ -76,11 +83,12 @@ void SessionIndex::write(const std::string& page, const std::string& html) {
   written_[page] = std::move(content);
 }
 
-void SessionIndex::update(const std::vector<WaitingSession>& waiting) {
+void SessionIndex::update(const std::vector<WaitingSession>& waiting, const std::vector<std::string>& troubles) {
   const bool has_changed = update_states();
-  if (is_written_ && !has_changed && waiting == waiting_) return;
+  if (is_written_ && !has_changed && waiting == waiting_ && troubles == troubles_) return;
   is_written_ = false;  // until all of it is
   waiting_ = waiting;
+  troubles_ = troubles;
   const std::string title = fmt::format("isoshift: sessions of {}", site_);
   ResultsPage newest{.title = title, .refresh_s = kRefreshS};
   newest.columns = {"Session", "Patient", "Acquired", "Verdict", "Action", "State"};
@@ -88,6 +96,7 @@ void SessionIndex::update(const std::vector<WaitingSession>& waiting) {
       fmt::format("{} sessions registered, {} waiting. Nothing is sent before somebody releases it: isoshift "
                   "release SESSION --by NAME",
                   sessions_.size(), waiting.size())};
+  for (const std::string& trouble : troubles) newest.summary.push_back("Trouble: " + trouble);
   for (const WaitingSession& one : waiting) newest.rows.push_back(row_of(one));
   std::map<std::string, ResultsPage, std::greater<>> months;
   for (const Session& session : sessions_) {
@@ -99,7 +108,7 @@ void SessionIndex::update(const std::vector<WaitingSession>& waiting) {
                                    {.text = session.action},
                                    {.text = session.state}}};
     if (newest.rows.size() < waiting.size() + kNewest) newest.rows.push_back(row);
-    const std::string month = session.acquired.empty() ? "undated" : session.acquired.substr(0, kMonthLength);
+    const std::string month = month_of(session.acquired);
     ResultsPage& page = months[month];
     if (page.rows.empty()) {
       page.title = fmt::format("{}, {}", title, month);

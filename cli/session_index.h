@@ -13,7 +13,7 @@ namespace isoshift {
 
 // X-rays without a result, and why.
 struct WaitingSession {
-  std::string name, patient, why;
+  std::string name, patient_id, why;
   bool has_failed = false;
   bool operator==(const WaitingSession&) const = default;
 };
@@ -25,8 +25,9 @@ class SessionIndex {
   void add(const std::string& session, const SetupReport& report);
   std::size_t size() const { return sessions_.size(); }
 
-  // Looks what has been released and sent, and writes the pages that are no longer true.
-  void update(const std::vector<WaitingSession>& waiting);
+  // Looks what has been released and sent, and writes the pages that are no longer true. `troubles`: what does not work
+  // now.
+  void update(const std::vector<WaitingSession>& waiting, const std::vector<std::string>& troubles);
 
  private:
   struct Session {
@@ -38,8 +39,9 @@ class SessionIndex {
 
   const ResultsTree& tree_;
   std::string site_;
-  std::vector<Session> sessions_;
+  std::vector<Session> sessions_;  // the newest first
   std::vector<WaitingSession> waiting_;
+  std::vector<std::string> troubles_;
   bool is_written_ = false;
   std::map<std::string, std::string> written_;  // SHA-256 of pages
 };

@@ -7,7 +7,10 @@
 #include <iterator>
 #include <map>
 #include <memory>
+#include <optional>
+#include <regex>
 #include <set>
+#include <stop_token>
 #include <thread>
 
 #include "cli/child_process.h"
@@ -17,6 +20,7 @@
 #include "cli/inbox.h"
 #include "cli/register_command.h"
 #include "cli/session_index.h"
+#include "cli/setup_report_of.h"
 #include "geometry/error.h"
 #include "io/report/result_folder.h"
 #include "io/results_tree.h"
@@ -35,14 +39,21 @@ RegisterOptions checked_registration_flags(const WatchFile& watch) {
   add_result_options(app, options);
   add_study_switches(app, options.study);
   add_registration_flags(app, options.flags);
+  const auto refuse = [&](const std::exception& error) {
+    throw Error(fmt::format("{}: register: {}", watch.path.string(), error.what()));
+  };
   try {
     app.parse(std::vector<std::string>(watch.registration.rbegin(), watch.registration.rend()));
     options.flags.settle();
+    options.study.study = watch.results;  // any: its words are what is checked
+    (void)options.study.request();
+    if (!options.site.empty()) throw UsageError("--site is named by site, not here");
+    (void)chosen_site(watch.site.path, options.anatomy);
   } catch (const CLI::ParseError& error) {
-    throw Error(fmt::format("{}: register: {}", watch.path.string(), error.what()));
+    refuse(error);
+  } catch (const UsageError& error) {
+    refuse(error);
   }
-  if (!options.site.empty())
-    throw Error(fmt::format("{}: register: --site is named by site, not here", watch.path.string()));
   return options;
 }
 
@@ -53,7 +64,6 @@ class Watch {
         console_(console),
         tree_(watch.results),
         inbox_(watch, watch.results / "objects"),
-        deliverer_(tree_, watch),
         index_(tree_, watch.site.name),
         takes_other_xrays_(takes_other_xrays) {}
 
@@ -63,180 +73,265 @@ class Watch {
     const GracefulEnd end;
     tree_.clean();
     take_results();
+    attempt("completing the audit log", [&] { tree_.complete_audit(); });
     tree_.audit("started", {{"sessions", index_.size()}});
     console_.err << fmt::format("watching {}; results in {}\n",
                                 watch_.orthanc ? watch_.orthanc->url : watch_.folder.string(), tree_.path().string());
+    const std::jthread sending([this](const std::stop_token& stop) { send(stop); });  // a peer may take its time
     while (!end.is_asked_for()) {
-      // While a server is down nothing is known to be quiet.
-      if (!attempt("receiving", [&] { receive(); })) steady_since_ = Clock::now();
-      attempt("registering", [&] { register_complete(end); });
+      attempt("receiving", [&] { receive(); });
+      attempt("registering", [&] { register_complete(); });
       attempt("releasing", [&] { release_automatically(); });
-      attempt("sending", [&] { deliverer_.deliver(console_); });
-      attempt("writing the index", [&] { index_.update(waiting_); });
-      std::this_thread::sleep_for(std::chrono::milliseconds(500));
+      attempt("writing the index", [&] { index_.update(waiting_, troubles()); });
+      std::this_thread::sleep_for(kRound);
     }
     tree_.audit("stopped", nlohmann::ordered_json::object());
   }
 
  private:
+  struct Running {
+    std::string session;
+    Clock::time_point news;  // of the patient, when it began
+    std::unique_ptr<Child> child;
+  };
   struct Failure {
     std::string why;
     Clock::time_point at;
-    Clock::time_point news;  // of the patient, when it failed
-    std::chrono::seconds pause{0};
+    Clock::time_point news;
+    std::optional<std::chrono::seconds> pause;  // unset: until there is news
   };
+  struct Complete {
+    SessionFiles session;
+    StudyFiles files;
+    Clock::time_point last;
+  };
+  static constexpr std::chrono::milliseconds kRound{500};
   static constexpr std::chrono::seconds kFirstPause{30}, kLongestPause{600};
   static constexpr std::chrono::days kKeptFor{60};  // objects of a patient of whom nothing comes any more
 
   // Nothing that fails now ends the watch: a full disk, a server that is down. Each kind of trouble is said once.
-  bool attempt(const std::string& what, const std::function<void()>& work) {
+  void attempt(const std::string& what, const std::function<void()>& work) {
     try {
       work();
       if (troubles_.erase(what) > 0) console_.err << what << ": goes on\n";
-      return true;
     } catch (const std::exception& error) {
       if (std::exchange(troubles_[what], error.what()) != error.what())
         console_.err << fmt::format("{}: {}\n", what, error.what());
-      return false;
     }
   }
 
+  std::vector<std::string> troubles() const {
+    std::vector<std::string> lines;
+    for (const auto& [what, why] : troubles_) lines.push_back(fmt::format("{}: {}", what, why));
+    return lines;
+  }
+
+  void send(const std::stop_token& stop) {
+    Deliverer deliverer(watch_);
+    std::string trouble;
+    while (!stop.stop_requested()) {
+      try {
+        deliverer.deliver(console_);
+        trouble.clear();
+      } catch (const std::exception& error) {
+        if (std::exchange(trouble, error.what()) != error.what())
+          console_.err << fmt::format("sending: {}\n", error.what());
+      }
+      std::this_thread::sleep_for(kRound);
+    }
+  }
+
+  // While a server is down nothing is known to be quiet.
   void receive() {
+    const Clock::time_point begin = Clock::now();
     Notes notes;
-    inbox_.update(notes);
-    for (const std::string& warning : notes.warnings) console_.err << "warning: " << warning << "\n";
+    const auto say = [&] {
+      for (const std::string& warning : notes.warnings) console_.err << "warning: " << warning << "\n";
+    };
+    try {
+      inbox_.update(notes);
+    } catch (const std::exception&) {
+      say();
+      quiet_from_ = Clock::now();
+      throw;
+    }
+    say();
+    seen_at_ = begin;
     if (Clock::now() < next_forgetting_) return;
     inbox_.forget_before(std::filesystem::file_time_type::clock::now() - kKeptFor);
     next_forgetting_ = Clock::now() + std::chrono::days(1);
   }
 
+  // One that cannot be read hides no other.
   void take_results() {
     const std::vector<std::string> sessions = tree_.sessions();
     ProgressBar progress(console_, "reading sessions");
     for (std::size_t n = 0; n < sessions.size(); ++n) {
-      take_result(sessions[n]);
+      try {
+        take_result(sessions[n]);
+      } catch (const std::exception& error) {
+        console_.err << fmt::format("warning: session {}: {}\n", sessions[n], error.what());
+      }
       progress.update(n + 1, sessions.size());
     }
   }
 
   Verdict take_result(const std::string& name) {
     const SetupReport report = read_report(tree_.session(name));
+    if (report.views.empty()) throw Error(fmt::format("{}: names no views", tree_.session(name).string()));
     for (const SetupReport::View& view : report.views) registered_.insert(view.sop_instance_uid);
     index_.add(name, report);
-    if (watch_.site.automatic_release && report.verdict == Verdict::kAccepted) accepted_.insert(name);
+    // What was made under another site file waits for a person.
+    if (watch_.site.automatic_release && report.verdict == Verdict::kAccepted && report.site &&
+        report.site->automatic_release)
+      accepted_.insert(name);
     return report.verdict;
   }
 
-  void register_complete(const GracefulEnd& end) {
+  // One at a time, those with the newest X-rays first: somebody waits for them.
+  void register_complete() {
+    if (running_) end_registration();
     waiting_.clear();
+    std::vector<Complete> complete;
     std::set<std::string> found;
-    bool has_retried = false;  // what has failed before does not hold up what is new
-    for (const auto& [name, patient] : inbox_.patients()) {
-      StudyFiles xrays;
-      const auto is_new = [&](const auto& image) { return !registered_.contains(image.sop_instance_uid); };
-      std::ranges::copy_if(patient.files.images, std::back_inserter(xrays.images), is_new);
-      std::ranges::copy_if(patient.files.other_xrays, std::back_inserter(xrays.other_xrays), is_new);
-      for (const SessionFiles& session : sessions_of(xrays, takes_other_xrays_)) {
-        if (end.is_asked_for()) return;
+    for (const auto& [patient_id, patient] : inbox_.patients()) {
+      for (SessionFiles& session : unregistered_sessions(patient.files)) {
         found.insert(session.name);
-        const StudyFiles own = files_for(session, patient.files);
-        const bool has_failed = failures_.contains(session.name);
-        std::string why = reason_to_wait(session, own, patient.last);
-        if (why.empty() && has_failed && std::exchange(has_retried, true)) why = failures_.at(session.name).why;
-        if (why.empty()) why = registered(session, own, patient.last);
-        if (!why.empty())
-          waiting_.push_back({session.name, session.patient, std::move(why), failures_.contains(session.name)});
+        StudyFiles own = files_for(session, patient.files);
+        const bool is_running = running_ && running_->session == session.name;
+        std::string why = is_running ? "is being registered" : reason_to_wait(session, own, patient_id, patient.last);
+        const bool is_complete = why.empty();
+        if (is_complete) why = "has its turn soon";
+        waiting_.push_back({session.name, patient_id, std::move(why), failures_.contains(session.name)});
+        if (is_complete) complete.push_back({std::move(session), std::move(own), patient.last});
       }
     }
     std::erase_if(failures_, [&](const auto& failure) { return !found.contains(failure.first); });
+    if (running_ || complete.empty()) return;
+    begin_registration(*std::ranges::min_element(complete, {}, [&](const Complete& one) {
+      return std::pair(failures_.contains(one.session.name), -one.session.images.back().at_s.value_or(0.0));
+    }));
+  }
+
+  std::vector<SessionFiles> unregistered_sessions(const StudyFiles& files) const {
+    StudyFiles xrays;
+    const auto is_new = [&](const auto& image) { return !registered_.contains(image.sop_instance_uid); };
+    std::ranges::copy_if(files.images, std::back_inserter(xrays.images), is_new);
+    std::ranges::copy_if(files.other_xrays, std::back_inserter(xrays.other_xrays), is_new);
+    return sessions_of(xrays, takes_other_xrays_);
   }
 
   // Empty: it can be registered now.
-  std::string reason_to_wait(const SessionFiles& session, const StudyFiles& own, Clock::time_point last) {
+  std::string reason_to_wait(const SessionFiles& session, const StudyFiles& own, const std::string& patient_id,
+                             Clock::time_point last) {
     const SiteFile::Sessions& rule = *watch_.site.sessions;
     if (static_cast<int>(session.images.size()) < rule.views)
       return fmt::format("{} of {} X-rays", session.images.size(), rule.views);
     if (const auto missing = missing_parts(own); !missing.empty()) {
-      inbox_.ask_for_rest(session.patient);
+      inbox_.ask_for_rest(patient_id);
       return "waits for " + missing.front();
     }
-    if (!inbox_.is_settled() ||
-        Clock::now() - std::max(last, steady_since_) < std::chrono::duration<double>(rule.quiet_s))
-      return "more may come";
+    const std::chrono::duration<double> quiet = seen_at_ - std::max(last, quiet_from_);
+    if (inbox_.is_coming(patient_id) || quiet.count() < rule.quiet_s) return "more may come";
     const auto failure = failures_.find(session.name);
-    if (failure == failures_.end()) return "";
-    const bool has_news = last != failure->second.news;
-    return has_news || Clock::now() - failure->second.at > failure->second.pause ? "" : failure->second.why;
+    if (failure == failures_.end() || last != failure->second.news) return "";
+    const auto& [why, at, news, pause] = failure->second;
+    return pause && Clock::now() - at > *pause ? "" : why;
   }
 
-  // Registers in a process of its own, whatever it meets there. Returns why there is no result.
-  std::string registered(const SessionFiles& session, const StudyFiles& own, Clock::time_point last) {
-    std::string why;
-    const auto has_result = [&] { return std::filesystem::exists(tree_.session(session.name) / kResultFile); };
+  // In a process of its own, whatever it meets there.
+  void begin_registration(const Complete& complete) {
+    const std::string& session = complete.session.name;
     try {
-      const StudyParts parts = choose_parts(own);
+      const StudyParts parts = choose_parts(complete.files);
       std::vector<std::string> words = {this_program().string(), "register", "--ct"};
       for (const auto& file : parts.ct) words.push_back(file.string());
       words.emplace_back("--image");
       for (const auto& file : parts.images) words.push_back(file.string());
       if (parts.plan) words.insert(words.end(), {"--plan", parts.plan->string()});
       if (parts.structures) words.insert(words.end(), {"--structures", parts.structures->string()});
-      words.insert(words.end(),
-                   {"--site", watch_.site.path.string(), "--output", tree_.session(session.name).string()});
+      words.insert(words.end(), {"--site", watch_.site.path.string(), "--output", tree_.session(session).string()});
       words.insert(words.end(), watch_.registration.begin(), watch_.registration.end());
-      const ChildEnd end = run_child(std::move(words), kLongestRegistration);
-      if (end.is_late)
-        why = fmt::format("the registration did not end within {} minutes", kLongestRegistration.count());
-      else if (!has_result() && end.status == kExitFailed)
-        why = end.output.substr(std::min(end.output.size(), end.output.rfind("error: ")));
-      else if (!has_result())
-        why = fmt::format("the registration ended with status {} and left no result", end.status);
+      running_ = Running{.session = session,
+                         .news = complete.last,
+                         .child = std::make_unique<Child>(std::move(words), kLongestRegistration)};
     } catch (const std::exception& error) {
-      why = error.what();
+      fail(session, complete.last, error.what(), true);
     }
-    if (!why.empty()) {
-      Failure& failure = failures_[session.name];
-      const bool is_new = std::exchange(failure.why, why) != why;
-      failure.pause = is_new ? kFirstPause : std::min(2 * failure.pause, kLongestPause);
-      failure.at = Clock::now();
-      failure.news = last;
-      if (is_new) {
-        console_.err << fmt::format("session {}: {}\n", session.name, why);
-        tree_.audit("failed", {{"session", session.name}});
-      }
-      return why;
-    }
-    failures_.erase(session.name);
-    const std::string verdict(to_string(take_result(session.name)));
-    console_.err << fmt::format("session {}: {}\n", session.name, verdict);
-    tree_.audit("registered", {{"session", session.name}, {"verdict", verdict}});
-    return "";
   }
 
-  void release_automatically() {
-    while (!accepted_.empty()) {
-      const std::string& session = *accepted_.begin();
-      if (!tree_.is_released(session))
-        tree_.release(session,
-                      fmt::format("automatic, allowed by {} on {}", watch_.site.automatic_release->by,
-                                  watch_.site.automatic_release->on),
-                      watch_.names_of_peers());
-      accepted_.erase(accepted_.begin());
+  void end_registration() {
+    const std::optional<ChildEnd> end = running_->child->end(std::chrono::milliseconds(0));
+    if (!end) return;
+    const std::string session = running_->session;
+    const Clock::time_point news = running_->news;
+    running_.reset();
+    tree_.clean();
+    if (!std::filesystem::exists(tree_.session(session) / kResultFile)) {
+      fail(session, news, reason_of(*end), !end->is_late);
+      return;
     }
+    failures_.erase(session);
+    const std::string verdict(to_string(take_result(session)));
+    console_.err << fmt::format("session {}: {}\n", session, verdict);
+    tree_.audit("registered", {{"session", session}, {"verdict", verdict}});
+  }
+
+  static std::string reason_of(const ChildEnd& end) {
+    if (end.is_late) return fmt::format("the registration did not end within {} minutes", kLongestRegistration.count());
+    if (const std::size_t error = end.output.rfind("error: "); error != std::string::npos)
+      return end.output.substr(error);
+    return fmt::format("the registration ended with status {} and left no result{}{}", end.status,
+                       end.output.empty() ? "" : ": ", end.output.substr(end.output.rfind('\n') + 1));
+  }
+
+  void fail(const std::string& session, Clock::time_point news, std::string why, bool may_be_over_soon) {
+    static const std::regex staging("[.]partial-[A-Za-z0-9]+");  // another name every time
+    why = std::regex_replace(why, staging, "");
+    Failure& failure = failures_[session];
+    const bool is_new = std::exchange(failure.why, why) != why;
+    if (!may_be_over_soon)
+      failure.pause.reset();
+    else
+      failure.pause = is_new || !failure.pause ? kFirstPause : std::min(2 * *failure.pause, kLongestPause);
+    failure.at = Clock::now();
+    failure.news = news;
+    if (!is_new) return;
+    console_.err << fmt::format("session {}: {}\n", session, why);
+    tree_.audit("failed", {{"session", session}});
+  }
+
+  // One that cannot be released keeps no other.
+  void release_automatically() {
+    std::string trouble;
+    for (const std::string& session : std::set(accepted_)) {
+      try {
+        if (!tree_.is_released(session))
+          tree_.release(session,
+                        fmt::format("automatic, allowed by {} on {}", watch_.site.automatic_release->by,
+                                    watch_.site.automatic_release->on),
+                        watch_.names_of_peers());
+        accepted_.erase(session);
+      } catch (const std::exception& error) {
+        trouble = error.what();
+      }
+    }
+    if (!trouble.empty()) throw Error(trouble);
   }
 
   const WatchFile& watch_;
   Console& console_;
   ResultsTree tree_;
   Inbox inbox_;
-  Deliverer deliverer_;
   SessionIndex index_;
   std::set<std::string> registered_;  // SOPInstanceUIDs of X-rays that have a result
   std::set<std::string> accepted_;    // sessions to be released without a person
   std::vector<WaitingSession> waiting_;
+  std::optional<Running> running_;
   std::map<std::string, Failure> failures_;  // by session
   std::map<std::string, std::string> troubles_;
-  Clock::time_point steady_since_ = Clock::now();  // everything that came has been seen
+  Clock::time_point seen_at_ = Clock::now();     // what had come by then has been seen
+  Clock::time_point quiet_from_ = Clock::now();  // a server was down until then
   Clock::time_point next_forgetting_ = Clock::now();
   bool takes_other_xrays_;  // a machine profile supplies their geometry
 };

@@ -9,7 +9,6 @@
 
 #include <memory>
 
-#include "geometry/error.h"
 #include "io/dicom_dataset.h"
 
 namespace isoshift {
@@ -36,9 +35,11 @@ class Association {
     syntaxes.push_back(UID_LittleEndianImplicitTransferSyntax);
     check(scu_->addPresentationContext(abstract_syntax, syntaxes), "presentation context");
     check(scu_->initNetwork(), "no connection can be prepared");
-    check(scu_->negotiateAssociation(), "no association");
-    context_ = scu_->findAnyPresentationContextID(abstract_syntax, "");
-    if (context_ == 0) fail(fmt::format("does not take {}", dcmFindNameOfUID(abstract_syntax, abstract_syntax)));
+    const OFCondition negotiated = scu_->negotiateAssociation();
+    context_ = negotiated.good() ? scu_->findAnyPresentationContextID(abstract_syntax, "") : 0;
+    if (negotiated == NET_EC_NoAcceptablePresentationContexts || (negotiated.good() && context_ == 0))
+      fail(fmt::format("does not take {}", dcmFindNameOfUID(abstract_syntax, abstract_syntax)));
+    check(negotiated, "no association");
   }
   ~Association() {
     if (scu_->isConnected()) scu_->releaseAssociation();
@@ -51,7 +52,7 @@ class Association {
 
   [[noreturn]] void fail(const std::string& why) const { throw Error(fmt::format("peer {}: {}", peer_.name, why)); }
   void check(const OFCondition& condition, const char* what) const {
-    if (condition.bad()) fail(fmt::format("{}: {}", what, condition.text()));
+    if (condition.bad()) throw PeerError(fmt::format("peer {}: {}: {}", peer_.name, what, condition.text()));
   }
 
  private:

@@ -10,7 +10,7 @@
 namespace isoshift {
 namespace {
 
-constexpr long kConnectTimeoutS = 5, kTimeoutS = 60, kOk = 200, kNotFound = 404;
+constexpr long kConnectTimeoutS = 5, kStallS = 30, kStallBytesPerS = 1000, kOk = 200, kNotFound = 404;
 
 std::size_t append(char* bytes, std::size_t size, std::size_t count, void* to) {
   static_cast<std::string*>(to)->append(bytes, size * count);
@@ -50,7 +50,8 @@ Orthanc::Answer Orthanc::get(const std::string& path) const {
   curl_easy_setopt(curl_, CURLOPT_PROTOCOLS_STR, "http,https");
   curl_easy_setopt(curl_, CURLOPT_NOSIGNAL, 1L);
   curl_easy_setopt(curl_, CURLOPT_CONNECTTIMEOUT, kConnectTimeoutS);
-  curl_easy_setopt(curl_, CURLOPT_TIMEOUT, kTimeoutS);
+  curl_easy_setopt(curl_, CURLOPT_LOW_SPEED_TIME, kStallS);
+  curl_easy_setopt(curl_, CURLOPT_LOW_SPEED_LIMIT, kStallBytesPerS);
   curl_easy_setopt(curl_, CURLOPT_WRITEFUNCTION, append);
   curl_easy_setopt(curl_, CURLOPT_WRITEDATA, &answer.body);
   if (!server_.user.empty()) {

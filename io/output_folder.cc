@@ -31,15 +31,6 @@ std::set<fs::path> unfinished;
   throw WriteError(fmt::format("{}: cannot be written: {}\n       No result was left behind", path.string(), why));
 }
 
-void flush(const fs::path& path) {
-  const int descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
-  if (descriptor < 0) fail(path, std::strerror(errno));
-  const int failed = ::fsync(descriptor);
-  const int reason = errno;
-  ::close(descriptor);
-  if (failed != 0) fail(path, std::strerror(reason));
-}
-
 std::set<fs::path> files_in(const fs::path& folder) {
   std::set<fs::path> files;
   for (const auto& entry : fs::recursive_directory_iterator(folder))
@@ -74,6 +65,15 @@ void check_replaceable(const fs::path& destination, bool overwrite) {
 }
 
 }  // namespace
+
+void flush(const fs::path& path) {
+  const int descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
+  if (descriptor < 0) fail(path, std::strerror(errno));
+  const int failed = ::fsync(descriptor);
+  const int reason = errno;
+  ::close(descriptor);
+  if (failed != 0) fail(path, std::strerror(reason));
+}
 
 OutputFolder::OutputFolder(fs::path destination, bool overwrite) : destination_(std::move(destination)) {
   if (destination_.empty()) throw UsageError("the name of the output folder is empty");

@@ -41,6 +41,9 @@ class OutputFolder {
 // Removes what uncommitted output folders of this process hold so far. For a process that is told to end.
 void abandon_outputs() noexcept;
 
+// Waits until a file, or the names in a folder, are on the disk.
+void flush(const std::filesystem::path& path);
+
 // The whole text in place of what is there, flushed; with an Error what was there before remains.
 void replace_text(const std::filesystem::path& path, std::string_view text);
 

@@ -7,6 +7,8 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
+#include <fstream>
+#include <iterator>
 
 #include "geometry/error.h"
 #include "io/json_file.h"
@@ -97,6 +99,7 @@ Release ResultsTree::release(const std::string& session, const std::string& by,
     throw Error(fmt::format("session {}: has been released by {} on {}", session, before.by, before.on));
   }
   if (failed != 0) throw Error(fmt::format("{}: cannot be written: {}", file.string(), std::strerror(reason)));
+  flush(file.parent_path());
   audit("released", {{"session", session}, {"by", by}, {"verdict", verdict}, {"objects", objects}, {"peers", peers}});
   return release;
 }
@@ -105,28 +108,37 @@ fs::path ResultsTree::sent_file(const Delivery& delivery) const {
   return path_ / "sent" / fmt::format("{}.{}.{}", delivery.session, delivery.peer, delivery.object.file);
 }
 
+std::vector<std::string> ResultsTree::released() const {
+  std::vector<std::string> sessions;
+  for (const auto& entry : fs::directory_iterator(path_ / "released"))
+    if (entry.path().extension() == ".json" && !entry.path().filename().string().starts_with('.'))
+      sessions.push_back(entry.path().stem().string());
+  std::ranges::sort(sessions);
+  return sessions;
+}
+
+std::vector<Delivery> ResultsTree::pending_of(const Release& release) const {
+  std::vector<Delivery> pending;
+  for (const std::string& peer : release.peers)
+    for (const Release::Object& object : release.objects) {
+      Delivery delivery{.session = release.session, .peer = peer, .object = object};
+      if (!fs::exists(sent_file(delivery))) pending.push_back(std::move(delivery));
+    }
+  return pending;
+}
+
 std::vector<Delivery> ResultsTree::pending() const {
   std::vector<Delivery> pending;
-  for (const auto& entry : fs::directory_iterator(path_ / "released")) {
-    const std::string session = entry.path().stem().string();
-    if (entry.path().extension() != ".json" || session.starts_with('.') || delivered_.contains(session)) continue;
-    Release release;
+  for (const std::string& session : released()) {
+    if (delivered_.contains(session)) continue;
     try {
-      release = release_of(session).value();
+      std::vector<Delivery> left = pending_of(release_of(session).value());
+      if (left.empty()) delivered_.insert(session);
+      std::ranges::move(left, std::back_inserter(pending));
     } catch (const std::exception&) {
       continue;  // whoever shows its state says that it cannot be read
     }
-    bool is_delivered = true;
-    for (const std::string& peer : release.peers)
-      for (const Release::Object& object : release.objects) {
-        Delivery delivery{.session = session, .peer = peer, .object = object};
-        if (fs::exists(sent_file(delivery))) continue;
-        is_delivered = false;
-        pending.push_back(std::move(delivery));
-      }
-    if (is_delivered) delivered_.insert(session);
   }
-  std::ranges::sort(pending, {}, [](const Delivery& one) { return std::pair(one.session, one.peer); });
   return pending;
 }
 
@@ -149,10 +161,38 @@ bool ResultsTree::is_in_doubt(const Delivery& delivery) const { return fs::exist
 
 void ResultsTree::mark_sent(const Delivery& delivery, const std::string& answer) const {
   fs::rename(prepared_file(delivery), sent_file(delivery));
+  flush(path_ / "sent");
   audit("sent", {{"session", delivery.session},
                  {"peer", delivery.peer},
                  {"object", delivery.object.sha256},
                  {"answer", answer.empty() ? "success" : answer}});
+}
+
+void ResultsTree::complete_audit() const {
+  std::set<std::string> written;  // events, with what tells one from another
+  const auto key = [](const Json& line) {
+    return line.value("event", "") + " " + line.value("session", "") + " " + line.value("peer", "") + " " +
+           line.value("object", "");
+  };
+  std::ifstream file(path_ / "audit.jsonl");
+  for (std::string text; std::getline(file, text);)
+    if (const Json line = Json::parse(text, nullptr, false); line.is_object()) written.insert(key(line));
+  const auto complete = [&](const char* event, Json details) {
+    Json line = {{"event", event}};
+    line.update(details);
+    if (written.contains(key(line))) return;
+    details["noted"] = "at the next start";
+    audit(event, details);
+  };
+  for (const std::string& session : sessions()) complete("registered", {{"session", session}});
+  for (const std::string& session : released()) {
+    const Release release = release_of(session).value();
+    complete("released", {{"session", session}, {"by", release.by}, {"released_on", release.on}});
+    for (const std::string& peer : release.peers)
+      for (const Release::Object& object : release.objects)
+        if (fs::exists(sent_file({.session = session, .peer = peer, .object = object})))
+          complete("sent", {{"session", session}, {"peer", peer}, {"object", object.sha256}});
+  }
 }
 
 void ResultsTree::audit(const std::string& event, const Json& details) const {

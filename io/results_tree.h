@@ -56,6 +56,7 @@ class ResultsTree {
 
   // What was released and no peer has answered for. What has been delivered once is not read again.
   std::vector<Delivery> pending() const;
+  std::vector<Delivery> pending_of(const Release& release) const;
   // The file, if it is what was released. Throws Error if it has changed since.
   std::filesystem::path checked_file(const Delivery& delivery) const;
   // Writes what mark_sent() only has to put in place: with a full disk nothing is sent that cannot be marked.
@@ -66,8 +67,11 @@ class ResultsTree {
 
   // One line, flushed. What cannot be written now is with the next one.
   void audit(const std::string& event, const nlohmann::ordered_json& details) const;
+  // Adds lines for what was done by somebody who was killed before the line. Only for whoever holds the lock.
+  void complete_audit() const;
 
  private:
+  std::vector<std::string> released() const;  // sessions
   std::filesystem::path sent_file(const Delivery& delivery) const;
   std::filesystem::path prepared_file(const Delivery& delivery) const;
 

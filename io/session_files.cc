@@ -55,9 +55,22 @@ std::vector<SessionFiles> sessions_of(const StudyFiles& files, bool other_xrays)
 
 StudyFiles files_for(const SessionFiles& session, const StudyFiles& files) {
   StudyFiles own;
+  const std::string id = patient_id_of(session.patient);
+  std::set<std::string> issued = {session.patient};  // patients of this ID whose issuer is named
+  const auto find_issuers = [&](const auto& entries) {
+    for (const auto& entry : entries)
+      if (patient_id_of(entry.patient) == id) issued.insert(entry.patient);
+  };
+  find_issuers(files.cts);
+  find_issuers(files.plans);
+  find_issuers(files.structures);
+  find_issuers(files.images);
+  find_issuers(files.other_xrays);
+  issued.erase(id + "\\");
   const auto take = [&](auto& to, const auto& from) {
-    std::ranges::copy_if(from, std::back_inserter(to),
-                         [&](const auto& entry) { return entry.patient == session.patient; });
+    std::ranges::copy_if(from, std::back_inserter(to), [&](const auto& entry) {
+      return entry.patient == session.patient || (issued.size() <= 1 && patient_id_of(entry.patient) == id);
+    });
   };
   take(own.cts, files.cts);
   take(own.plans, files.plans);

@@ -20,7 +20,8 @@ struct SessionFiles {
 // other classes than RT Image are X-rays to be registered.
 std::vector<SessionFiles> sessions_of(const StudyFiles& files, bool other_xrays);
 
-// What choose_parts() chooses from for a session: all files of its patient, and of X-rays its own.
+// What choose_parts() chooses from for a session: all files of its patient, and of X-rays its own. Files without an
+// issuer of the PatientID are of the only one there is.
 StudyFiles files_for(const SessionFiles& session, const StudyFiles& files);
 
 // CT images that its structure set was drawn on and that are not there, in words; empty: none, or nobody knows.

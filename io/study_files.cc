@@ -250,6 +250,8 @@ StudyParts chosen(StudyFiles files, std::vector<StudyFiles::Plan> other_plans, c
 
 }  // namespace
 
+std::string patient_id_of(const std::string& patient) { return patient.substr(0, patient.find('\\')); }
+
 std::vector<fs::path> files_below(const std::vector<fs::path>& paths, const std::unordered_set<std::string>& but) {
   std::vector<fs::path> files;
   const auto add = [&](const fs::path& file) {

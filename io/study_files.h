@@ -14,7 +14,7 @@ namespace isoshift {
 // The files below some paths, sorted by what they are, with what tells which of them belong together.
 struct StudyFiles {
   struct Ct {
-    std::string patient;  // PatientID, and its issuer
+    std::string patient;  // PatientID\issuer
     std::string series_instance_uid;
     std::string frame_of_reference_uid;
     std::vector<std::filesystem::path> files;
@@ -52,6 +52,9 @@ struct StudyFiles {
   std::vector<std::string> left_aside;  // "FILE: reason"
   std::vector<std::string> unreadable;  // why files that begin as DICOM, or cannot be opened, cannot be read
 };
+
+// The PatientID alone of what StudyFiles calls a patient.
+std::string patient_id_of(const std::string& patient);
 
 // All files below `paths` (files or folders) but those named and hidden ones (with a leading dot), in the order of
 // their names. Throws Error for a path that is not there or cannot be searched.

@@ -27,6 +27,7 @@ class InboxTest : public testing::Test {
     inbox_->update(notes_);
     inbox_->update(notes_);
   }
+  bool is_coming() const { return inbox_->is_coming(inbox_->patients().begin()->first); }
   const Inbox::Patient& patient() const { return inbox_->patients().begin()->second; }
   std::size_t slices() const { return patient().files.cts.at(0).files.size(); }
 
@@ -42,17 +43,44 @@ TEST_F(InboxTest, TakesAllFilesOfAPatient) {
   EXPECT_EQ(patient().files.images.size(), 2U);
   EXPECT_EQ(patient().files.plans.size(), 1U);
   EXPECT_GT(slices(), 10U);
-  EXPECT_TRUE(inbox_->is_settled());
+  EXPECT_FALSE(is_coming());
   EXPECT_THAT(notes_.warnings, testing::IsEmpty());
 }
 
 TEST_F(InboxTest, AFileThatGrowsIsNotTakenYet) {
   fs::copy(study_.plan(), watch_.folder / "plan2.dcm");
   inbox_->update(notes_);
-  EXPECT_FALSE(inbox_->is_settled());
+  EXPECT_TRUE(is_coming());
   std::ofstream(watch_.folder / "plan2.dcm", std::ios::app) << "more";
   inbox_->update(notes_);
-  EXPECT_FALSE(inbox_->is_settled());
+  EXPECT_TRUE(is_coming());
+}
+
+TEST_F(InboxTest, WhatIsOfSomebodyElseOrNoDicomIsNotWaitedFor) {
+  std::ofstream(watch_.folder / "export.log") << "exported";
+  fs::copy(study_.plan(), watch_.folder / "other.dcm");
+  edit(watch_.folder / "other.dcm", [](DicomItem d) {
+    d.put(DCM_PatientID, "OTHER");
+    d.put(DCM_SOPInstanceUID, "2.25.7");
+  });
+  inbox_->update(notes_);
+  EXPECT_FALSE(is_coming());
+  EXPECT_TRUE(inbox_->is_coming("OTHER"));
+  inbox_->update(notes_);
+  EXPECT_FALSE(inbox_->is_coming("OTHER"));
+  EXPECT_EQ(inbox_->patients().size(), 2U);
+}
+
+TEST_F(InboxTest, AWholeObjectTakesThePlaceOfATruncatedOne) {
+  const fs::path slice = watch_.folder / fs::relative(study_.ct_slice(3), study_.path());
+  fs::resize_file(slice, fs::file_size(slice) / 2);
+  settle();
+  const std::size_t before = slices();
+  fs::copy(study_.ct_slice(3), watch_.folder / "again.dcm");
+  settle();
+  EXPECT_EQ(slices(), before);
+  EXPECT_THAT(patient().files.cts.at(0).files, testing::Contains(watch_.folder / "again.dcm"));
+  EXPECT_THAT(patient().files.cts.at(0).files, testing::Not(testing::Contains(slice)));
 }
 
 TEST_F(InboxTest, WhatIsGoneIsForgotten) {

@@ -23,6 +23,14 @@ TEST(Watch, RegistersWhatComesAndSendsWhatIsReleasedOnce) {
   EXPECT_EQ(checked.exit_status, 0) << checked.out << std::string(std::istreambuf_iterator<char>(log), {});
 }
 
+TEST(Watch, InTroubleLosesNothingAndLetsNobodyElseWait) {
+  const TemporaryFolder work;
+  const CommandOutcome checked = run_shell(fmt::format("/usr/bin/python3 {}/tests/cli/watch_in_trouble.py {} {}",
+                                                       ISOSHIFT_SOURCE_DIR, ISOSHIFT_PROGRAM, (work / "").string()));
+  std::ifstream log(work / "watch.log");
+  EXPECT_EQ(checked.exit_status, 0) << checked.out << std::string(std::istreambuf_iterator<char>(log), {});
+}
+
 TEST(Watch, FollowsAFolder) {
   const TemporaryFolder work;
   const SmallStudy study;
@@ -53,12 +61,13 @@ TEST(Watch, FlagsOfTheFileAreCheckedAtStart) {
   const TemporaryFolder work;
   fs::create_directories(work / "in");
   std::ofstream(work / "site.json") << R"({"site_file": 1, "name": "S", "sessions": {"views": 2, "quiet_s": 1}})";
-  std::ofstream(work / "watch.json") << R"({"watch_file": 1, "folder": "in", "results": "out", "site": "site.json",)"
-                                     << R"( "register": ["--preste=fast"]})";
-  const CommandOutcome outcome = run_command({"watch", (work / "watch.json").string()});
-  EXPECT_EQ(outcome.exit_status, 1);
-  EXPECT_THAT(outcome.err, testing::HasSubstr("watch.json: register: "));
-  EXPECT_THAT(outcome.err, testing::HasSubstr("--preste=fast"));
+  for (const char* flag : {"--preste=fast", "--anatomy=pelvis", "--allow=everything", "--site=other.json"}) {
+    std::ofstream(work / "watch.json") << R"({"watch_file": 1, "folder": "in", "results": "out", "site": "site.json",)"
+                                       << R"( "register": [")" << flag << R"("]})";
+    const CommandOutcome outcome = run_command({"watch", (work / "watch.json").string()});
+    EXPECT_EQ(outcome.exit_status, 1) << flag;
+    EXPECT_THAT(outcome.err, testing::HasSubstr("watch.json: register: ")) << flag;
+  }
 }
 
 TEST(Slurm, RunsABatchAsAJobArray) {

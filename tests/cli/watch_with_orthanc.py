@@ -20,22 +20,9 @@ import urllib.error
 import pydicom
 
 from orthanc_server import Orthanc, fetch
+from room import expect, wait_for
 
 VIEWS, QUIET_S = 2, 2
-
-
-def expect(truth, message):
-    if not truth:
-        sys.exit(message)
-
-
-def wait_for(condition, seconds, what):
-    end = time.time() + seconds
-    while time.time() < end:
-        if condition():
-            return
-        time.sleep(0.2)
-    sys.exit(f"waited {seconds} s for {what}")
 
 
 def make_certificate(folder):

@@ -67,6 +67,23 @@ TEST_F(ResultsTreeTest, EveryObjectIsPendingForEveryPeerUntilItIsSent) {
   EXPECT_THAT(audit(), HasSubstr("\"event\":\"sent\""));
 }
 
+TEST_F(ResultsTreeTest, LinesOfTheAuditLogThatAKilledProcessDidNotWriteAreAdded) {
+  tree_.audit("registered", {{"session", "a"}});
+  tree_.release("a", "J. Doe", {"record"});
+  const Delivery sent = tree_.pending()[0];
+  tree_.prepare_to_send(sent);
+  tree_.mark_sent(sent, "");
+  const std::string before = audit();
+  tree_.complete_audit();
+  EXPECT_EQ(audit(), before);
+  replace_text(tree_.path() / "audit.jsonl", before.substr(0, before.find('\n') + 1));  // the first line alone
+  tree_.complete_audit();
+  EXPECT_THAT(audit(), HasSubstr("\"event\":\"released\",\"session\":\"a\",\"by\":\"J. Doe\""));
+  EXPECT_THAT(audit(), HasSubstr("\"event\":\"sent\",\"session\":\"a\",\"peer\":\"record\""));
+  EXPECT_THAT(audit(), HasSubstr("at the next start"));
+  EXPECT_THAT(audit().substr(before.find('\n')), testing::Not(HasSubstr("registered")));
+}
+
 TEST_F(ResultsTreeTest, ASessionIsReleasedOnce) {
   tree_.release("a", "J. Doe", {"record"});
   EXPECT_THAT(error_of_release("a"), HasSubstr("has been released by J. Doe on "));

@@ -42,6 +42,29 @@ TEST(Sessions, NamesFollowFromTheXraysAlone) {
   EXPECT_NE(sessions_of(one, false)[0].name, sessions_of(other, false)[0].name);
 }
 
+TEST(Sessions, AnAbsentIssuerIsTheOnlyOneThereIs) {
+  StudyFiles files;
+  files.images = {image("1", "A", 0)};
+  files.images[0].patient = "7\\";
+  const auto ct_of = [](const std::string& patient) {
+    return StudyFiles::Ct{
+        .patient = patient, .series_instance_uid = patient, .frame_of_reference_uid = "f", .files = {"a"}};
+  };
+  files.cts = {ct_of("7\\HOSPITAL"), ct_of("70\\HOSPITAL")};
+  const auto own = [&] {
+    std::vector<std::string> patients;
+    for (const StudyFiles::Ct& ct : files_for(sessions_of(files, false)[0], files).cts) patients.push_back(ct.patient);
+    return patients;
+  };
+  EXPECT_THAT(own(), testing::ElementsAre("7\\HOSPITAL"));
+  files.cts.push_back(ct_of("7\\OTHER"));
+  EXPECT_THAT(own(), testing::IsEmpty());
+  files.cts.push_back(ct_of("7\\"));
+  EXPECT_THAT(own(), testing::ElementsAre("7\\"));
+  files.images[0].patient = "7\\OTHER";
+  EXPECT_THAT(own(), testing::ElementsAre("7\\OTHER"));
+}
+
 TEST(Sessions, WhatIsReferredToAndNotThereIsMissing) {
   StudyFiles files;
   files.images = {image("1", "A", 0)};
