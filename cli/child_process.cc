@@ -35,6 +35,7 @@ pid_t start_child(const std::string& program, std::vector<std::string> words, co
   for (const auto& [from, to] : {std::pair(streams.in, STDIN_FILENO), std::pair(streams.out, STDOUT_FILENO),
                                  std::pair(streams.err, STDERR_FILENO)})
     if (from >= 0) posix_spawn_file_actions_adddup2(&actions, from, to);
+  ::posix_spawn_file_actions_addclosefrom_np(&actions, STDERR_FILENO + 1);  // libraries' sockets
   std::vector<char*> argv;
   argv.reserve(words.size() + 1);
   for (std::string& word : words) argv.push_back(word.data());

@@ -16,12 +16,13 @@ std::chrono::seconds Deliverer::pause(const std::string& what) {
   return pause.length;
 }
 
-void Deliverer::deliver(Console& console) {
+void Deliverer::deliver(const std::stop_token& stop, Console& console) {
   const auto is_due = [&](const std::string& what) {
     const auto pause = pauses_.find(what);
     return pause == pauses_.end() || pause->second.until <= std::chrono::steady_clock::now();
   };
   for (const Delivery& delivery : tree_.pending()) {
+    if (stop.stop_requested()) return;
     const auto& [session, peer_name, object] = delivery;
     const std::string key = fmt::format("{}/{}/{}", peer_name, session, object.file);
     if (!is_due(peer_name) || !is_due(key)) continue;

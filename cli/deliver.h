@@ -3,6 +3,7 @@
 
 #include <chrono>
 #include <map>
+#include <stop_token>
 #include <string>
 
 #include "cli/console.h"
@@ -16,8 +17,8 @@ class Deliverer {
  public:
   explicit Deliverer(const WatchFile& watch) : tree_(watch.results), watch_(watch) {}
 
-  // Tries all that is due. Only for whoever holds the lock of the tree.
-  void deliver(Console& console);
+  // Tries all that is due, until it is stopped. Only for whoever holds the lock of the tree.
+  void deliver(const std::stop_token& stop, Console& console);
 
  private:
   struct Pause {

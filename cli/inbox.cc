@@ -51,7 +51,9 @@ Inbox::Inbox(const WatchFile& watch, fs::path objects) : watch_(watch), objects_
   fs::create_directories(objects_);
   if (!fs::exists(objects_ / kState)) return;
   const nlohmann::json state = read_json_file(objects_ / kState).json;
+  if (state.at("url") != watch_.orthanc->url) return;  // another server
   last_change_ = state.at("last_change");
+  last_mark_ = state.at("last_mark");
   for (const std::string instance : state.at("not_fetched")) unfetched_[instance];
 }
 
@@ -96,7 +98,12 @@ void Inbox::update(Notes& notes) {
 }
 
 void Inbox::update_folder(Notes& notes) {
-  const std::vector<fs::path> files = files_below({watch_.folder});
+  std::set<fs::path> unsearchable;
+  const std::vector<fs::path> files = files_below({watch_.folder}, {}, &unsearchable);
+  const auto warn_once = [&](const fs::path& path) {
+    if (unopened_.insert(path).second) notes.warnings.push_back(fmt::format("{}: cannot be opened", path.string()));
+  };
+  std::ranges::for_each(unsearchable, warn_once);
   std::vector<fs::path> gone;
   for (const auto& [file, version] : done_)
     if (!std::ranges::binary_search(files, file)) gone.push_back(file);
@@ -112,7 +119,7 @@ void Inbox::update_folder(Notes& notes) {
     const auto done = done_.find(file), end = done_.end();
     if (error || (done != end && done->second == version)) continue;
     if (!std::ifstream(file)) {
-      if (unopened_.insert(file).second) notes.warnings.push_back(fmt::format("{}: cannot be opened", file.string()));
+      warn_once(file);
       continue;
     }
     unopened_.erase(file);
@@ -139,6 +146,8 @@ void Inbox::update_orthanc(Notes& notes) {
   if (!has_read_objects_) read_objects(notes);
   has_read_objects_ = true;
   has_all_changes_ = false;
+  if (!has_checked_server_) check_server(notes);
+  has_checked_server_ = true;
   const Orthanc::Changes changes = orthanc_->changes_since(last_change_);
   if (changes.last < last_change_) {  // another database
     last_change_ = 0;
@@ -151,11 +160,23 @@ void Inbox::update_orthanc(Notes& notes) {
     if (attempts.next <= Clock::now()) fetch(instance, notes);
   has_all_changes_ = changes.done;
   last_change_ = changes.last;
+  if (!changes.mark.empty()) last_mark_ = changes.mark;
   save_state();
 }
 
+// Another database under the same address has another change of that number, or none.
+void Inbox::check_server(Notes& notes) {
+  if (last_change_ == 0 || orthanc_->changes_since(last_change_ - 1, 1).mark == last_mark_) return;
+  notes.warnings.push_back(
+      fmt::format("Orthanc at {}: holds other changes than before: asked for all of them again", watch_.orthanc->url));
+  last_change_ = 0;
+}
+
 void Inbox::save_state() {
-  nlohmann::json state = {{"last_change", last_change_}, {"not_fetched", nlohmann::json::array()}};
+  nlohmann::json state = {{"url", watch_.orthanc->url},
+                          {"last_change", last_change_},
+                          {"last_mark", last_mark_},
+                          {"not_fetched", nlohmann::json::array()}};
   for (const auto& [instance, attempts] : unfetched_) state["not_fetched"].push_back(instance);
   std::string text = state.dump() + "\n";
   if (text == saved_state_) return;
@@ -168,10 +189,12 @@ void Inbox::read_objects(Notes& notes) {
   for (const auto& entry : fs::directory_iterator(objects_))
     if (entry.path().filename().string().starts_with('.') && entry.path().filename() != kState)
       fs::remove(entry.path());
-  for (const fs::path& object : files_below({objects_})) keep(object, notes);
+  for (const fs::path& object : files_below({objects_}))
+    if (!keep(object, notes)) unfetched_[object.stem().string()];
 }
 
-// One that the server does not give is tried again, after longer and longer times, and holds up no other.
+// One that the server does not give is tried again, after longer and longer times, and holds up no other. Of a server
+// that does not answer at all nothing else is asked in this round.
 void Inbox::fetch(const std::string& instance, Notes& notes) {
   const fs::path file = objects_ / (instance + kSuffix);
   std::string content;
@@ -183,11 +206,15 @@ void Inbox::fetch(const std::string& instance, Notes& notes) {
     constexpr int kSaid = 5;
     if (++attempts.count == kSaid)
       notes.warnings.push_back(fmt::format("an instance that the server does not give: {}", error.what()));
+    if (dynamic_cast<const ServerError*>(&error) != nullptr) throw;
     return;
   }
-  if (!content.empty() && (!fs::exists(file) || sha256_of_file(file) != sha256_of(content))) {
+  const bool is_there = fs::exists(file);
+  if (!content.empty() && (!is_there || sha256_of_file(file) != sha256_of(content))) {
+    if (is_there) notes.warnings.push_back(fmt::format("{}: the server has replaced it by another", file.string()));
     replace_text(file, content);
     keep(file, notes);
+    if (!known_.contains(file)) useless_.insert(instance);
   }
   unfetched_.erase(instance);
 }
@@ -199,7 +226,7 @@ void Inbox::find_rest(const std::string& patient_id, Notes& notes) {
   if (one == known_.end()) return;
   try {
     for (const std::string& instance : orthanc_->instances_beside(one->first.stem().string()))
-      if (!fs::exists(objects_ / (instance + kSuffix)))
+      if (!useless_.contains(instance) && !fs::exists(objects_ / (instance + kSuffix)))
         unfetched_.emplace(instance, Attempts{.count = 0, .since = Clock::now()});
   } catch (const Error& error) {
     next = Clock::now() + 1min;
@@ -244,22 +271,23 @@ void Inbox::forget(const fs::path& file) {
 }
 
 // An object of which nothing is made goes again: the server has it.
-void Inbox::keep(const fs::path& object, Notes& notes) {
-  take(object, notes);
+bool Inbox::keep(const fs::path& object, Notes& notes) {
+  const bool is_readable = take(object, notes);
   if (!known_.contains(object)) fs::remove(object);
+  return is_readable;
 }
 
-void Inbox::take(const fs::path& file, Notes& notes) {
+bool Inbox::take(const fs::path& file, Notes& notes) {
   forget(file);  // another content under a name that was there before
   StudyFiles one;
   try {
     add_file(file, one);
   } catch (const Error& error) {
     notes.warnings.push_back(fmt::format("left out: {}", error.what()));
-    return;
+    return false;
   }
   const std::optional<Known> found = known_in(one);
-  if (!found) return;
+  if (!found) return true;
   if (const auto earlier = file_of_uid_.find(found->uid); earlier != file_of_uid_.end()) {
     const fs::path before = earlier->second;
     if (is_whole(before)) {
@@ -268,7 +296,7 @@ void Inbox::take(const fs::path& file, Notes& notes) {
       if (sha256_of_file(before) != sha256_of_file(file))
         notes.warnings.push_back(fmt::format("{}: left out: differs from {}, which has the same SOPInstanceUID",
                                              file.string(), before.string()));
-      return;
+      return true;
     }
     forget(before);
     if (orthanc_) fs::remove(before);
@@ -279,6 +307,7 @@ void Inbox::take(const fs::path& file, Notes& notes) {
   Patient& patient = patients_[found->patient_id];
   patient.last = Clock::now();
   merge(std::move(one), patient.files);
+  return true;
 }
 
 }  // namespace isoshift

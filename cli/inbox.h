@@ -75,8 +75,10 @@ class Inbox {
   void fetch(const std::string& instance, Notes& notes);
   void find_rest(const std::string& patient_id, Notes& notes);
   void save_state();
-  void keep(const std::filesystem::path& object, Notes& notes);
-  void take(const std::filesystem::path& file, Notes& notes);
+  void check_server(Notes& notes);
+  // Both tell whether it can be read.
+  bool keep(const std::filesystem::path& object, Notes& notes);
+  bool take(const std::filesystem::path& file, Notes& notes);
   void forget(const std::filesystem::path& file);
 
   const WatchFile& watch_;
@@ -90,13 +92,15 @@ class Inbox {
   // Of a folder.
   std::map<std::filesystem::path, Version> done_;
   std::map<std::filesystem::path, Growing> growing_;
-  std::set<std::filesystem::path> unopened_;
+  std::set<std::filesystem::path> unopened_;  // files and folders
 
   // Of a server.
   std::int64_t last_change_ = 0;
+  std::string last_mark_;
   std::map<std::string, Attempts> unfetched_;      // instances
   std::map<std::string, Clock::time_point> rest_;  // patients to be asked for, and when
-  bool has_all_changes_ = true, has_read_objects_ = false;
+  std::set<std::string> useless_;                  // instances that are no part of a study
+  bool has_all_changes_ = true, has_read_objects_ = false, has_checked_server_ = false;
   std::string saved_state_;
 };
 

@@ -33,7 +33,7 @@ void run_release(const std::filesystem::path& file, const std::string& session, 
                                                      : fmt::format("{}", fmt::join(release.peers, ", ")));
   if (release.objects.size() == 1) console.out << "the session holds no registration object\n";
   const auto lock = tree.try_lock();
-  if (lock) Deliverer(watch).deliver(console);  // nobody else does
+  if (lock) Deliverer(watch).deliver(std::stop_token(), console);  // nobody else does
   if (release.peers.empty()) return;
   if (tree.pending_of(release).empty())
     console.out << "sent\n";

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <csignal>
 #include <iterator>
 #include <map>
 #include <memory>
@@ -65,19 +66,21 @@ class Watch {
         tree_(watch.results),
         inbox_(watch, watch.results / "objects"),
         index_(tree_, watch.site.name),
+        deliverer_(watch),
         takes_other_xrays_(takes_other_xrays) {}
 
   void run() {
     const auto lock = tree_.try_lock();
     if (!lock) throw Error(fmt::format("{}: another isoshift watch is working here", tree_.path().string()));
     const GracefulEnd end;
+    std::signal(SIGPIPE, SIG_IGN);  // a peer or server that goes is told by what is called
     tree_.clean();
     take_results();
     attempt("completing the audit log", [&] { tree_.complete_audit(); });
     tree_.audit("started", {{"sessions", index_.size()}});
     console_.err << fmt::format("watching {}; results in {}\n",
                                 watch_.orthanc ? watch_.orthanc->url : watch_.folder.string(), tree_.path().string());
-    const std::jthread sending([this](const std::stop_token& stop) { send(stop); });  // a peer may take its time
+    std::jthread sending([this](const std::stop_token& stop) { send(stop); });  // a peer may take its time
     while (!end.is_asked_for()) {
       attempt("receiving", [&] { receive(); });
       attempt("registering", [&] { register_complete(); });
@@ -85,6 +88,9 @@ class Watch {
       attempt("writing the index", [&] { index_.update(waiting_, troubles()); });
       std::this_thread::sleep_for(kRound);
     }
+    running_.reset();
+    sending.request_stop();
+    sending.join();
     tree_.audit("stopped", nlohmann::ordered_json::object());
   }
 
@@ -127,11 +133,10 @@ class Watch {
   }
 
   void send(const std::stop_token& stop) {
-    Deliverer deliverer(watch_);
     std::string trouble;
     while (!stop.stop_requested()) {
       try {
-        deliverer.deliver(console_);
+        deliverer_.deliver(stop, console_);
         trouble.clear();
       } catch (const std::exception& error) {
         if (std::exchange(trouble, error.what()) != error.what())
@@ -183,7 +188,7 @@ class Watch {
     index_.add(name, report);
     // What was made under another site file waits for a person.
     if (watch_.site.automatic_release && report.verdict == Verdict::kAccepted && report.site &&
-        report.site->automatic_release)
+        report.site->sha256 == watch_.site.sha256)
       accepted_.insert(name);
     return report.verdict;
   }
@@ -271,8 +276,14 @@ class Watch {
       fail(session, news, reason_of(*end), !end->is_late);
       return;
     }
+    std::string verdict;
+    try {
+      verdict = to_string(take_result(session));
+    } catch (const std::exception& error) {
+      fail(session, news, error.what(), false);
+      return;
+    }
     failures_.erase(session);
-    const std::string verdict(to_string(take_result(session)));
     console_.err << fmt::format("session {}: {}\n", session, verdict);
     tree_.audit("registered", {{"session", session}, {"verdict", verdict}});
   }
@@ -324,6 +335,7 @@ class Watch {
   ResultsTree tree_;
   Inbox inbox_;
   SessionIndex index_;
+  Deliverer deliverer_;               // of the thread that sends
   std::set<std::string> registered_;  // SOPInstanceUIDs of X-rays that have a result
   std::set<std::string> accepted_;    // sessions to be released without a person
   std::vector<WaitingSession> waiting_;

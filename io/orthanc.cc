@@ -5,8 +5,6 @@
 
 #include <nlohmann/json.hpp>
 
-#include "geometry/error.h"
-
 namespace isoshift {
 namespace {
 
@@ -60,7 +58,7 @@ Orthanc::Answer Orthanc::get(const std::string& path) const {
   }
   if (!server_.ca.empty()) curl_easy_setopt(curl_, CURLOPT_CAINFO, server_.ca.c_str());
   if (const CURLcode failed = curl_easy_perform(curl_); failed != CURLE_OK)
-    throw Error(fmt::format("Orthanc at {}: {}", server_.url, curl_easy_strerror(failed)));
+    throw ServerError(fmt::format("Orthanc at {}: {}", server_.url, curl_easy_strerror(failed)));
   curl_easy_getinfo(curl_, CURLINFO_RESPONSE_CODE, &answer.status);
   if (answer.status != kOk && answer.status != kNotFound)
     throw Error(fmt::format("Orthanc at {}: answered {} to {}{}", server_.url, answer.status, path,
@@ -68,12 +66,15 @@ Orthanc::Answer Orthanc::get(const std::string& path) const {
   return answer;
 }
 
-Orthanc::Changes Orthanc::changes_since(std::int64_t last) const {
-  const Answer answer = get(fmt::format("/changes?since={}&limit=200", last));
+Orthanc::Changes Orthanc::changes_since(std::int64_t last, int limit) const {
+  const Answer answer = get(fmt::format("/changes?since={}&limit={}", last, limit));
   return parsed(answer.body, server_.url, "a list of changes", [](const nlohmann::json& json) {
-    Changes changes{.instances = {}, .last = json.at("Last").get<std::int64_t>(), .done = json.at("Done").get<bool>()};
-    for (const nlohmann::json& change : json.at("Changes"))
+    Changes changes{
+        .instances = {}, .mark = "", .last = json.at("Last").get<std::int64_t>(), .done = json.at("Done").get<bool>()};
+    for (const nlohmann::json& change : json.at("Changes")) {
       if (change.at("ChangeType") == "NewInstance") changes.instances.push_back(id_of(change));
+      changes.mark = fmt::format("{} {}", change.at("ID").get<std::string>(), change.value("Date", ""));
+    }
     return changes;
   });
 }

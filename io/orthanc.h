@@ -6,9 +6,16 @@
 #include <string>
 #include <vector>
 
+#include "geometry/error.h"
 #include "io/watch_file.h"
 
 namespace isoshift {
+
+// No answer, or one that was cut off.
+class ServerError : public Error {
+ public:
+  using Error::Error;
+};
 
 class Orthanc {
  public:
@@ -19,11 +26,13 @@ class Orthanc {
 
   struct Changes {
     std::vector<std::string> instances;  // Orthanc's identifiers of those that are new
+    std::string mark;                    // tells the last change from that of another database; empty: no change
     std::int64_t last = 0;               // to ask from next time
     bool done = true;                    // no more for now
   };
-  // Throws Error naming the server for one that does not answer, refuses, or answers something else.
-  Changes changes_since(std::int64_t last) const;
+  // Throws ServerError for one that does not answer, Error for one that refuses or answers something else; both name
+  // it.
+  Changes changes_since(std::int64_t last, int limit = 200) const;
 
   // The file as it was received; empty for one that has been deleted since.
   std::string file_of(const std::string& instance) const;

@@ -2,6 +2,7 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <sys/file.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -199,9 +200,12 @@ void ResultsTree::audit(const std::string& event, const Json& details) const {
   Json line = {{"on", local_time()}, {"event", event}};
   line.update(details);
   unwritten_ += line.dump() + "\n";
-  const int descriptor = ::open((path_ / "audit.jsonl").c_str(), O_WRONLY | O_APPEND | O_CREAT | O_CLOEXEC, 0640);
+  const int descriptor = ::open((path_ / "audit.jsonl").c_str(), O_RDWR | O_APPEND | O_CREAT | O_CLOEXEC, 0640);
   if (descriptor < 0) return;
+  ::flock(descriptor, LOCK_EX);
   const off_t before = ::lseek(descriptor, 0, SEEK_END);
+  char last = '\n';
+  if (before > 0 && ::pread(descriptor, &last, 1, before - 1) == 1 && last != '\n') unwritten_.insert(0, "\n");
   const ssize_t written = ::write(descriptor, unwritten_.data(), unwritten_.size());
   if (written == static_cast<ssize_t>(unwritten_.size()) && ::fsync(descriptor) == 0)
     unwritten_.clear();

@@ -2,8 +2,11 @@
 
 #include <dcmtk/dcmdata/dcuid.h>
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <algorithm>
+#include <cerrno>
+#include <cstring>
 #include <iterator>
 #include <utility>
 
@@ -252,7 +255,8 @@ StudyParts chosen(StudyFiles files, std::vector<StudyFiles::Plan> other_plans, c
 
 std::string patient_id_of(const std::string& patient) { return patient.substr(0, patient.find('\\')); }
 
-std::vector<fs::path> files_below(const std::vector<fs::path>& paths, const std::unordered_set<std::string>& but) {
+std::vector<fs::path> files_below(const std::vector<fs::path>& paths, const std::unordered_set<std::string>& but,
+                                  std::set<fs::path>* unsearchable) {
   std::vector<fs::path> files;
   const auto add = [&](const fs::path& file) {
     if (!but.contains(file.native())) files.push_back(file);
@@ -266,8 +270,16 @@ std::vector<fs::path> files_below(const std::vector<fs::path>& paths, const std:
       continue;
     }
     for (auto entry = fs::recursive_directory_iterator(path, error); !error && entry != fs::end(entry);
-         entry.increment(error))
+         entry.increment(error)) {
+      if (entry->is_directory() && ::access(entry->path().c_str(), R_OK | X_OK) != 0) {
+        if (unsearchable == nullptr)
+          throw Error(fmt::format("{}: cannot be searched: {}", entry->path().string(), std::strerror(errno)));
+        unsearchable->insert(entry->path());
+        entry.disable_recursion_pending();
+        continue;
+      }
       if (!entry->path().filename().native().starts_with('.') && entry->is_regular_file()) add(entry->path());
+    }
     if (error) throw Error(fmt::format("{}: cannot be searched: {}", path.string(), error.message()));
   }
   std::ranges::sort(files);

@@ -58,8 +58,10 @@ std::string patient_id_of(const std::string& patient);
 
 // All files below `paths` (files or folders) but those named and hidden ones (with a leading dot), in the order of
 // their names. Throws Error for a path that is not there or cannot be searched.
+// With `unsearchable` folders below them that cannot be searched are left out, and told there.
 std::vector<std::filesystem::path> files_below(const std::vector<std::filesystem::path>& paths,
-                                               const std::unordered_set<std::string>& but = {});
+                                               const std::unordered_set<std::string>& but = {},
+                                               std::set<std::filesystem::path>* unsearchable = nullptr);
 
 // Reads the headers of all files below `paths` (files or folders), in the order of their names. A file that is no DICOM
 // is left aside.

@@ -133,8 +133,9 @@ TEST_F(BatchCommandTest, AWorkerThatDiesTakesItsCaseWithIt) {
   use_program(program);
   const CommandOutcome outcome = batch();
   EXPECT_EQ(outcome.exit_status, 4);
-  for (const auto& one : summary()["cases"])
-    EXPECT_THAT(one["error"].get<std::string>(), HasSubstr("ended by signal 9"));
+  const nlohmann::json all = summary()["cases"];
+  EXPECT_EQ(all.size(), 4U);
+  for (const auto& one : all) EXPECT_THAT(one["error"].get<std::string>(), HasSubstr("ended by signal 9"));
 
   std::ofstream(program) << "#!/bin/sh\nexit 3\n";
   fs::remove_all(results());

@@ -1,4 +1,5 @@
-"""A watch whose server fails, whose disk is full and whose peer does not answer: nothing is lost, nobody else waits.
+"""A watch whose server fails or is another one, whose disk is full or damaged, and whose peer does not answer: nothing is lost, nobody
+else waits.
 
   watch_in_trouble.py ISOSHIFT WORK
 
@@ -29,9 +30,9 @@ class Server(http.server.ThreadingHTTPServer):
         self.instances, self.failures = [], {}
         threading.Thread(target=self.serve_forever, daemon=True).start()
 
-    def publish(self, files, failures=0):
+    def publish(self, files, failures=0, prefix=""):
         for file in files:
-            name = f"{len(self.instances):08x}"
+            name = f"{prefix}{len(self.instances):08x}"
             if pydicom.dcmread(file, stop_before_pixels=True).Modality == "RTIMAGE":
                 self.failures[name], failures = failures, 0
             self.instances.append((name, file.read_bytes()))
@@ -50,10 +51,11 @@ class Handler(http.server.BaseHTTPRequestHandler):
     def do_GET(self):
         url = urllib.parse.urlparse(self.path)
         if url.path == "/changes":
-            since = int(urllib.parse.parse_qs(url.query)["since"][0])
-            new = self.server.instances[since:]
+            since, limit = (int(urllib.parse.parse_qs(url.query)[key][0]) for key in ("since", "limit"))
+            new = self.server.instances[since:since + limit]
             changes = [{"ChangeType": "NewInstance", "ID": name, "Seq": since + n + 1} for n, (name, _) in enumerate(new)]
-            return self.answer(200, json.dumps({"Changes": changes, "Last": since + len(new), "Done": True}).encode())
+            last = since + len(new)
+            return self.answer(200, json.dumps({"Changes": changes, "Last": last, "Done": last >= len(self.server.instances)}).encode())
         name = url.path.split("/")[2]
         if self.server.failures.get(name, 0) > 0:
             self.server.failures[name] -= 1
@@ -84,7 +86,15 @@ def main(program, work):
         return {f.parent.name for f in (results / "sessions").glob("*/result.json") if ".partial" not in f.parent.name}
 
     log = work / "watch.log"
-    watch = subprocess.Popen([program, "watch", work / "watch.json"], stderr=log.open("w"))
+
+    def start():
+        return subprocess.Popen([program, "watch", work / "watch.json"], stderr=log.open("a"))
+
+    def kill():
+        watch.kill()
+        watch.wait()
+
+    watch = start()
     try:
         wait_for(lambda: (results / "index.html").exists(), 30, "the index")
         filler = disk / "filler"
@@ -105,9 +115,30 @@ def main(program, work):
         server.publish(study(program, work / "b", 2))
         wait_for(lambda: len(sessions()) == 2, 25, "a session while the peer says nothing")
         del connection
+
+        # A result and an object that are damaged: the object comes again, and the result keeps no other.
+        kill()
+        damaged = sorted((results / "objects").glob("*.dcm"))[0]
+        content = damaged.read_bytes()
+        damaged.write_bytes(content[:200])
+        (results / "sessions" / min(first) / "result.json").write_text("{")
+        watch = start()
+        wait_for(lambda: damaged.exists() and damaged.read_bytes() == content, 30, "the damaged object to come again")
+        server.publish(study(program, work / "c", 3))
+        wait_for(lambda: len(sessions()) == 3, 60, "a session beside a damaged one")
+        wait_for(lambda: "result.json" in (results / "index.html").read_text(), 10, "the index to tell of the damaged one")
+
+        # Another server's database, with more changes than the first had.
+        kill()
+        before, server.instances = len(server.instances), []
+        other = study(program, work / "d", 4)
+        while len(server.instances) <= before:
+            server.publish(other, prefix="f")
+        watch = start()
+        wait_for(lambda: len(sessions()) == 4, 60, "the session of another server")
+        expect("holds other changes than before" in log.read_text(), "another server was not told")
     finally:
-        watch.kill()
-        watch.wait()
+        kill()
         if is_mounted:
             subprocess.run(["umount", disk], check=True)
 

@@ -76,11 +76,12 @@ TEST_F(ResultsTreeTest, LinesOfTheAuditLogThatAKilledProcessDidNotWriteAreAdded)
   const std::string before = audit();
   tree_.complete_audit();
   EXPECT_EQ(audit(), before);
-  replace_text(tree_.path() / "audit.jsonl", before.substr(0, before.find('\n') + 1));  // the first line alone
+  replace_text(tree_.path() / "audit.jsonl", before.substr(0, before.find('\n') + 20));  // the second line is cut
   tree_.complete_audit();
   EXPECT_THAT(audit(), HasSubstr("\"event\":\"released\",\"session\":\"a\",\"by\":\"J. Doe\""));
   EXPECT_THAT(audit(), HasSubstr("\"event\":\"sent\",\"session\":\"a\",\"peer\":\"record\""));
   EXPECT_THAT(audit(), HasSubstr("at the next start"));
+  EXPECT_THAT(audit(), HasSubstr("\n{\"on\":"));  // a line of its own behind the cut one
   EXPECT_THAT(audit().substr(before.find('\n')), testing::Not(HasSubstr("registered")));
 }
 
