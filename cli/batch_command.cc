@@ -141,7 +141,7 @@ class Batch {
   std::vector<BatchCase> scanned_cases() const {
     Notes notes;
     std::vector<BatchCase> cases = scan_cases(options_.cases, !options_.each.study.machine.empty(), notes);
-    for (const std::string& warning : notes.warnings) console_.err << "warning: " << warning << "\n";
+    print_warnings(notes.warnings, console_);
     return cases;
   }
 

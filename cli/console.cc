@@ -44,4 +44,8 @@ void ProgressBar::update(double share) {
   shown_percent_ = percent;
 }
 
+void print_warnings(const std::vector<std::string>& warnings, Console& console) {
+  for (const std::string& warning : warnings) console.err << "warning: " << warning << "\n";
+}
+
 }  // namespace isoshift

@@ -6,6 +6,7 @@
 #include <ostream>
 #include <string>
 #include <string_view>
+#include <vector>
 
 namespace isoshift {
 
@@ -35,6 +36,8 @@ class ProgressBar {
   std::chrono::steady_clock::time_point begin_;
   int shown_percent_ = -1;
 };
+
+void print_warnings(const std::vector<std::string>& warnings, Console& console);
 
 // Exit statuses, the same for every command.
 inline constexpr int kExitAccepted = 0;

@@ -8,25 +8,19 @@
 
 namespace isoshift {
 
-std::chrono::seconds Deliverer::pause(const std::string& what) {
-  constexpr std::chrono::seconds kFirst(2), kLongest(300);
-  Pause& pause = pauses_[what];
-  pause.length = std::clamp(2 * pause.length, kFirst, kLongest);
-  pause.until = std::chrono::steady_clock::now() + pause.length;
-  return pause.length;
-}
-
 void Deliverer::deliver(const std::stop_token& stop, Console& console) {
   const auto is_due = [&](const std::string& what) {
     const auto pause = pauses_.find(what);
-    return pause == pauses_.end() || pause->second.until <= std::chrono::steady_clock::now();
+    return pause == pauses_.end() || pause->second.is_due();
   };
   for (const Delivery& delivery : tree_.pending()) {
     if (stop.stop_requested()) return;
     const auto& [session, peer_name, object] = delivery;
     const std::string key = fmt::format("{}/{}/{}", peer_name, session, object.file);
     if (!is_due(peer_name) || !is_due(key)) continue;
-    const auto say_failed = [&](const std::exception& error, std::chrono::seconds pause) {
+    const auto fail = [&](const std::string& what, const std::exception& error) {
+      constexpr std::chrono::seconds kFirst(2), kLongest(300);
+      const std::chrono::seconds pause = pauses_.try_emplace(what, kFirst, kLongest).first->second.fail();
       console.err << fmt::format("session {}: {} not sent, tried again in {} s: {}\n", delivery.session,
                                  delivery.object.file, pause.count(), error.what());
     };
@@ -44,9 +38,9 @@ void Deliverer::deliver(const std::stop_token& stop, Console& console) {
       pauses_.erase(peer_name);
       pauses_.erase(key);
     } catch (const PeerError& error) {
-      say_failed(error, pause(peer_name));
+      fail(delivery.peer, error);
     } catch (const std::exception& error) {
-      say_failed(error, pause(key));
+      fail(key, error);
     }
   }
 }

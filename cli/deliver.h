@@ -1,11 +1,11 @@
 #pragma once
 // Sends what was released to the peers of a watch file.
 
-#include <chrono>
 #include <map>
 #include <stop_token>
 #include <string>
 
+#include "cli/backoff.h"
 #include "cli/console.h"
 #include "io/results_tree.h"
 #include "io/watch_file.h"
@@ -21,15 +21,9 @@ class Deliverer {
   void deliver(const std::stop_token& stop, Console& console);
 
  private:
-  struct Pause {
-    std::chrono::seconds length{0};
-    std::chrono::steady_clock::time_point until;
-  };
-  std::chrono::seconds pause(const std::string& what);
-
   ResultsTree tree_;
   const WatchFile& watch_;
-  std::map<std::string, Pause> pauses_;  // of peers, and of objects that one refuses
+  std::map<std::string, Backoff> pauses_;  // of peers, and of objects that one refuses
 };
 
 }  // namespace isoshift

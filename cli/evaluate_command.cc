@@ -229,7 +229,7 @@ int run_evaluate(EvaluateOptions options, Console& console) {
     run_missing(folder, study, setup, truth, start_poses(truth, protocol), jobs, bar);
   }
   folder.write_summary();
-  for (const std::string& warning : notes.warnings) console.err << "warning: " << warning << "\n";
+  print_warnings(notes.warnings, console);
   console.out << evaluation_table(
       {{options.output.filename().string(), summarized(folder.runs(), folder.judged_by_mrpd())}});
   return kExitAccepted;

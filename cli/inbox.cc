@@ -20,7 +20,7 @@ namespace fs = std::filesystem;
 using namespace std::chrono_literals;
 
 constexpr const char *kState = ".orthanc.json", *kSuffix = ".dcm";
-constexpr std::chrono::seconds kLongestWait(60), kFirstPause(1), kLongestPause(600);
+constexpr std::chrono::seconds kLongestWait(60);
 
 // Whether it is there and can be read to its end.
 bool is_whole(const fs::path& file) {
@@ -72,9 +72,7 @@ std::optional<Inbox::Known> Inbox::known_in(const StudyFiles& one) {
 Inbox::Growing Inbox::growing(const fs::path& file, const Version& version) {
   Growing growing{.version = version, .since = Clock::now(), .patient_id = ""};
   try {
-    StudyFiles one;
-    add_file(file, one);
-    if (const auto known = known_in(one)) growing.patient_id = known->patient_id;
+    if (const auto known = known_in(scan_file(file))) growing.patient_id = known->patient_id;
   } catch (const Error&) {
     // It does not yet.
   }
@@ -153,11 +151,11 @@ void Inbox::update_orthanc(Notes& notes) {
     last_change_ = 0;
     return;
   }
-  for (const std::string& instance : changes.instances) unfetched_[instance] = {.count = 0, .since = Clock::now()};
+  for (const std::string& instance : changes.instances) unfetched_[instance] = {.since = Clock::now()};
   for (auto& [patient_id, when] : rest_)
     if (when <= Clock::now()) find_rest(patient_id, notes);
   for (const auto& [instance, attempts] : std::map(unfetched_))
-    if (attempts.next <= Clock::now()) fetch(instance, notes);
+    if (attempts.again.is_due()) fetch(instance, notes);
   has_all_changes_ = changes.done;
   last_change_ = changes.last;
   if (!changes.mark.empty()) last_mark_ = changes.mark;
@@ -198,15 +196,20 @@ void Inbox::read_objects(Notes& notes) {
 void Inbox::fetch(const std::string& instance, Notes& notes) {
   const fs::path file = objects_ / (instance + kSuffix);
   std::string content;
-  try {
-    content = orthanc_->file_of(instance);
-  } catch (const Error& error) {
+  const auto fail = [&](const Error& error) {
     Attempts& attempts = unfetched_[instance];
-    attempts.next = Clock::now() + std::min(kFirstPause * (1 << std::min(attempts.count, 10)), kLongestPause);
+    attempts.again.fail();
     constexpr int kSaid = 5;
     if (++attempts.count == kSaid)
       notes.warnings.push_back(fmt::format("an instance that the server does not give: {}", error.what()));
-    if (dynamic_cast<const ServerError*>(&error) != nullptr) throw;
+  };
+  try {
+    content = orthanc_->file_of(instance);
+  } catch (const ServerError& error) {
+    fail(error);
+    throw;
+  } catch (const Error& error) {
+    fail(error);
     return;
   }
   const bool is_there = fs::exists(file);
@@ -227,7 +230,7 @@ void Inbox::find_rest(const std::string& patient_id, Notes& notes) {
   try {
     for (const std::string& instance : orthanc_->instances_beside(one->first.stem().string()))
       if (!useless_.contains(instance) && !fs::exists(objects_ / (instance + kSuffix)))
-        unfetched_.emplace(instance, Attempts{.count = 0, .since = Clock::now()});
+        unfetched_.emplace(instance, Attempts{.since = Clock::now()});
   } catch (const Error& error) {
     next = Clock::now() + 1min;
     notes.warnings.push_back(error.what());
@@ -281,7 +284,7 @@ bool Inbox::take(const fs::path& file, Notes& notes) {
   forget(file);  // another content under a name that was there before
   StudyFiles one;
   try {
-    add_file(file, one);
+    one = scan_file(file);
   } catch (const Error& error) {
     notes.warnings.push_back(fmt::format("left out: {}", error.what()));
     return false;

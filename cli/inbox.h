@@ -10,6 +10,7 @@
 #include <set>
 #include <string>
 
+#include "cli/backoff.h"
 #include "io/notes.h"
 #include "io/orthanc.h"
 #include "io/study_files.h"
@@ -63,7 +64,8 @@ class Inbox {
   };
   struct Attempts {
     int count = 0;
-    Clock::time_point since, next;
+    Clock::time_point since;
+    Backoff again{std::chrono::seconds(1), std::chrono::minutes(10)};
   };
   // Of one file; nothing for one that is no part of a study.
   static std::optional<Known> known_in(const StudyFiles& one);

@@ -26,7 +26,7 @@ void run_phantom(PhantomCommandOptions options, Console& console) {
   phantom.anatomy = options.anatomy == "head" ? kHead : options.anatomy == "spine" ? kSpine : kThorax;
   Notes notes;
   if (!options.trace.empty()) phantom.breathing.trace = read_motion_trace(options.trace, notes);
-  for (const std::string& warning : notes.warnings) console.err << "warning: " << warning << "\n";
+  print_warnings(notes.warnings, console);
   phantom.placement.isocenter_patient_mm = Eigen::Vector3d(-12.5, 38.0, -410.0);
   phantom.placement.translation_mm = Eigen::Vector3d(options.translation_mm.data());
   phantom.placement.rotation_deg = Eigen::Vector3d(options.rotation_deg.data());

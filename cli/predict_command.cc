@@ -72,7 +72,7 @@ Scores scores_of(const PredictOptions& options, Console& console) {
                                                                                  : path.string());
     if (traces.back().size() < 2) throw Error(fmt::format("{}: holds fewer than two positions", path.string()));
   }
-  for (const std::string& warning : notes.warnings) console.err << "warning: " << warning << "\n";
+  print_warnings(notes.warnings, console);
   const std::size_t per_trace = scores.kinds.size() * scores.latencies_ms.size();
   scores.all.resize(traces.size() * per_trace);
   ProgressBar bar(console, "Predicting");

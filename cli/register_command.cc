@@ -102,7 +102,7 @@ int run_register(RegisterOptions options, const std::filesystem::path& truth_fil
   if (!truth_file.empty()) truth = read_setup_error(truth_file);
   SharedWork none;
   const SetupReport report = register_study(options, none, console);
-  for (const std::string& warning : report.warnings) console.err << "warning: " << warning << "\n";
+  print_warnings(report.warnings, console);
   console.out << (as_json ? json_report(report) : text_report(report_page(report)));
   if (!as_json) {
     if (truth) console.out << "\n" << compared_with_truth(report.setup_error, *truth);

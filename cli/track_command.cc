@@ -151,7 +151,7 @@ class TrackRun {
   void say_warnings() {
     if (notes_.warnings.empty()) return;
     if (console_.err_is_terminal) console_.err << kClearedLine;
-    for (const std::string& warning : notes_.warnings) console_.err << "warning: " << warning << "\n";
+    print_warnings(notes_.warnings, console_);
     notes_.warnings.clear();
   }
 

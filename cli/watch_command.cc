@@ -14,6 +14,7 @@
 #include <stop_token>
 #include <thread>
 
+#include "cli/backoff.h"
 #include "cli/child_process.h"
 #include "cli/commands.h"
 #include "cli/deliver.h"
@@ -76,16 +77,16 @@ class Watch {
     std::signal(SIGPIPE, SIG_IGN);  // a peer or server that goes is told by what is called
     tree_.clean();
     take_results();
-    attempt("completing the audit log", [&] { tree_.complete_audit(); });
+    attempt(troubles_, "completing the audit log", [&] { tree_.complete_audit(); });
     tree_.audit("started", {{"sessions", index_.size()}});
     console_.err << fmt::format("watching {}; results in {}\n",
                                 watch_.orthanc ? watch_.orthanc->url : watch_.folder.string(), tree_.path().string());
     std::jthread sending([this](const std::stop_token& stop) { send(stop); });  // a peer may take its time
     while (!end.is_asked_for()) {
-      attempt("receiving", [&] { receive(); });
-      attempt("registering", [&] { register_complete(); });
-      attempt("releasing", [&] { release_automatically(); });
-      attempt("writing the index", [&] { index_.update(waiting_, troubles()); });
+      attempt(troubles_, "receiving", [&] { receive(); });
+      attempt(troubles_, "registering", [&] { register_complete(); });
+      attempt(troubles_, "releasing", [&] { release_automatically(); });
+      attempt(troubles_, "writing the index", [&] { index_.update(waiting_, troubles()); });
       std::this_thread::sleep_for(kRound);
     }
     running_.reset();
@@ -102,9 +103,8 @@ class Watch {
   };
   struct Failure {
     std::string why;
-    Clock::time_point at;
-    Clock::time_point news;
-    std::optional<std::chrono::seconds> pause;  // unset: until there is news
+    Clock::time_point news;        // of the patient, when it began
+    std::optional<Backoff> again;  // unset: when there is news
   };
   struct Complete {
     SessionFiles session;
@@ -116,12 +116,13 @@ class Watch {
   static constexpr std::chrono::days kKeptFor{60};  // objects of a patient of whom nothing comes any more
 
   // Nothing that fails now ends the watch: a full disk, a server that is down. Each kind of trouble is said once.
-  void attempt(const std::string& what, const std::function<void()>& work) {
+  using Troubles = std::map<std::string, std::string>;  // by what is tried
+  void attempt(Troubles& troubles, const std::string& what, const std::function<void()>& work) const {
     try {
       work();
-      if (troubles_.erase(what) > 0) console_.err << what << ": goes on\n";
+      if (troubles.erase(what) > 0) console_.err << what << ": goes on\n";
     } catch (const std::exception& error) {
-      if (std::exchange(troubles_[what], error.what()) != error.what())
+      if (std::exchange(troubles[what], error.what()) != error.what())
         console_.err << fmt::format("{}: {}\n", what, error.what());
     }
   }
@@ -133,15 +134,9 @@ class Watch {
   }
 
   void send(const std::stop_token& stop) {
-    std::string trouble;
+    Troubles troubles;
     while (!stop.stop_requested()) {
-      try {
-        deliverer_.deliver(stop, console_);
-        trouble.clear();
-      } catch (const std::exception& error) {
-        if (std::exchange(trouble, error.what()) != error.what())
-          console_.err << fmt::format("sending: {}\n", error.what());
-      }
+      attempt(troubles, "sending", [&] { deliverer_.deliver(stop, console_); });
       std::this_thread::sleep_for(kRound);
     }
   }
@@ -150,17 +145,14 @@ class Watch {
   void receive() {
     const Clock::time_point begin = Clock::now();
     Notes notes;
-    const auto say = [&] {
-      for (const std::string& warning : notes.warnings) console_.err << "warning: " << warning << "\n";
-    };
     try {
       inbox_.update(notes);
     } catch (const std::exception&) {
-      say();
+      print_warnings(notes.warnings, console_);
       quiet_from_ = Clock::now();
       throw;
     }
-    say();
+    print_warnings(notes.warnings, console_);
     seen_at_ = begin;
     if (Clock::now() < next_forgetting_) return;
     inbox_.forget_before(std::filesystem::file_time_type::clock::now() - kKeptFor);
@@ -240,8 +232,8 @@ class Watch {
     if (inbox_.is_coming(patient_id) || quiet.count() < rule.quiet_s) return "more may come";
     const auto failure = failures_.find(session.name);
     if (failure == failures_.end() || last != failure->second.news) return "";
-    const auto& [why, at, news, pause] = failure->second;
-    return pause && Clock::now() - at > *pause ? "" : why;
+    const auto& [why, news, again] = failure->second;
+    return again && again->is_due() ? "" : why;
   }
 
   // In a process of its own, whatever it meets there.
@@ -301,11 +293,9 @@ class Watch {
     why = std::regex_replace(why, staging, "");
     Failure& failure = failures_[session];
     const bool is_new = std::exchange(failure.why, why) != why;
-    if (!may_be_over_soon)
-      failure.pause.reset();
-    else
-      failure.pause = is_new || !failure.pause ? kFirstPause : std::min(2 * *failure.pause, kLongestPause);
-    failure.at = Clock::now();
+    if (is_new || !may_be_over_soon) failure.again.reset();
+    if (!failure.again && may_be_over_soon) failure.again.emplace(kFirstPause, kLongestPause);
+    if (failure.again) failure.again->fail();
     failure.news = news;
     if (!is_new) return;
     console_.err << fmt::format("session {}: {}\n", session, why);
@@ -341,7 +331,7 @@ class Watch {
   std::vector<WaitingSession> waiting_;
   std::optional<Running> running_;
   std::map<std::string, Failure> failures_;  // by session
-  std::map<std::string, std::string> troubles_;
+  Troubles troubles_;
   Clock::time_point seen_at_ = Clock::now();     // what had come by then has been seen
   Clock::time_point quiet_from_ = Clock::now();  // a server was down until then
   Clock::time_point next_forgetting_ = Clock::now();

@@ -28,6 +28,14 @@ fs::path release_file(const fs::path& tree, const std::string& session) {
   return tree / "released" / (session + ".json");
 }
 
+std::vector<Delivery> deliveries_of(const Release& release) {
+  std::vector<Delivery> all;
+  for (const std::string& peer : release.peers)
+    for (const Release::Object& object : release.objects)
+      all.push_back({.session = release.session, .peer = peer, .object = object});
+  return all;
+}
+
 }  // namespace
 
 ResultsTree::ResultsTree(fs::path path) : path_(std::move(path)) {
@@ -119,12 +127,8 @@ std::vector<std::string> ResultsTree::released() const {
 }
 
 std::vector<Delivery> ResultsTree::pending_of(const Release& release) const {
-  std::vector<Delivery> pending;
-  for (const std::string& peer : release.peers)
-    for (const Release::Object& object : release.objects) {
-      Delivery delivery{.session = release.session, .peer = peer, .object = object};
-      if (!fs::exists(sent_file(delivery))) pending.push_back(std::move(delivery));
-    }
+  std::vector<Delivery> pending = deliveries_of(release);
+  std::erase_if(pending, [&](const Delivery& delivery) { return fs::exists(sent_file(delivery)); });
   return pending;
 }
 
@@ -189,10 +193,9 @@ void ResultsTree::complete_audit() const {
   for (const std::string& session : released()) {
     const Release release = release_of(session).value();
     complete("released", {{"session", session}, {"by", release.by}, {"released_on", release.on}});
-    for (const std::string& peer : release.peers)
-      for (const Release::Object& object : release.objects)
-        if (fs::exists(sent_file({.session = session, .peer = peer, .object = object})))
-          complete("sent", {{"session", session}, {"peer", peer}, {"object", object.sha256}});
+    for (const Delivery& delivery : deliveries_of(release))
+      if (fs::exists(sent_file(delivery)))
+        complete("sent", {{"session", session}, {"peer", delivery.peer}, {"object", delivery.object.sha256}});
   }
 }
 

@@ -70,16 +70,11 @@ void add_ct_slice(const fs::path& path, const DicomItem& dataset, StudyFiles& fi
     files.left_aside.push_back(fmt::format("{}: a CT localizer", path.string()));
     return;
   }
-  const std::string series_uid = dataset.required_text(DCM_SeriesInstanceUID);
-  auto ct = std::ranges::find(files.cts, series_uid, &StudyFiles::Ct::series_instance_uid);
-  if (ct == files.cts.end()) {
-    files.cts.push_back({.patient = patient_of(dataset),
-                         .series_instance_uid = series_uid,
-                         .frame_of_reference_uid = dataset.text(DCM_FrameOfReferenceUID).value_or("")});
-    ct = files.cts.end() - 1;
-  }
-  ct->files.push_back(path);
-  ct->sop_instance_uids.insert(dataset.required_text(DCM_SOPInstanceUID));
+  files.cts.push_back({.patient = patient_of(dataset),
+                       .series_instance_uid = dataset.required_text(DCM_SeriesInstanceUID),
+                       .frame_of_reference_uid = dataset.text(DCM_FrameOfReferenceUID).value_or(""),
+                       .files = {path},
+                       .sop_instance_uids = {dataset.required_text(DCM_SOPInstanceUID)}});
 }
 
 bool is_other_xray(const std::string& sop_class) {
@@ -287,10 +282,11 @@ std::vector<fs::path> files_below(const std::vector<fs::path>& paths, const std:
   return files;
 }
 
-void add_file(const fs::path& path, StudyFiles& files) {
+StudyFiles scan_file(const fs::path& path) {
+  StudyFiles files;
   if (!begins_like_dicom(path)) {
     files.left_aside.push_back(fmt::format("{}: not a DICOM file", path.string()));
-    return;
+    return files;
   }
   const DicomFile file = DicomFile::read(path, DicomFile::Extent::kHeader);
   const DicomItem dataset = file.dataset();
@@ -320,6 +316,7 @@ void add_file(const fs::path& path, StudyFiles& files) {
     files.left_aside.push_back(
         fmt::format("{}: {}", path.string(), dcmFindNameOfUID(sop_class.c_str(), "an object of unknown class")));
   }
+  return files;
 }
 
 void merge(StudyFiles from, StudyFiles& files) {
@@ -345,7 +342,7 @@ StudyFiles scan_study(const std::vector<fs::path>& paths) {
   StudyFiles files;
   for (const fs::path& path : files_below(paths)) {
     try {
-      add_file(path, files);
+      merge(scan_file(path), files);
     } catch (const Error& error) {
       files.unreadable.emplace_back(error.what());
     }

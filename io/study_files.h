@@ -67,8 +67,8 @@ std::vector<std::filesystem::path> files_below(const std::vector<std::filesystem
 // is left aside.
 StudyFiles scan_study(const std::vector<std::filesystem::path>& paths);
 
-// Adds one file to those scanned. Throws Error for one that cannot be read.
-void add_file(const std::filesystem::path& path, StudyFiles& files);
+// The same of one file. Throws Error for one that cannot be read.
+StudyFiles scan_file(const std::filesystem::path& path);
 
 // Adds what was scanned elsewhere.
 void merge(StudyFiles from, StudyFiles& files);
