@@ -220,6 +220,8 @@ std::vector<BatchCase> scan_cases(const fs::path& folder, bool other_xrays, Note
   for (const std::string& reason : files.unreadable) notes.warnings.push_back(reason);
   std::vector<BatchCase> cases;
   for (const SessionFiles& session : sessions_of(files, other_xrays)) {
+    for (const std::string& remark : session.remarks)
+      notes.warnings.push_back(fmt::format("case {}: {}", session.name, remark));
     try {
       const StudyFiles own = files_for(session, files);
       const StudyParts parts = choose_parts(own);

@@ -49,7 +49,7 @@ std::string describe_rt_image(RtImage image, const std::optional<std::string>& p
           line("values origin", or_missing(image.reported_values_origin)) +
           line("SAD, SID", or_missing(image.sad_mm, "mm") + ", " + or_missing(image.sid_mm, "mm")) +
           line("gantry angle", or_missing(image.gantry_angle_deg, "deg")) +
-          line("couch angle", or_missing(image.support_angle_deg, "deg")) +
+          line("couch angle", or_missing(image.table.support_angle_deg, "deg")) +
           line("receptor translation", or_missing(image.receptor_translation_mm, "mm")) +
           line("receptor angle", or_missing(image.receptor_angle_deg, "deg")) +
           line("pixel spacing", or_missing(image.pixel_spacing_mm, "mm, rows then columns")) +

@@ -65,10 +65,13 @@ int exit_status_of(Verdict verdict) {
 SetupReport register_study(const RegisterOptions& options, SharedWork& shared, Console& console) {
   const Stopwatch total;
   OutputFolder output(options.output, options.overwrite);
-  std::optional<SetupReport::Site> site = chosen_site(options.site, options.anatomy);
+  const std::optional<SiteFile> site_file = named_site(options.site);
+  std::optional<SetupReport::Site> site = chosen_site(site_file, options.anatomy);
 
   Notes notes;
-  const Study study = load(options.study, notes, console, shared.cts);
+  StudyOptions named = options.study;
+  if (site_file && site_file->sessions) named.max_span_s = site_file->sessions->max_span_s;
+  const Study study = load(named, notes, console, shared.cts);
   const RegistrationSetup setup(options.flags, study, beams_of(study), shared.renderers);
   const double seconds_load = total.seconds();
   RegistrationResult result;
@@ -77,6 +80,7 @@ SetupReport register_study(const RegisterOptions& options, SharedWork& shared, C
     result = register_views(setup.renderers(), study.xrays, study.planned_room_from_patient, setup.options(),
                             [&](double share) { bar.update(share); });
   }
+  for (const std::string& doubt : study.doubts) result.demote(Verdict::kReview, doubt);
 
   SetupReport report = setup_report_of(study, options.flags, setup, result);
   report.site = std::move(site);

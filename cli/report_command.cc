@@ -22,7 +22,7 @@ struct ReportOptions {
 
 void run_report(const ReportOptions& options, Console& console) {
   SetupReport report = read_result(options.result);
-  report.site = chosen_site(options.site, options.anatomy, report.site);
+  report.site = chosen_site(named_site(options.site), options.anatomy, report.site);
   OutputFolder output(options.output.empty() ? options.result : options.output, options.overwrite);
   write_result(report, output.path());
   if (options.site.empty())  // nothing in it has changed

@@ -25,12 +25,22 @@ std::string month_of(const std::string& acquired) {
 // A page's file, "sessions-2026-03.html".
 std::string page_of_month(const std::string& month) { return "sessions-" + month + ".html"; }
 
+// "KV_AP 2026-03-01 10:15:00; KV_LAT ...", of anything with a label and a time.
+template <class Xray>
+std::string times_in_words(const std::vector<Xray>& xrays) {
+  std::string words;
+  for (const Xray& xray : xrays)
+    words += fmt::format("{}{} {}", words.empty() ? "" : "; ", xray.label.empty() ? "X-ray" : xray.label,
+                         xray.acquired.empty() ? "at an unknown time" : xray.acquired);
+  return words;
+}
+
 ResultsPage::Row row_of(const WaitingSession& waiting) {
   const std::string verdict = waiting.has_failed ? "failed" : "waiting";
   return {.verdict = verdict,
           .cells = {{.text = waiting.name},
                     {.text = waiting.patient_id},
-                    {.text = ""},
+                    {.text = waiting.acquired},
                     {.text = verdict},
                     {.text = ""},
                     {.text = waiting.why}}};
@@ -38,14 +48,17 @@ ResultsPage::Row row_of(const WaitingSession& waiting) {
 
 }  // namespace
 
+std::string times_of(const std::vector<StudyFiles::Image>& images) { return times_in_words(images); }
+
 void SessionIndex::add(const std::string& session, const SetupReport& report) {
   Session added{.name = session,
                 .patient = fmt::format("{} ({})", report.identity.patient_name, report.identity.patient_id),
-                .acquired = report.views.front().acquired,
                 .verdict = std::string(to_string(report.verdict)),
                 .action = std::string(to_string(shown_shift(report).action)),
-                .state = ""};
-  sessions_.insert(std::ranges::upper_bound(sessions_, added.acquired, std::ranges::greater(), &Session::acquired),
+                .state = "",
+                .first = report.views.front().acquired,
+                .times = times_in_words(report.views)};
+  sessions_.insert(std::ranges::upper_bound(sessions_, added.first, std::ranges::greater(), &Session::first),
                    std::move(added));
   is_written_ = false;
 }
@@ -103,12 +116,12 @@ void SessionIndex::update(const std::vector<WaitingSession>& waiting, const std:
     ResultsPage::Row row{.verdict = session.verdict,
                          .cells = {{.text = session.name, .link = "sessions/" + session.name + "/report.html"},
                                    {.text = session.patient},
-                                   {.text = session.acquired},
+                                   {.text = session.times},
                                    {.text = session.verdict},
                                    {.text = session.action},
                                    {.text = session.state}}};
     if (newest.rows.size() < waiting.size() + kNewest) newest.rows.push_back(row);
-    const std::string month = month_of(session.acquired);
+    const std::string month = month_of(session.first);
     ResultsPage& page = months[month];
     if (page.rows.empty()) {
       page.title = fmt::format("{}, {}", title, month);

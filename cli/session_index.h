@@ -8,12 +8,16 @@
 
 #include "io/report/setup_report.h"
 #include "io/results_tree.h"
+#include "io/study_files.h"
 
 namespace isoshift {
 
+// "KV_AP 2026-03-01 10:15:00; KV_LAT 2026-03-01 10:15:10", of the X-rays of a session.
+std::string times_of(const std::vector<StudyFiles::Image>& images);
+
 // X-rays without a result, and why.
 struct WaitingSession {
-  std::string name, patient_id, why;
+  std::string name, patient_id, acquired, why;
   bool has_failed = false;
   bool operator==(const WaitingSession&) const = default;
 };
@@ -31,7 +35,9 @@ class SessionIndex {
 
  private:
   struct Session {
-    std::string name, patient, acquired, verdict, action, state;
+    std::string name, patient, verdict, action, state;
+    std::string first;     // when the first X-ray was acquired, "2026-03-01 10:15:00"
+    std::string times;     // of all X-rays
     bool is_over = false;  // nothing becomes of it any more
   };
   bool update_states();

@@ -55,18 +55,10 @@ SetupReport::Stage stage_in_report(const Stage& stage, const StageReport& done) 
   return shown;
 }
 
-// "2026-03-01 10:15:00" from DA and TM.
-std::string acquired(const RtImage& image) {
-  const std::string date = image.acquisition_date.value_or(""), time = image.acquisition_time.value_or("");
-  if (date.size() != 8 || time.size() < 4) return "";
-  return fmt::format("{}-{}-{} {}:{}{}", date.substr(0, 4), date.substr(4, 2), date.substr(6, 2), time.substr(0, 2),
-                     time.substr(2, 2), time.size() >= 6 ? ":" + time.substr(4, 2) : "");
-}
-
 std::optional<Eigen::Vector3d> table_position(const Study& study) {
   for (const RtImage& image : study.rt_images)
-    if (image.table_lateral_mm && image.table_longitudinal_mm && image.table_vertical_mm)
-      return Eigen::Vector3d(*image.table_lateral_mm, *image.table_longitudinal_mm, *image.table_vertical_mm);
+    if (const TableReadOuts& table = image.table; table.has_position())
+      return Eigen::Vector3d(*table.lateral_mm, *table.longitudinal_mm, *table.vertical_mm);
   return std::nullopt;
 }
 
@@ -95,12 +87,15 @@ SetupReport::Point centroid_of(const MarkedStructure& structure, const Study& st
 
 }  // namespace
 
-std::optional<SetupReport::Site> chosen_site(const std::filesystem::path& file, const std::string& anatomy,
+std::optional<SiteFile> named_site(const std::filesystem::path& file) {
+  return file.empty() ? std::nullopt : std::optional(read_site_file(file));
+}
+
+std::optional<SetupReport::Site> chosen_site(const std::optional<SiteFile>& file, const std::string& anatomy,
                                              std::optional<SetupReport::Site> before) {
-  if (file.empty() && !anatomy.empty())
-    throw UsageError("--anatomy chooses an action level of a site file: --site FILE");
-  if (file.empty()) return before;
-  const SiteFile site = read_site_file(file);
+  if (!file && !anatomy.empty()) throw UsageError("--anatomy chooses an action level of a site file: --site FILE");
+  if (!file) return before;
+  const SiteFile& site = *file;
   const std::string& whose = anatomy.empty() && before ? before->anatomy : anatomy;
   return SetupReport::Site{.name = site.name,
                            .sha256 = site.sha256,

@@ -61,6 +61,7 @@ StudyRequest StudyOptions::request() const {
     const auto [label, angle] = key_and_value(text, "--gantry-angle");
     request.switches.gantry_angle_deg[label] = number_from(angle, "--gantry-angle");
   }
+  request.max_span_s = max_span_s;
   request.switches.couch_angle_deg = couch_angle_deg;
   request.switches.sad_mm = sad_mm;
   request.switches.sid_mm = sid_mm;

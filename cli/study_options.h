@@ -20,6 +20,7 @@ struct StudyOptions {
   std::string patient_position, intensity, beam;
   std::optional<double> couch_angle_deg, sad_mm, sid_mm;
   bool assume_centered = false;
+  double max_span_s = kDefaultUntoldSpanS;  // of the site, no flag
 
   // Throws UsageError for a word that is none of those allowed, a number that is not finite, or no study at all.
   StudyRequest request() const;

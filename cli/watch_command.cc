@@ -1,6 +1,7 @@
 // isoshift watch: registers what comes into a treatment room, and holds the results until they are released.
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <chrono>
@@ -50,7 +51,7 @@ RegisterOptions checked_registration_flags(const WatchFile& watch) {
     options.study.study = watch.results;  // any: its words are what is checked
     (void)options.study.request();
     if (!options.site.empty()) throw UsageError("--site is named by site, not here");
-    (void)chosen_site(watch.site.path, options.anatomy);
+    (void)chosen_site(watch.site, options.anatomy);
   } catch (const CLI::ParseError& error) {
     refuse(error);
   } catch (const UsageError& error) {
@@ -192,14 +193,18 @@ class Watch {
     std::vector<Complete> complete;
     std::set<std::string> found;
     for (const auto& [patient_id, patient] : inbox_.patients()) {
-      for (SessionFiles& session : unregistered_sessions(patient.files)) {
+      for (SessionFiles& session : sessions_of(patient.files, takes_other_xrays_, registered_)) {
         found.insert(session.name);
         StudyFiles own = files_for(session, patient.files);
         const bool is_running = running_ && running_->session == session.name;
         std::string why = is_running ? "is being registered" : reason_to_wait(session, own, patient_id, patient.last);
         const bool is_complete = why.empty();
         if (is_complete) why = "has its turn soon";
-        waiting_.push_back({session.name, patient_id, std::move(why), failures_.contains(session.name)});
+        waiting_.push_back({.name = session.name,
+                            .patient_id = patient_id,
+                            .acquired = times_of(session.images),
+                            .why = std::move(why),
+                            .has_failed = failures_.contains(session.name)});
         if (is_complete) complete.push_back({std::move(session), std::move(own), patient.last});
       }
     }
@@ -210,20 +215,13 @@ class Watch {
     }));
   }
 
-  std::vector<SessionFiles> unregistered_sessions(const StudyFiles& files) const {
-    StudyFiles xrays;
-    const auto is_new = [&](const auto& image) { return !registered_.contains(image.sop_instance_uid); };
-    std::ranges::copy_if(files.images, std::back_inserter(xrays.images), is_new);
-    std::ranges::copy_if(files.other_xrays, std::back_inserter(xrays.other_xrays), is_new);
-    return sessions_of(xrays, takes_other_xrays_);
-  }
-
   // Empty: it can be registered now.
   std::string reason_to_wait(const SessionFiles& session, const StudyFiles& own, const std::string& patient_id,
                              Clock::time_point last) {
     const SiteFile::Sessions& rule = *watch_.site.sessions;
     if (static_cast<int>(session.images.size()) < rule.views)
-      return fmt::format("{} of {} X-rays", session.images.size(), rule.views);
+      return fmt::format("{} of {} X-rays{}{}", session.images.size(), rule.views, session.remarks.empty() ? "" : "; ",
+                         fmt::join(session.remarks, "; "));
     if (const auto missing = missing_parts(own); !missing.empty()) {
       inbox_.ask_for_rest(patient_id);
       return "waits for " + missing.front();
@@ -239,6 +237,8 @@ class Watch {
   // In a process of its own, whatever it meets there.
   void begin_registration(const Complete& complete) {
     const std::string& session = complete.session.name;
+    for (const std::string& remark : complete.session.remarks)
+      console_.err << fmt::format("session {}: {}\n", session, remark);
     try {
       const StudyParts parts = choose_parts(complete.files);
       std::vector<std::string> words = {this_program().string(), "register", "--ct"};

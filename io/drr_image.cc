@@ -51,10 +51,10 @@ void put_geometry(DicomItem dataset, const RtImage& image) {
   dataset.put(DCM_PrimaryDosimeterUnit, "MU");
   dataset.put(DCM_GantryAngle, image.gantry_angle_deg.value());
   dataset.put(DCM_BeamLimitingDeviceAngle, image.collimator_angle_deg.value_or(0.0));
-  dataset.put(DCM_PatientSupportAngle, image.support_angle_deg.value());
-  dataset.put(DCM_TableTopEccentricAngle, image.eccentric_angle_deg.value_or(0.0));
-  dataset.put(DCM_TableTopPitchAngle, image.table_pitch_deg.value_or(0.0));
-  dataset.put(DCM_TableTopRollAngle, image.table_roll_deg.value_or(0.0));
+  dataset.put(DCM_PatientSupportAngle, image.table.support_angle_deg.value());
+  dataset.put(DCM_TableTopEccentricAngle, image.table.eccentric_angle_deg.value_or(0.0));
+  dataset.put(DCM_TableTopPitchAngle, image.table.pitch_deg.value_or(0.0));
+  dataset.put(DCM_TableTopRollAngle, image.table.roll_deg.value_or(0.0));
 }
 
 }  // namespace

@@ -131,13 +131,7 @@ RtImage read_frame(const std::filesystem::path& path, const DicomItem& d, const 
   image.gantry_angle_deg = attributes.number(DCM_GantryAngle);
   image.gantry_pitch_angle_deg = attributes.number(DCM_GantryPitchAngle);
   image.collimator_angle_deg = attributes.number(DCM_BeamLimitingDeviceAngle);
-  image.support_angle_deg = attributes.number(DCM_PatientSupportAngle);
-  image.eccentric_angle_deg = attributes.number(DCM_TableTopEccentricAngle);
-  image.table_pitch_deg = attributes.number(DCM_TableTopPitchAngle);
-  image.table_roll_deg = attributes.number(DCM_TableTopRollAngle);
-  image.table_lateral_mm = attributes.number(DCM_TableTopLateralPosition);
-  image.table_longitudinal_mm = attributes.number(DCM_TableTopLongitudinalPosition);
-  image.table_vertical_mm = attributes.number(DCM_TableTopVerticalPosition);
+  image.table = read_table_read_outs([&](const DcmTagKey& tag) { return attributes.number(tag); });
   image.isocenter_mm = vector_of<3>(d, DCM_IsocenterPosition);
 
   for (const auto& [keyword, tag] : kEquipmentAttributes)
@@ -240,6 +234,13 @@ std::optional<double> acquisition_seconds(const RtImage& image) {
          image.frame_offset_s;
 }
 
+std::string acquired(const RtImage& image) {
+  const std::string date = image.acquisition_date.value_or(""), time = image.acquisition_time.value_or("");
+  if (date.size() != 8 || time.size() < 4) return "";
+  return fmt::format("{}-{}-{} {}:{}{}", date.substr(0, 4), date.substr(4, 2), date.substr(6, 2), time.substr(0, 2),
+                     time.substr(2, 2), time.size() >= 6 ? ":" + time.substr(4, 2) : "");
+}
+
 std::string imager_label(const RtImage& image) { return image.label.substr(0, image.label.rfind('#')); }
 
 RtImage with_switches(RtImage image, const RtImageSwitches& switches, Notes& notes, const std::string& origin) {
@@ -254,7 +255,7 @@ RtImage with_switches(RtImage image, const RtImageSwitches& switches, Notes& not
     replace(image.gantry_angle_deg, angle->second, named(DCM_GantryAngle),
             by(fmt::format("--gantry-angle {}={}", image.label, angle->second)), notes);
   if (switches.couch_angle_deg)
-    replace(image.support_angle_deg, *switches.couch_angle_deg, named(DCM_PatientSupportAngle),
+    replace(image.table.support_angle_deg, *switches.couch_angle_deg, named(DCM_PatientSupportAngle),
             by(fmt::format("--couch-angle {}", *switches.couch_angle_deg)), notes);
   if (switches.sad_mm && !by_matrix)
     replace(image.sad_mm, *switches.sad_mm, named(DCM_RadiationMachineSAD),
@@ -303,7 +304,7 @@ std::vector<MissingAttribute> missing_attributes(const RtImage& image) {
   need((!needs_geometry && !image.pixel_from_room) || image.sid_mm.has_value(), DCM_RTImageSID, "--sid MM");
   need(!needs_geometry || image.gantry_angle_deg.has_value(), DCM_GantryAngle,
        fmt::format("--gantry-angle {}=DEG", image.label));
-  need(image.support_angle_deg.has_value(), DCM_PatientSupportAngle, "--couch-angle DEG");
+  need(image.table.support_angle_deg.has_value(), DCM_PatientSupportAngle, "--couch-angle DEG");
   need(image.patient_position.has_value(), DCM_PatientPosition, "--patient-position HFS");
   const bool known = image.intensity_relationship == "LIN" || image.intensity_relationship == "LOG";
   need(known, DCM_PixelIntensityRelationship, "--intensity LIN+|LIN-|LOG+|LOG-");
@@ -349,21 +350,21 @@ Beam beam_of(const RtImage& image, Notes& notes) {
 }
 
 TableAngles table_angles(std::span<const RtImage> images, Notes& notes) {
-  const auto first_deg = [&](const std::optional<double> RtImage::*angle_deg) -> std::optional<double> {
+  const auto first_deg = [&](const std::optional<double> TableReadOuts::*angle_deg) -> std::optional<double> {
     const auto says =
-        std::ranges::find_if(images, [&](const RtImage& image) { return (image.*angle_deg).has_value(); });
-    return says == images.end() ? std::nullopt : *says.*angle_deg;
+        std::ranges::find_if(images, [&](const RtImage& image) { return (image.table.*angle_deg).has_value(); });
+    return says == images.end() ? std::nullopt : says->table.*angle_deg;
   };
   const auto angle_rad = [&](const std::optional<double>& value_deg, const DcmTagKey& tag) {
     if (!value_deg) notes.warnings.push_back(fmt::format("{} is missing in all X-rays, taken as 0", described(tag)));
     return wrapped_rad(rad_from_deg(value_deg.value_or(0.0)));
   };
-  const double eccentric_deg = first_deg(&RtImage::eccentric_angle_deg).value_or(0.0);
+  const double eccentric_deg = first_deg(&TableReadOuts::eccentric_angle_deg).value_or(0.0);
   const TableAngles table{
-      .support_rad = angle_rad(first_deg(&RtImage::support_angle_deg), DCM_PatientSupportAngle),
+      .support_rad = angle_rad(first_deg(&TableReadOuts::support_angle_deg), DCM_PatientSupportAngle),
       .eccentric_rad = wrapped_rad(rad_from_deg(eccentric_deg)),
-      .pitch_rad = angle_rad(first_deg(&RtImage::table_pitch_deg), DCM_TableTopPitchAngle),
-      .roll_rad = angle_rad(first_deg(&RtImage::table_roll_deg), DCM_TableTopRollAngle),
+      .pitch_rad = angle_rad(first_deg(&TableReadOuts::pitch_deg), DCM_TableTopPitchAngle),
+      .roll_rad = angle_rad(first_deg(&TableReadOuts::roll_deg), DCM_TableTopRollAngle),
   };
   if (std::abs(table.eccentric_rad) > rad_from_deg(kMaxAngleNoiseDeg))
     notes.warnings.push_back(fmt::format("{} is {} degrees and was added to the couch angle",

@@ -13,6 +13,7 @@
 #include "geometry/xray_image.h"
 #include "io/identity.h"
 #include "io/notes.h"
+#include "io/table_read_outs.h"
 
 namespace isoshift {
 
@@ -58,8 +59,7 @@ struct RtImage {
   std::optional<Eigen::Vector2d> pixel_spacing_mm;  // row spacing, column spacing
   std::optional<Eigen::Vector2d> position_mm;
   std::optional<double> gantry_angle_deg, gantry_pitch_angle_deg, collimator_angle_deg;
-  std::optional<double> support_angle_deg, eccentric_angle_deg, table_pitch_deg, table_roll_deg;
-  std::optional<double> table_lateral_mm, table_longitudinal_mm, table_vertical_mm;
+  TableReadOuts table;
   std::optional<Eigen::Vector3d> isocenter_mm;  // IsocenterPosition, in this image's own frame of reference
 
   std::map<std::string, std::string, std::less<>> equipment;   // what machine profiles tell images apart by, by keyword
@@ -119,6 +119,9 @@ Beam beam_of(const RtImage& image, Notes& notes);
 // When it was taken: seconds since an epoch, with fractions and, of frames of one file, their own times (FrameTime,
 // FrameTimeVector); nothing where date or time is absent or malformed.
 std::optional<double> acquisition_seconds(const RtImage& image);
+
+// The same for people, "2026-03-01 10:15:00"; empty where it is unknown.
+std::string acquired(const RtImage& image);
 
 // The label without the number of its frame.
 std::string imager_label(const RtImage& image);

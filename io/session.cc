@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <iterator>
 #include <optional>
@@ -14,42 +13,26 @@
 namespace isoshift {
 namespace {
 
-constexpr double kMaxTableMoveMm = 0.5;
-
 // Empty components at the end of a name may be written or not (PS3.5 6.2.1.1).
 std::string without_trailing_carets(std::string name) {
   name.erase(name.find_last_not_of("^ ") + 1);
   return name;
 }
 
-struct TableReadOut {
-  std::optional<double> RtImage::*value;
-  DcmTagKey tag;
-  bool is_angle;
-};
-const std::array kTableReadOuts = {
-    TableReadOut{&RtImage::table_lateral_mm, DCM_TableTopLateralPosition, false},
-    TableReadOut{&RtImage::table_longitudinal_mm, DCM_TableTopLongitudinalPosition, false},
-    TableReadOut{&RtImage::table_vertical_mm, DCM_TableTopVerticalPosition, false},
-    TableReadOut{&RtImage::support_angle_deg, DCM_PatientSupportAngle, true},
-    TableReadOut{&RtImage::eccentric_angle_deg, DCM_TableTopEccentricAngle, true},
-    TableReadOut{&RtImage::table_pitch_deg, DCM_TableTopPitchAngle, true},
-    TableReadOut{&RtImage::table_roll_deg, DCM_TableTopRollAngle, true},
-};
-
-// Precondition: both say where the table stood.
+// What a table read-out says of two images; nothing where it is the same, or missing in one of them.
 std::optional<Finding> table_finding(const TableReadOut& read_out, const RtImage& image, const RtImage& reference) {
-  const double change = *(image.*read_out.value) - *(reference.*read_out.value);
-  const std::string where = image.path.string(), since = reference.path.string();
-  if (!read_out.is_angle) {
-    if (std::abs(change) <= kMaxTableMoveMm) return std::nullopt;
-    return Finding{"table-moved", fmt::format("{}: the table moved by {:.1f} mm since {} ({})", where, change, since,
-                                              described(read_out.tag))};
-  }
-  const double turned_deg = deg_from_rad(wrapped_rad(rad_from_deg(change)));
-  if (std::abs(turned_deg) <= kMaxTableTurnDeg) return std::nullopt;
-  return Finding{"table-moved", fmt::format("{}: the table turned by {:.1f} degrees since {} ({})", where, turned_deg,
-                                            since, described(read_out.tag))};
+  const auto change = table_change(read_out, image.table, reference.table);
+  if (!change) return std::nullopt;
+  return Finding{"table-moved", fmt::format("{}: the table {} since {} ({})", image.path.string(), *change,
+                                            reference.path.string(), described(read_out.tag))};
+}
+
+// Whether both show the same view: one label, and one gantry angle as far as both have it.
+bool is_retake(const RtImage& image, const RtImage& earlier) {
+  constexpr double kSameAngleRad = rad_from_deg(1.0);
+  if (image.label != earlier.label) return false;
+  if (!image.gantry_angle_deg || !earlier.gantry_angle_deg) return true;
+  return std::abs(wrapped_rad(rad_from_deg(*image.gantry_angle_deg - *earlier.gantry_angle_deg))) < kSameAngleRad;
 }
 
 }  // namespace
@@ -97,8 +80,8 @@ std::vector<Finding> session_findings(std::span<const RtImage> images, Notes& no
                                                     image.path.string(), apart_s / 60.0, first.path.string(),
                                                     described(DCM_AcquisitionTime))};
           });
-  for (const TableReadOut& read_out : kTableReadOuts) {
-    const auto value_of = [&](const RtImage& image) { return image.*read_out.value; };
+  for (const TableReadOut& read_out : table_read_outs()) {
+    const auto value_of = [&](const RtImage& image) { return image.table.*read_out.value; };
     if (std::ranges::any_of(images, [&](const RtImage& image) { return value_of(image).has_value(); }))
       compare(read_out.tag, value_of,
               [&](const RtImage& image, const RtImage& first) { return table_finding(read_out, image, first); });
@@ -106,11 +89,35 @@ std::vector<Finding> session_findings(std::span<const RtImage> images, Notes& no
   return findings;
 }
 
+std::vector<Finding> session_doubts(std::span<const RtImage> images, double max_span_s) {
+  if (std::ranges::all_of(images, [](const RtImage& image) { return image.table.has_position(); })) return {};
+  constexpr const char* kNoReadOuts = "without table read-outs in all views nobody knows whether the table moved";
+  std::vector<Finding> doubts;
+  const RtImage* earliest = nullptr;
+  const RtImage* latest = nullptr;
+  for (const RtImage& image : images) {
+    const auto at_s = acquisition_seconds(image);
+    if (!at_s) continue;
+    if (earliest == nullptr || *at_s < *acquisition_seconds(*earliest)) earliest = &image;
+    if (latest == nullptr || *at_s > *acquisition_seconds(*latest)) latest = &image;
+  }
+  if (earliest != nullptr)
+    if (const double span_s = *acquisition_seconds(*latest) - *acquisition_seconds(*earliest); span_s > max_span_s)
+      doubts.push_back({"time-span", fmt::format("{} was taken {:.0f} s after {}, more than {:.0f} s: {}",
+                                                 latest->label, span_s, earliest->label, max_span_s, kNoReadOuts)});
+  for (std::size_t n = 1; n < images.size(); ++n)
+    if (const auto first = std::ranges::find_if(images.first(n),
+                                                [&](const RtImage& earlier) { return is_retake(images[n], earlier); });
+        first != images.begin() + static_cast<std::ptrdiff_t>(n))
+      doubts.push_back({"table-moved", fmt::format("{} was taken twice ({} and {}): {}", images[n].label,
+                                                   first->path.string(), images[n].path.string(), kNoReadOuts)});
+  return doubts;
+}
+
 std::vector<Finding> table_findings(const RtImage& image, const RtImage& reference) {
   std::vector<Finding> findings;
-  for (const TableReadOut& read_out : kTableReadOuts)
-    if (image.*read_out.value && reference.*read_out.value)
-      if (auto finding = table_finding(read_out, image, reference)) findings.push_back(std::move(*finding));
+  for (const TableReadOut& read_out : table_read_outs())
+    if (auto finding = table_finding(read_out, image, reference)) findings.push_back(std::move(*finding));
   return findings;
 }
 

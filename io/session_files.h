@@ -1,6 +1,7 @@
 #pragma once
 // Among the files of many patients: which X-rays were taken for one setup, and what else belongs to it.
 
+#include <set>
 #include <string>
 #include <vector>
 
@@ -8,17 +9,25 @@
 
 namespace isoshift {
 
-// X-rays of one patient, one plan and one position: at most 10 minutes apart, no label twice (a label that comes again
-// is the next setup). X-rays without a time are told apart by their folder.
+// X-rays of one patient, one plan and one position of the table: at most 10 minutes apart, no label twice.
 struct SessionFiles {
   std::string name;  // made from its X-rays' SOPInstanceUIDs; says nothing of the patient
   std::string patient;
-  std::vector<StudyFiles::Image> images;
+  std::vector<StudyFiles::Image> images;  // in the order of their times
+  std::vector<std::string> remarks;       // in words: X-rays taken again, why X-rays are not grouped
 };
 
-// In the order of patients and times; an instance that is there twice counts once. `other_xrays`: whether those of
-// other classes than RT Image are X-rays to be registered.
-std::vector<SessionFiles> sessions_of(const StudyFiles& files, bool other_xrays);
+// X-rays are grouped from the newest backwards: a label that comes again begins an earlier session, and so do table
+// read-outs that differ. Where no read-outs tell that the table moved, an X-ray that lies nearer in time to the session
+// before, of which it repeats a label, is a retake of that one: it is not grouped with later X-rays, between which and
+// itself the couch may have moved. X-rays without a time are grouped by their folder, and not at all where a label is
+// there twice.
+//
+// X-rays with a result (their SOPInstanceUIDs in `registered`) are in no session, but still count as the earlier ones
+// of which a retake is one. Sessions come in the order of patients and times; an instance that is there twice counts
+// once. `other_xrays`: whether those of other classes than RT Image are X-rays to be registered.
+std::vector<SessionFiles> sessions_of(const StudyFiles& files, bool other_xrays,
+                                      const std::set<std::string>& registered = {});
 
 // What choose_parts() chooses from for a session: all files of its patient, and of X-rays its own. Files without an
 // issuer of the PatientID are of the only one there is.

@@ -77,6 +77,7 @@ SiteFile::Sessions sessions_from(JsonSection section) {
   const auto quiet_s = section.number("quiet_s", 0.0, kLongestS);
   if (!quiet_s) section.refuse_missing("quiet_s", "seconds");
   sessions.quiet_s = *quiet_s;
+  sessions.max_span_s = section.number("max_span_s", 0.0, kMaxTimeSpanS).value_or(sessions.max_span_s);
   section.end();
   return sessions;
 }

@@ -12,6 +12,9 @@
 
 namespace isoshift {
 
+constexpr double kMaxTimeSpanS = 600.0;        // between the views of one session
+constexpr double kDefaultUntoldSpanS = 120.0;  // between those without table read-outs, where no site file says other
+
 enum class LengthUnit { kMm, kCm };
 
 // From which a person must act. At least one is set.
@@ -32,8 +35,9 @@ struct SiteFile {
 
   // When a session of X-rays is complete.
   struct Sessions {
-    int views = 2;         // so many X-rays are there,
-    double quiet_s = 0.0;  // and nothing of the patient has come for so long
+    int views = 2;                            // so many X-rays are there,
+    double quiet_s = 0.0;                     // and nothing of the patient has come for so long
+    double max_span_s = kDefaultUntoldSpanS;  // between X-rays without table read-outs, or the result needs a review
   };
 
   std::filesystem::path path;

@@ -11,7 +11,6 @@
 
 #include "geometry/error.h"
 #include "io/decode.h"
-#include "io/session.h"
 
 namespace isoshift {
 namespace {
@@ -86,9 +85,9 @@ void check_one_patient_position(const Study& study) {
 // Whether two images of one UID show the same from the same place.
 bool is_same_xray(const RtImage& a, const RtImage& b) {
   const auto geometry = [](const RtImage& image) {
-    return std::tie(image.sad_mm, image.sid_mm, image.gantry_angle_deg, image.support_angle_deg, image.pixel_spacing_mm,
-                    image.position_mm, image.orientation, image.receptor_translation_mm, image.receptor_angle_deg,
-                    image.acquisition_time);
+    return std::tie(image.sad_mm, image.sid_mm, image.gantry_angle_deg, image.table.support_angle_deg,
+                    image.pixel_spacing_mm, image.position_mm, image.orientation, image.receptor_translation_mm,
+                    image.receptor_angle_deg, image.acquisition_time);
   };
   if (geometry(a) != geometry(b)) return false;
   const auto pixels = [](const RtImage& image) {
@@ -249,6 +248,8 @@ Study load_study(const StudyRequest& request, Notes& notes, const Progress& prog
   std::ranges::move(structure_findings(study, notes), std::back_inserter(findings));
   std::ranges::move(session_findings(study.rt_images, notes), std::back_inserter(findings));
   settle(findings, request.allowed, notes);
+  for (const Finding& doubt : not_allowed(session_doubts(study.rt_images, request.max_span_s), request.allowed, notes))
+    study.doubts.push_back(fmt::format("{} (--allow {}=REASON)", doubt.message, doubt.key));
   check_one_patient_position(study);
 
   study.patient_position = patient_position_from(study.rt_images.front().patient_position.value()).value();

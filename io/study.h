@@ -13,6 +13,7 @@
 #include "io/rt_image.h"
 #include "io/rt_plan.h"
 #include "io/rt_structures.h"
+#include "io/session.h"
 #include "io/study_files.h"
 
 namespace isoshift {
@@ -24,6 +25,7 @@ struct StudyRequest {
   RtImageSwitches switches;
   std::optional<MachineProfile> machine;
   Allowances allowed;
+  double max_span_s = kDefaultUntoldSpanS;  // between views without table read-outs, or the result needs a review
   bool one_per_imager = false;  // of X-rays with one label only the earliest: those of a moving target come later
 };
 
@@ -39,6 +41,7 @@ struct Study {
   TableAngles table;  // at imaging, the same for all views
   Eigen::Vector3d isocenter_patient_mm = Eigen::Vector3d::Zero();
   Eigen::Isometry3d planned_room_from_patient = Eigen::Isometry3d::Identity();
+  std::vector<std::string> doubts;  // why a result of this study needs a person's review, whatever registration finds
 };
 
 // Finds, reads and checks the parts. Everything the images lack is reported in one Error, with the switch that supplies

@@ -53,6 +53,14 @@ std::string patient_of(const DicomItem& dataset) {
   return dataset.text(DCM_PatientID).value_or("") + "\\" + dataset.text(DCM_IssuerOfPatientID).value_or("");
 }
 
+// A read-out of the dataset, else of its first exposure that has it.
+std::optional<double> read_out(const DicomItem& dataset, const DcmTagKey& tag) {
+  if (const auto value = dataset.number(tag)) return value;
+  for (const DicomItem& exposure : dataset.items(DCM_ExposureSequence))
+    if (const auto value = exposure.number(tag)) return value;
+  return std::nullopt;
+}
+
 StudyFiles::Image xray(const fs::path& path, const DicomItem& dataset) {
   RtImage timed;
   read_acquisition_time(dataset, timed);
@@ -61,7 +69,9 @@ StudyFiles::Image xray(const fs::path& path, const DicomItem& dataset) {
           .sop_instance_uid = dataset.required_text(DCM_SOPInstanceUID),
           .plan_uid = first_reference(dataset, DCM_ReferencedRTPlanSequence),
           .label = dataset.text(DCM_RTImageLabel).value_or(""),
-          .at_s = acquisition_seconds(timed)};
+          .at_s = acquisition_seconds(timed),
+          .acquired = acquired(timed),
+          .table = read_table_read_outs([&](const DcmTagKey& tag) { return read_out(dataset, tag); })};
 }
 
 void add_ct_slice(const fs::path& path, const DicomItem& dataset, StudyFiles& files) {

@@ -9,6 +9,8 @@
 #include <unordered_set>
 #include <vector>
 
+#include "io/table_read_outs.h"
+
 namespace isoshift {
 
 // The files below some paths, sorted by what they are, with what tells which of them belong together.
@@ -34,6 +36,8 @@ struct StudyFiles {
     std::string plan_uid;        // ReferencedRTPlanSequence
     std::string label;           // RTImageLabel; empty: none
     std::optional<double> at_s;  // when it was acquired, since an epoch
+    std::string acquired;        // the same for people, "2026-03-01 10:15:00"; empty: unknown
+    TableReadOuts table;
   };
   struct Structures {
     std::filesystem::path file;

@@ -62,6 +62,11 @@ void RegistrationOptions::check() const {
   if (stages.empty()) throw UsageError("stages is empty, expected at least one");
 }
 
+void RegistrationResult::demote(Verdict to, std::string reason) {
+  verdict = std::max(verdict, to);
+  reasons.push_back(std::move(reason));
+}
+
 int RegistrationResult::evaluations() const {
   return std::accumulate(stages.begin(), stages.end(), 0,
                          [](int sum, const StageReport& stage) { return sum + stage.evaluations; });

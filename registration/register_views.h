@@ -63,6 +63,8 @@ struct RegistrationResult {
   std::vector<Alternative> alternatives;                                    // empty: the preset leaves them out
   double seconds = 0.0, seconds_rendering = 0.0, seconds_similarity = 0.0;  // in all, and of that in the search
 
+  // Makes the verdict `to`, if that is worse than what it was, and adds the reason.
+  void demote(Verdict to, std::string reason);
   int evaluations() const;
 };
 

@@ -56,11 +56,7 @@ std::vector<Eigen::Vector3d> unobservable_directions(std::span<const XrayView> v
 void judge(std::span<const double> parameters, const RegistrationOptions& options, RegistrationResult& result) {
   result.reasons.clear();
   result.verdict = Verdict::kAccepted;
-  const auto demote = [&](Verdict to, std::string reason) {
-    if (to > result.verdict) result.verdict = to;
-    result.reasons.push_back(std::move(reason));
-  };
-  const auto review = [&](std::string reason) { demote(Verdict::kReview, std::move(reason)); };
+  const auto review = [&](std::string reason) { result.demote(Verdict::kReview, std::move(reason)); };
 
   for (std::size_t axis = 0; axis < parameters.size(); ++axis) {
     const double bound = axis < 3 ? options.bound_mm : options.bound_rad * kLeverMm;
@@ -96,8 +92,8 @@ void judge(std::span<const double> parameters, const RegistrationOptions& option
       review(fmt::format("too little of {} is compared to tell whether anatomy moved against the rest", name));
   }
   if (!(mean >= kMinSimilarity)) {
-    demote(mean >= kRejectedSimilarity ? Verdict::kReview : Verdict::kRejected,
-           fmt::format("the final gradient correlation {:.3f} is below {:.2f}", mean, kMinSimilarity));
+    result.demote(mean >= kRejectedSimilarity ? Verdict::kReview : Verdict::kRejected,
+                  fmt::format("the final gradient correlation {:.3f} is below {:.2f}", mean, kMinSimilarity));
   } else {
     for (std::size_t n = 0; n < result.views.size(); ++n)
       if (const ViewReport& view = result.views[n]; !(view.similarity_final >= kMinViewSimilarity))

@@ -173,6 +173,34 @@ TEST_F(BatchCommandTest, ScanWritesTheManifestThatBatchReads) {
   EXPECT_EQ(found[2].plan, exported() / "2" / "RTPLAN.dcm");
 }
 
+// AP and LAT, LAT again, the couch moves, AP and LAT: LAT again belongs to neither pair.
+TEST_F(BatchCommandTest, ScanDoesNotPairARetakeAcrossACouchMove) {
+  const fs::path images = exported() / "1" / "RTIMAGE";
+  fs::remove_all(exported() / "2");
+  fs::remove_all(images / "F02");
+  const auto take = [&](const char* from, const char* name, const char* time) {
+    fs::copy_file(images / from, images / name);
+    edit(images / name, [&](DicomItem d) {
+      d.put(DCM_SOPInstanceUID, fmt::format("1.2.{}", time + 1));
+      d.put(DCM_AcquisitionTime, time);
+    });
+  };
+  take("KV_G090.dcm", "c.dcm", "101600");
+  take("KV_G000.dcm", "d.dcm", "102000");
+  take("KV_G090.dcm", "e.dcm", "102010");
+  const fs::path manifest = folder_ / "cases.csv";
+  const CommandOutcome outcome = run_command({"batch", "--scan", exported().string(), "-o", manifest.string()});
+  ASSERT_EQ(outcome.exit_status, 0) << outcome.err;
+  EXPECT_THAT(outcome.err, HasSubstr("KV_G090 was taken again"));
+  std::vector<std::vector<std::string>> found;
+  for (const BatchCase& one : read_manifest(manifest)) {
+    found.emplace_back();
+    for (const fs::path& image : one.images) found.back().push_back(image.stem());
+  }
+  using testing::ElementsAre;
+  EXPECT_THAT(found, ElementsAre(ElementsAre("KV_G000", "KV_G090"), ElementsAre("c"), ElementsAre("d", "e")));
+}
+
 class ManifestTest : public testing::Test {
  protected:
   std::string error_of(const std::string& text) const {

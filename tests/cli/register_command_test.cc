@@ -169,6 +169,48 @@ TEST_F(RegisterCommandTest, AViewWithoutATimeIsWarnedOfAndDoesNotHideTheOthers) 
   EXPECT_THAT(result()["warnings"].dump(), HasSubstr("KV_G000: AcquisitionTime (0008,0032) is missing"));
 }
 
+// Whether the couch moved in between nobody knows without its read-outs, which the phantom's X-rays do not have.
+TEST_F(RegisterCommandTest, ViewsFarApartWithoutTableReadOutsNeedAReview) {
+  const auto take_second_at = [&](const char* time) {
+    edit(study_.image(1), [&](DicomItem d) { d.put(DCM_AcquisitionTime, time); });
+  };
+  const auto reasons = [&](const std::vector<std::string>& more) {
+    std::vector<std::string> arguments = {"--overwrite"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    register_study(study_, arguments);
+    return fmt::format("{} {}", result()["verdict"].get<std::string>(), result()["reasons"].dump());
+  };
+  take_second_at("101659");
+  EXPECT_EQ(reasons({}), "accepted []");
+  take_second_at("101710");
+  EXPECT_EQ(reasons({}),
+            "review [\"KV_G090 was taken 130 s after KV_G000, more than 120 s: without table read-outs in all views "
+            "nobody knows whether the table moved (--allow time-span=REASON)\"]");
+  EXPECT_EQ(reasons({"--allow", "time-span=the couch stood still"}), "accepted []");
+  EXPECT_THAT(result()["overrides"].dump(), HasSubstr("130 s after KV_G000"));
+  const std::filesystem::path site = study_.path().parent_path() / "site.json";
+  std::ofstream(site) << R"({"site_file": 1, "name": "S", "sessions": {"views": 2, "quiet_s": 1, "max_span_s": 300}})";
+  EXPECT_EQ(reasons({"--site", site.string()}), "accepted []");
+  for (const int n : {0, 1})
+    edit(study_.image(n), [](DicomItem d) {
+      d.put(DCM_TableTopLateralPosition, 1.0);
+      d.put(DCM_TableTopLongitudinalPosition, 2.0);
+      d.put(DCM_TableTopVerticalPosition, 3.0);
+    });
+  EXPECT_EQ(reasons({}), "accepted []");
+}
+
+TEST_F(RegisterCommandTest, AViewTakenTwiceNeedsAReviewWhereTheTableIsUnknown) {
+  const std::filesystem::path again = study_.path() / "RTIMAGE" / "AGAIN.dcm";
+  std::filesystem::copy_file(study_.image(1), again);
+  edit(again, [](DicomItem d) {
+    d.put(DCM_SOPInstanceUID, "1.2.3.4");
+    d.put(DCM_AcquisitionTime, "101530");
+  });
+  EXPECT_EQ(register_study(study_).exit_status, 3);
+  EXPECT_THAT(result()["reasons"].dump(), HasSubstr("KV_G090 was taken twice"));
+}
+
 TEST_F(RegisterCommandTest, LabelsCannotForgeLines) {
   edit(study_.image(0), [](DicomItem d) { d.put(DCM_RTImageLabel, "A\nVERDICT"); });
   edit(study_.image(1), [](DicomItem d) {

@@ -53,6 +53,17 @@ TEST_F(SessionIndexTest, ListsWhatWaitsAndTheNewestFirst) {
   EXPECT_THAT(page("sessions-2026-02.html"), Not(HasSubstr("sessions/new/")));
 }
 
+TEST_F(SessionIndexTest, ShowsTheTimeOfEveryXray) {
+  SetupReport report;
+  report.views = {{.label = "AP", .acquired = "2026-03-01 10:15:00"}, {.label = "LAT", .acquired = ""}};
+  index_.add("a", report);
+  StudyFiles::Image waiting{.label = "", .acquired = "2026-03-01 10:20:10"};
+  index_.update({{.name = "next", .patient_id = "8", .acquired = times_of({waiting}), .why = "1 of 2 X-rays"}}, {});
+  const std::string index = page("index.html");
+  EXPECT_THAT(index, HasSubstr("AP 2026-03-01 10:15:00; LAT at an unknown time"));
+  EXPECT_THAT(index, HasSubstr("X-ray 2026-03-01 10:20:10"));
+}
+
 TEST_F(SessionIndexTest, ADateThatIsNoneHasAPageToo) {
   add("a", "2026/3/1");
   index_.update({}, {});

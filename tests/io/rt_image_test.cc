@@ -272,9 +272,9 @@ TEST_F(RtImageTest, ExposuresThatNameNoFrameAreNotTakenForAll) {
 TEST_F(RtImageTest, TableAnglesAreThoseOfTheFirstViewThatSays) {
   std::vector<RtImage> images = {read_rt_images(study_.image(0), notes_).front(),
                                  read_rt_images(study_.image(1), notes_).front()};
-  images[0].table_pitch_deg.reset();
-  images[1].table_pitch_deg = 3.0;
-  images[1].table_roll_deg = images[0].table_roll_deg = std::nullopt;
+  images[0].table.pitch_deg.reset();
+  images[1].table.pitch_deg = 3.0;
+  images[1].table.roll_deg = images[0].table.roll_deg = std::nullopt;
   EXPECT_NEAR(table_angles(images, notes_).pitch_rad, rad_from_deg(3.0), 1e-12);
   EXPECT_THAT(notes_.warnings,
               testing::Contains(HasSubstr("TableTopRollAngle (300A,0144) is missing in all X-rays, taken as 0")));
