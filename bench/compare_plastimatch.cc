@@ -31,13 +31,13 @@
 #include <nlohmann/json.hpp>
 #include <thread>
 
+#include "base/error.h"
+#include "base/output_folder.h"
 #include "bench/scene.h"
-#include "geometry/error.h"
 #include "geometry/patient_setup.h"
-#include "io/ct_series.h"
-#include "io/decoder_process.h"
-#include "io/output_folder.h"
-#include "io/study_files.h"
+#include "io/dicom/ct_series.h"
+#include "io/dicom/decoder_process.h"
+#include "io/study/study_files.h"
 
 namespace isoshift {
 namespace {

@@ -12,8 +12,8 @@
 #include <optional>
 #include <random>
 
+#include "base/error.h"
 #include "bench/scene.h"
-#include "geometry/error.h"
 #include "geometry/target_error.h"
 #include "registration/presets.h"
 

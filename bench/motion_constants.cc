@@ -12,7 +12,7 @@
 #include <string>
 #include <vector>
 
-#include "io/motion_trace.h"
+#include "io/study/motion_trace.h"
 #include "registration/motion/score.h"
 
 namespace {

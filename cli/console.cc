@@ -3,12 +3,14 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <utility>
 
 namespace isoshift {
 namespace {
 
 constexpr std::chrono::milliseconds kQuiet{500};
 constexpr int kBarWidth = 30;
+constexpr const char* kClearedLine = "\r\x1b[K";
 
 }  // namespace
 
@@ -16,7 +18,7 @@ ProgressBar::ProgressBar(Console& console, std::string what)
     : console_(console), what_(std::move(what)), begin_(std::chrono::steady_clock::now()) {}
 
 ProgressBar::~ProgressBar() {
-  if (console_.err_is_terminal && shown_percent_ >= 0) console_.err << "\r\x1b[K" << std::flush;
+  if (console_.err_is_terminal && shown_percent_ >= 0) console_.err << kClearedLine << std::flush;
 }
 
 // What remains, once there is enough to tell from.
@@ -34,7 +36,7 @@ void ProgressBar::update(double share) {
   if (std::chrono::steady_clock::now() - begin_ < kQuiet || percent <= shown_percent_) return;
   if (console_.err_is_terminal) {
     const int filled = percent * kBarWidth / 100;
-    console_.err << fmt::format("\r\x1b[K{:<16} [{:<{}}] {:3} %{}", what_,
+    console_.err << fmt::format("{}{:<16} [{:<{}}] {:3} %{}", kClearedLine, what_,
                                 std::string(static_cast<std::size_t>(filled), '#'), kBarWidth, percent,
                                 time_left(share))
                  << std::flush;
@@ -42,6 +44,33 @@ void ProgressBar::update(double share) {
     console_.err << fmt::format("{}: {} %{}\n", what_, percent / 25 * 25, time_left(share)) << std::flush;
   }
   shown_percent_ = percent;
+}
+
+void ConsoleObserver::progress(std::string_view step, double share) {
+  if (!bar_ || step != step_) {
+    bar_.reset();
+    bar_.emplace(console_, std::string(step));
+    step_ = step;
+  }
+  bar_->update(share);
+  if (share >= 1.0) bar_.reset();
+}
+
+ConsoleObserver::~ConsoleObserver() {
+  if (shows_line_) console_.err << "\n";
+}
+
+void ConsoleObserver::show(std::string_view line) {
+  if (!console_.err_is_terminal) return;
+  bar_.reset();
+  console_.err << kClearedLine << line << std::flush;
+  shows_line_ = true;
+}
+
+void ConsoleObserver::say(std::string_view line) {
+  bar_.reset();
+  if (std::exchange(shows_line_, false)) console_.err << kClearedLine;
+  console_.err << line << std::endl;
 }
 
 void print_warnings(const std::vector<std::string>& warnings, Console& console) {

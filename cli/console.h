@@ -3,10 +3,13 @@
 
 #include <chrono>
 #include <cstddef>
+#include <optional>
 #include <ostream>
 #include <string>
 #include <string_view>
 #include <vector>
+
+#include "workflow/observer.h"
 
 namespace isoshift {
 
@@ -35,6 +38,24 @@ class ProgressBar {
   std::string what_;
   std::chrono::steady_clock::time_point begin_;
   int shown_percent_ = -1;
+};
+
+// Shows what work tells: a bar for each of its steps, and its lines.
+class ConsoleObserver : public Observer {
+ public:
+  explicit ConsoleObserver(Console& console) : console_(console) {}
+  ~ConsoleObserver() override;
+
+  using Observer::progress;
+  void progress(std::string_view step, double share) override;
+  void show(std::string_view line) override;
+  void say(std::string_view line) override;
+
+ private:
+  Console& console_;
+  std::string step_;
+  std::optional<ProgressBar> bar_;
+  bool shows_line_ = false;
 };
 
 void print_warnings(const std::vector<std::string>& warnings, Console& console);

@@ -5,10 +5,10 @@
 #include <exception>
 #include <sstream>
 
-#include "cli/commands.h"
+#include "base/error.h"
+#include "base/version.h"
+#include "cli/commands/commands.h"
 #include "cli/man_pages.h"
-#include "geometry/error.h"
-#include "io/version.h"
 
 namespace isoshift {
 namespace {

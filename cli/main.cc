@@ -5,15 +5,15 @@
 #include <string_view>
 #include <thread>
 
-#include "cli/commands.h"
-#include "cli/graceful_end.h"
-#include "io/decoder_process.h"
-#include "io/output_folder.h"
+#include "base/graceful_end.h"
+#include "base/output_folder.h"
+#include "cli/commands/commands.h"
+#include "io/dicom/decoder_process.h"
 
 namespace {
 
-// SIGINT and SIGTERM end the program without leaving half a result behind, or ask its work to end (cli/graceful_end.h):
-// a thread of its own waits for them, since hardly anything may be done in a handler.
+// SIGINT and SIGTERM end the program without leaving half a result behind, or ask its work to end
+// (base/graceful_end.h): a thread of its own waits for them, since hardly anything may be done in a handler.
 void end_cleanly_on_signals() {
   static sigset_t signals;
   sigemptyset(&signals);

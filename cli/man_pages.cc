@@ -2,8 +2,8 @@
 
 #include <fmt/format.h>
 
-#include "io/output_folder.h"
-#include "io/version.h"
+#include "base/output_folder.h"
+#include "base/version.h"
 
 namespace isoshift {
 namespace {

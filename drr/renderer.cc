@@ -7,13 +7,13 @@
 #include <numeric>
 #include <random>
 
+#include "base/error.h"
 #include "drr/cpu/raycast.h"
 #include "drr/cpu/siddon.h"
 #include "drr/cpu/trilinear.h"
 #include "drr/raycast/rasterized.h"
 #include "drr/raycast/raycast.h"
 #include "drr/splat/splat.h"
-#include "geometry/error.h"
 
 namespace isoshift {
 

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <string>
 
-#include "geometry/error.h"
+#include "base/error.h"
 
 namespace isoshift {
 namespace {

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "geometry/error.h"
+#include "base/error.h"
 #include "geometry/rotation.h"
 
 namespace isoshift {

@@ -10,10 +10,10 @@
 #include <random>
 #include <set>
 
-#include "geometry/error.h"
+#include "base/error.h"
+#include "base/output_folder.h"
 #include "geometry/patient_setup.h"
-#include "io/decode.h"
-#include "io/output_folder.h"
+#include "io/dicom/decode.h"
 
 namespace isoshift {
 namespace {

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "io/ct_series.h"
+#include "io/dicom/ct_series.h"
 #include "phantom/breathing.h"
 #include "phantom/xray_simulation.h"
 

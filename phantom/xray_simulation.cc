@@ -9,7 +9,7 @@
 #include <random>
 #include <span>
 
-#include "geometry/error.h"
+#include "base/error.h"
 
 namespace isoshift {
 namespace {

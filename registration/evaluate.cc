@@ -7,7 +7,7 @@
 #include <map>
 #include <random>
 
-#include "geometry/error.h"
+#include "base/error.h"
 #include "geometry/rotation.h"
 #include "geometry/target_error.h"
 

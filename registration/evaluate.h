@@ -10,8 +10,8 @@
 #include <string>
 #include <vector>
 
-#include "geometry/verdict.h"
 #include "geometry/xray_view.h"
+#include "setup/verdict.h"
 
 namespace isoshift {
 

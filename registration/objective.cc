@@ -8,8 +8,8 @@
 #include <numeric>
 #include <random>
 
+#include "base/error.h"
 #include "drr/raycast/raycast.h"
-#include "geometry/error.h"
 #include "registration/similarity/gl_similarity.h"
 
 namespace isoshift {

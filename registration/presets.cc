@@ -3,7 +3,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include "geometry/error.h"
+#include "base/error.h"
 #include "geometry/rotation.h"
 
 namespace isoshift {

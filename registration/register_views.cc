@@ -7,7 +7,7 @@
 #include <cmath>
 #include <numeric>
 
-#include "geometry/error.h"
+#include "base/error.h"
 #include "registration/objective.h"
 #include "registration/pose_parameters.h"
 #include "registration/quality/judge.h"

@@ -14,13 +14,13 @@
 #include <vector>
 
 #include "drr/renderer_pyramid.h"
-#include "geometry/verdict.h"
 #include "geometry/xray_image.h"
 #include "registration/quality/alternatives.h"
 #include "registration/quality/consistency.h"
 #include "registration/quality/cross_checks.h"
 #include "registration/quality/uncertainty.h"
 #include "registration/search.h"
+#include "setup/verdict.h"
 
 namespace isoshift {
 

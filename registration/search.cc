@@ -7,7 +7,7 @@
 #include <numeric>
 #include <random>
 
-#include "geometry/error.h"
+#include "base/error.h"
 #include "registration/objective.h"
 #include "registration/pose_parameters.h"
 

@@ -6,8 +6,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/error.h"
 #include "drr/cpu/march.h"
-#include "geometry/error.h"
 
 namespace isoshift {
 namespace {

@@ -9,7 +9,7 @@
 #include <cstring>
 #include <optional>
 
-#include "geometry/error.h"
+#include "base/error.h"
 
 namespace isoshift {
 namespace {

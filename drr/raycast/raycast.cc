@@ -5,10 +5,10 @@
 #include <algorithm>
 #include <array>
 
+#include "base/error.h"
 #include "drr/camera.h"
 #include "drr/occupied_blocks.h"
 #include "drr/raycast/raycast.comp.h"
-#include "geometry/error.h"
 
 namespace isoshift {
 namespace {

@@ -7,10 +7,10 @@
 #include <random>
 #include <type_traits>
 
+#include "base/error.h"
 #include "drr/camera.h"
 #include "drr/splat/splat.frag.h"
 #include "drr/splat/splat.vert.h"
-#include "geometry/error.h"
 
 namespace isoshift {
 namespace {

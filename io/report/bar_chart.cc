@@ -8,7 +8,7 @@
 #include <cmath>
 #include <memory>
 
-#include "geometry/error.h"
+#include "base/error.h"
 #include "io/report/ticks.h"
 
 namespace isoshift {

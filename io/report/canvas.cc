@@ -8,7 +8,7 @@
 #include <cmath>
 #include <functional>
 
-#include "geometry/error.h"
+#include "base/error.h"
 
 namespace isoshift {
 namespace {

@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "geometry/image.h"
-#include "io/image_files.h"
+#include "io/objects/image_files.h"
 
 namespace isoshift {
 

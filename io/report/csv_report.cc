@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "io/csv.h"
+#include "base/csv.h"
 #include "io/report/canvas.h"
 #include "io/report/formats.h"
 

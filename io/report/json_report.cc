@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
-#include "geometry/error.h"
+#include "base/error.h"
 #include "geometry/rotation.h"
 #include "io/report/formats.h"
 #include "io/report/polygons_json.h"

@@ -8,9 +8,9 @@
 #include <iterator>
 #include <utility>
 
-#include "geometry/error.h"
-#include "io/encapsulated_pdf.h"
-#include "io/output_folder.h"
+#include "base/error.h"
+#include "base/output_folder.h"
+#include "io/objects/encapsulated_pdf.h"
 #include "io/report/drawings.h"
 #include "io/report/formats.h"
 

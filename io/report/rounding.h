@@ -4,7 +4,7 @@
 #include <optional>
 #include <string>
 
-#include "io/site_file.h"
+#include "io/config/site_file.h"
 
 namespace isoshift {
 

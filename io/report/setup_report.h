@@ -9,11 +9,11 @@
 #include <utility>
 #include <vector>
 
-#include "geometry/couch_shift.h"
-#include "geometry/verdict.h"
-#include "io/identity.h"
+#include "io/config/site_file.h"
+#include "io/dicom/identity.h"
 #include "io/report/view_picture.h"
-#include "io/site_file.h"
+#include "setup/couch_shift.h"
+#include "setup/verdict.h"
 
 namespace isoshift {
 

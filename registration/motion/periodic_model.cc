@@ -8,7 +8,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "geometry/error.h"
+#include "base/error.h"
 
 namespace isoshift {
 namespace {

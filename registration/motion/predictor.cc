@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "geometry/error.h"
+#include "base/error.h"
 #include "registration/motion/kalman.h"
 #include "registration/motion/periodic_model.h"
 #include "registration/motion/rls.h"

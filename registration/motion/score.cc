@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "geometry/error.h"
+#include "base/error.h"
 
 namespace isoshift {
 

@@ -5,10 +5,10 @@
 #include <algorithm>
 #include <cmath>
 
-#include "geometry/couch_shift.h"
-#include "geometry/error.h"
+#include "base/error.h"
 #include "registration/pose_parameters.h"
 #include "registration/quality/judge.h"
+#include "setup/couch_shift.h"
 
 namespace isoshift {
 namespace {

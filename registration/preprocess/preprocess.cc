@@ -7,7 +7,7 @@
 #include <numbers>
 #include <opencv2/imgproc.hpp>
 
-#include "geometry/error.h"
+#include "base/error.h"
 #include "geometry/rotation.h"
 #include "registration/preprocess/mat.h"
 

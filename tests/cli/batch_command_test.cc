@@ -8,11 +8,11 @@
 #include <iterator>
 #include <nlohmann/json.hpp>
 
-#include "cli/batch_folder.h"
-#include "cli/batch_manifest.h"
-#include "cli/child_process.h"
-#include "geometry/error.h"
+#include "base/child_process.h"
+#include "base/error.h"
 #include "tests/support/small_study.h"
+#include "workflow/batch/batch_folder.h"
+#include "workflow/batch/batch_manifest.h"
 
 namespace isoshift {
 namespace {
@@ -85,7 +85,7 @@ TEST_F(BatchCommandTest, RegistersEverySessionOnceAndGoesOn) {
 TEST_F(BatchCommandTest, ItsPageSortsFiltersAndLinks) {
   if (!fs::exists("/usr/bin/chromedriver")) GTEST_SKIP() << "Chromium is not installed";
   ASSERT_NE(batch().exit_status, 1);
-  const CommandOutcome seen = run_shell(fmt::format("/usr/bin/python3 {}/tests/io/results_page_in_browser.py {}",
+  const CommandOutcome seen = run_shell(fmt::format("/usr/bin/python3 {}/tests/io/report/results_page_in_browser.py {}",
                                                     ISOSHIFT_SOURCE_DIR, (results() / "index.html").string()));
   EXPECT_EQ(seen.exit_status, 0) << seen.out;
 }

@@ -7,7 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
-#include "cli/commands.h"
+#include "cli/commands/commands.h"
 #include "tests/support/small_study.h"
 
 namespace isoshift {
@@ -224,7 +224,7 @@ TEST_F(EvaluateCommandTest, StartsOfThePaperAre25MmAway) {
   EXPECT_GE(std::stod(fields_of(lines_of(folder_ / "paper" / "runs.csv")[1])[1]), 24.0);
 }
 
-TEST(RegionSwitchesTest, AnUnknownStructureIsAnErrorThatListsWhatThereIs) {
+TEST(RegionOptionsTest, AnUnknownStructureIsAnErrorThatListsWhatThereIs) {
   const SmallStudy study;
   const auto square = rectangle({-12, 38, -410}, 40, 40);
   auto above = square;
@@ -240,14 +240,14 @@ TEST(RegionSwitchesTest, AnUnknownStructureIsAnErrorThatListsWhatThereIs) {
   }
 }
 
-TEST(RegionSwitchesTest, AStructureOfAStudyWithoutAnyIsAnError) {
+TEST(RegionOptionsTest, AStructureOfAStudyWithoutAnyIsAnError) {
   const SmallStudy study;
   const CommandOutcome outcome = register_study(study, {"--structure", "Spine"});
   EXPECT_EQ(outcome.exit_status, 1);
   EXPECT_THAT(outcome.err, HasSubstr("structure Spine: the study holds no RT Structure Set"));
 }
 
-TEST(RegionSwitchesTest, ARectangleNeedsALabelOfAnXrayAndFourNumbers) {
+TEST(RegionOptionsTest, ARectangleNeedsALabelOfAnXrayAndFourNumbers) {
   const SmallStudy study;
   for (const char* rectangle : {"KV_G000", "KV_G000=1,2,3", "KV_G000=1,2,3,x", "KV_G000=10,10,5,20",
                                 "KV_G000=1,2,30,40,5", "OTHER=10,10,80,80"}) {
@@ -258,7 +258,7 @@ TEST(RegionSwitchesTest, ARectangleNeedsALabelOfAnXrayAndFourNumbers) {
   EXPECT_THAT(register_study(study, {"--preset", "fast", "--rectangle", "KV_G000=10,10,80,80"}).exit_status, 3);
 }
 
-TEST(RegionSwitchesTest, ADistanceThatIsNoneIsAUsageError) {
+TEST(RegionOptionsTest, ADistanceThatIsNoneIsAUsageError) {
   const SmallStudy study;
   for (const char* distance : {"0", "-5", "nan"})
     EXPECT_EQ(register_study(study, {"--around-isocenter", distance}).exit_status, 2) << distance;

@@ -11,6 +11,7 @@ import pathlib
 import subprocess
 import sys
 
+sys.path.insert(0, str(pathlib.Path(__file__).parents[1] / "support"))
 from orthanc_server import Orthanc, fetch
 
 

@@ -4,10 +4,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "cli/truth.h"
 #include "geometry/patient_setup.h"
 #include "tests/support/pose_near.h"
 #include "tests/support/small_study.h"
+#include "workflow/register/truth.h"
 
 namespace isoshift {
 namespace {

@@ -3,7 +3,7 @@
 
 #include <sstream>
 
-#include "io/dicom_dataset.h"
+#include "io/dicom/dicom_dataset.h"
 #include "tests/support/command.h"
 #include "tests/support/temporary_folder.h"
 

@@ -5,10 +5,10 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
-#include "cli/truth.h"
 #include "tests/support/command.h"
 #include "tests/support/pose_near.h"
 #include "tests/support/small_study.h"
+#include "workflow/register/truth.h"
 
 namespace isoshift {
 namespace {

@@ -5,11 +5,11 @@
 
 #include <nlohmann/json.hpp>
 
-#include "cli/truth.h"
 #include "tests/support/command.h"
 #include "tests/support/pose_near.h"
 #include "tests/support/small_study.h"
 #include "tests/support/temporary_folder.h"
+#include "workflow/register/truth.h"
 
 namespace isoshift {
 namespace {

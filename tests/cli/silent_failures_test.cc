@@ -4,8 +4,8 @@
 #include <gtest/gtest.h>
 
 #include "drr/gl/context.h"
-#include "geometry/couch_shift.h"
-#include "io/spatial_registration.h"
+#include "io/objects/spatial_registration.h"
+#include "setup/couch_shift.h"
 #include "tests/support/command.h"
 #include "tests/support/pose_near.h"
 #include "tests/support/small_study.h"

@@ -11,7 +11,7 @@
 #include <thread>
 #include <utility>
 
-#include "cli/graceful_end.h"
+#include "base/graceful_end.h"
 #include "tests/support/small_study.h"
 
 namespace isoshift {

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "geometry/error.h"
+#include "base/error.h"
 
 namespace isoshift {
 namespace {

@@ -4,9 +4,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "base/error.h"
 #include "drr/gl/context.h"
 #include "drr/gl/objects.h"
-#include "geometry/error.h"
 #include "geometry/rotation.h"
 #include "tests/drr/test_views.h"
 #include "tests/support/command.h"

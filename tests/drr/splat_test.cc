@@ -8,8 +8,8 @@
 #include <complex>
 #include <numbers>
 
+#include "base/error.h"
 #include "drr/renderer.h"
-#include "geometry/error.h"
 #include "tests/drr/test_views.h"
 
 namespace isoshift {

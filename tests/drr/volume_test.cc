@@ -6,13 +6,13 @@
 
 #include <hwy/highway.h>
 
+#include "base/error.h"
 #include "drr/cpu/march.h"
 #include "drr/gl/context.h"
 #include "drr/occupied_blocks.h"
 #include "drr/quantized_volume.h"
 #include "drr/raycast/bounding_faces.h"
 #include "drr/raycast/raycast.h"
-#include "geometry/error.h"
 #include "tests/drr/test_views.h"
 
 namespace isoshift {

@@ -13,8 +13,8 @@
 #include <iostream>
 #include <random>
 
-#include "geometry/error.h"
-#include "io/decoder_process.h"
+#include "base/error.h"
+#include "io/dicom/decoder_process.h"
 #include "tests/fuzz/readers.h"
 #include "tests/support/small_study.h"
 

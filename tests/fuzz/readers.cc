@@ -1,14 +1,14 @@
 #include "tests/fuzz/readers.h"
 
-#include "io/ct_series.h"
-#include "io/decode.h"
-#include "io/registration_check.h"
-#include "io/rt_image.h"
-#include "io/rt_plan.h"
-#include "io/rt_structures.h"
-#include "io/spatial_registration.h"
-#include "io/structure_mask.h"
-#include "io/study_files.h"
+#include "io/dicom/ct_series.h"
+#include "io/dicom/decode.h"
+#include "io/dicom/rt_image.h"
+#include "io/dicom/rt_plan.h"
+#include "io/dicom/rt_structures.h"
+#include "io/dicom/structure_mask.h"
+#include "io/objects/registration_check.h"
+#include "io/objects/spatial_registration.h"
+#include "io/study/study_files.h"
 
 namespace isoshift {
 namespace {

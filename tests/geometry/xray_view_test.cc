@@ -7,7 +7,7 @@
 #include <array>
 #include <cmath>
 
-#include "geometry/error.h"
+#include "base/error.h"
 #include "geometry/patient_setup.h"
 #include "tests/support/pose_near.h"
 

@@ -5,7 +5,7 @@
 #include <array>
 #include <cmath>
 
-#include "geometry/error.h"
+#include "base/error.h"
 #include "tests/support/pose_near.h"
 
 namespace isoshift {

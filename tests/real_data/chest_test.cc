@@ -7,8 +7,8 @@
 #include <cmath>
 
 #include "geometry/mask.h"
-#include "io/structure_mask.h"
-#include "io/study.h"
+#include "io/dicom/structure_mask.h"
+#include "io/study/study.h"
 #include "tests/support/real_data.h"
 
 namespace isoshift {

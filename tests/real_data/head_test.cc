@@ -7,20 +7,20 @@
 #include <algorithm>
 #include <cmath>
 
-#include "cli/truth.h"
 #include "drr/gl/context.h"
 #include "drr/renderer.h"
 #include "drr/renderer_pyramid.h"
-#include "geometry/couch_shift.h"
 #include "geometry/target_error.h"
-#include "io/ct_series.h"
-#include "io/study.h"
+#include "io/dicom/ct_series.h"
+#include "io/study/study.h"
 #include "registration/presets.h"
+#include "setup/couch_shift.h"
 #include "tests/drr/test_views.h"
 #include "tests/support/command.h"
 #include "tests/support/pose_near.h"
 #include "tests/support/real_data.h"
 #include "tests/support/temporary_folder.h"
+#include "workflow/register/truth.h"
 
 namespace isoshift {
 namespace {
@@ -65,7 +65,7 @@ TEST(HeadRegistration, ObjectMeansTheTruthToPydicomAndPassesDciodvfy) {
   TemporaryFolder folder;
   registered("head-kv-pair", folder / "out");
   const CommandOutcome checked = run_shell(
-      fmt::format("dciodvfy -new {0} | grep '^Error'; /usr/bin/python3 {1}/tests/io/check_registration.py {0} {2} 0.3",
+      fmt::format("dciodvfy -new {0} | grep '^Error'; /usr/bin/python3 {1}/tests/io/objects/check_registration.py {0} {2} 0.3",
                   (folder / "out" / "spatial_registration.dcm").string(), ISOSHIFT_SOURCE_DIR,
                   (kHead / "head-kv-pair" / "truth.json").string()));
   EXPECT_EQ(checked.exit_status, 0) << checked.out;

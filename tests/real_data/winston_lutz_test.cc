@@ -6,13 +6,13 @@
 #include <gtest/gtest.h>
 
 #include "cli/console.h"
-#include "cli/truth.h"
-#include "io/rt_image.h"
+#include "io/dicom/rt_image.h"
 #include "registration/preprocess/preprocess.h"
 #include "tests/support/command.h"
 #include "tests/support/pose_near.h"
 #include "tests/support/real_data.h"
 #include "tests/support/temporary_folder.h"
+#include "workflow/register/truth.h"
 
 namespace isoshift {
 namespace {

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <map>
 
-#include "geometry/error.h"
+#include "base/error.h"
 #include "geometry/rotation.h"
 #include "geometry/target_error.h"
 #include "tests/support/pose_near.h"

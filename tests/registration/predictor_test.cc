@@ -8,7 +8,7 @@
 #include <numbers>
 #include <random>
 
-#include "geometry/error.h"
+#include "base/error.h"
 #include "registration/motion/kalman.h"
 #include "registration/motion/periodic_model.h"
 #include "registration/motion/rls.h"

@@ -6,8 +6,8 @@
 #include <cmath>
 #include <functional>
 
-#include "geometry/couch_shift.h"
 #include "registration/presets.h"
+#include "setup/couch_shift.h"
 #include "tests/drr/test_views.h"
 #include "tests/support/pose_near.h"
 #include "tests/support/registration_scene.h"

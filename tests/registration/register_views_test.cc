@@ -6,10 +6,10 @@
 #include <algorithm>
 #include <cmath>
 
-#include "geometry/couch_shift.h"
-#include "geometry/error.h"
+#include "base/error.h"
 #include "geometry/patient_setup.h"
 #include "phantom/study_writer.h"
+#include "setup/couch_shift.h"
 #include "tests/drr/test_views.h"
 #include "tests/support/pose_near.h"
 

@@ -6,7 +6,7 @@
 #include <cstdio>
 #include <sstream>
 
-#include "cli/commands.h"
+#include "cli/commands/commands.h"
 
 namespace isoshift {
 

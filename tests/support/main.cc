@@ -2,8 +2,8 @@
 
 #include <gmock/gmock.h>
 
-#include "cli/child_process.h"
-#include "io/decoder_process.h"
+#include "base/child_process.h"
+#include "io/dicom/decoder_process.h"
 
 int main(int argc, char** argv) {
   testing::InitGoogleMock(&argc, argv);

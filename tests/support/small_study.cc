@@ -3,8 +3,8 @@
 #include <dcmtk/dcmdata/dcuid.h>
 #include <fmt/format.h>
 
-#include "io/decode.h"
-#include "io/rt_plan.h"
+#include "io/dicom/decode.h"
+#include "io/dicom/rt_plan.h"
 
 namespace isoshift {
 

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "io/dicom_dataset.h"
+#include "io/dicom/dicom_dataset.h"
 #include "phantom/study_writer.h"
 #include "tests/support/command.h"
 #include "tests/support/temporary_folder.h"

@@ -1,0 +1,67 @@
+#include "base/json_file.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <fstream>
+#include <iterator>
+#include <set>
+
+#include "base/error.h"
+#include "base/sha256.h"
+
+namespace isoshift {
+
+JsonFile read_json_file(const std::filesystem::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  const std::string content{std::istreambuf_iterator<char>(file), {}};
+  if (!file) throw Error(fmt::format("{}: cannot be read", path.string()));
+  std::vector<std::set<std::string>> keys;  // of the objects that are open
+  const auto check_keys = [&](int, nlohmann::json::parse_event_t event, const nlohmann::json& parsed) {
+    using Event = nlohmann::json::parse_event_t;
+    if (event == Event::object_start) keys.emplace_back();
+    if (event == Event::object_end) keys.pop_back();
+    if (event == Event::key && !keys.back().insert(parsed.get<std::string>()).second)
+      throw Error(fmt::format("{}: says {} twice", path.string(), parsed.get<std::string>()));
+    return true;
+  };
+  try {
+    return {.json = nlohmann::json::parse(content, check_keys), .sha256 = sha256_of(content)};
+  } catch (const nlohmann::json::exception& error) {
+    throw Error(fmt::format("{}: is no JSON: {}", path.string(), error.what()));
+  }
+}
+
+JsonSection::JsonSection(const nlohmann::json& json, std::string where) : json_(json), where_(std::move(where)) {
+  if (!json_.is_object()) throw Error(fmt::format("{}: expected an object", where_));
+}
+
+std::optional<double> JsonSection::number(const char* key, double low, double high) {
+  const auto value = find<double>(key, "a number");
+  if (value && !(*value >= low && *value <= high))
+    throw Error(fmt::format("{}: {} is {}, expected {} to {}", where_, key, *value, low, high));
+  return value;
+}
+
+std::optional<JsonSection> JsonSection::section(const char* key) {
+  known_.emplace_back(key);
+  if (!json_.contains(key)) return std::nullopt;
+  return JsonSection(json_.at(key), fmt::format("{}: {}", where_, key));
+}
+
+void JsonSection::refuse(const char* key, const char* expected) const {
+  throw Error(fmt::format("{}: {} is {}, expected {}", where_, key, json_.at(key).dump(), expected));
+}
+
+void JsonSection::refuse_missing(const char* key, const char* expected) const {
+  throw Error(fmt::format("{}: {} is missing, expected {}", where_, key, expected));
+}
+
+void JsonSection::end() const {
+  for (const auto& [key, value] : json_.items())
+    if (std::ranges::find(known_, key) == known_.end())
+      throw Error(fmt::format("{}: there is no key {}; the keys are {}", where_, key, fmt::join(known_, ", ")));
+}
+
+}  // namespace isoshift

@@ -1,0 +1,151 @@
+// isoshift batch: registers many studies.
+
+#include <fmt/format.h>
+
+#include <memory>
+#include <set>
+#include <sstream>
+
+#include "base/error.h"
+#include "base/output_folder.h"
+#include "cli/commands/commands.h"
+#include "cli/commands/register_command.h"
+#include "cli/switches/registration_switches.h"
+#include "cli/switches/study_switches.h"
+#include "workflow/batch/batch.h"
+#include "workflow/batch/batch_slurm.h"
+
+namespace isoshift {
+namespace {
+
+struct BatchFlags {
+  BatchOptions batch;
+  int slurm_tasks = 0;
+  std::string shard;
+  bool scan = false, merge = false, worker = false, json = false;
+};
+
+// Those that say which part of a batch runs, and how it is told.
+const std::set<std::string> kOfOneRun = {"cases", "output", "jobs",   "shard", "merge",
+                                         "slurm", "scan",   "worker", "json",  "help"};
+
+std::vector<std::string> kept_options(const CLI::App& command) {
+  std::vector<std::string> kept;
+  for (const CLI::Option* option : command.get_options()) {
+    const std::string name = option->get_single_name();
+    if (option->count() == 0 || kOfOneRun.contains(name)) continue;
+    for (const std::string& result : option->results())
+      kept.push_back(option->get_expected_max() == 0 ? "--" + name : fmt::format("--{}={}", name, result));
+  }
+  return kept;
+}
+
+Shard shard_from(const std::string& text) {
+  Shard shard;
+  char slash = 0;
+  std::istringstream words(text);
+  if (!(words >> shard.number >> slash >> shard.count) || slash != '/' || !words.eof() || shard.number < 1 ||
+      shard.number > shard.count)
+    throw UsageError(fmt::format("--shard {}: expected I/N, I from 1 to N", text));
+  return shard;
+}
+
+// Whether all, some or none were accepted.
+int print(const BatchSummary& summary, bool as_json, Console& console) {
+  console.out << (as_json ? summary_json(summary) : summary_text(summary));
+  if (summary.accepted() == summary.cases.size()) return kExitAccepted;
+  return summary.accepted() > 0 ? kExitReview : kExitRejected;
+}
+
+int scan(const BatchOptions& options, Console& console) {
+  ConsoleObserver observer(console);
+  const std::vector<BatchCase> cases = cases_of(options, observer);
+  replace_text(options.output, manifest_csv(cases));
+  console.out << fmt::format("{}: {} cases\n", options.output.string(), cases.size());
+  return kExitAccepted;
+}
+
+int summarize(const Batch& batch, bool as_json, Console& console) {
+  const BatchSummary summary = batch.summary();
+  write_summary(batch.folder(), summary);
+  const int status = print(summary, as_json, console);
+  if (!as_json)
+    console.out << fmt::format("\nWritten to {}: index.html, summary.csv, summary.json\n",
+                               batch.folder().path().string());
+  return summary.open() > 0 ? kExitFailed : status;
+}
+
+int run_batch(BatchFlags& flags, Console& console) {
+  BatchOptions& options = flags.batch;
+  if (!flags.shard.empty()) options.shard = shard_from(flags.shard);
+  options.takes_earlier_scan = flags.worker || flags.merge || options.shard;
+  if (flags.scan) return scan(options, console);
+  ConsoleObserver observer(console);
+  Batch batch(options, observer);
+  if (flags.worker) {
+    batch.serve();
+    return kExitAccepted;
+  }
+  if (flags.slurm_tasks > 0) {
+    console.out << submit_to_slurm(std::filesystem::absolute(batch.folder().path()), batch.arguments(),
+                                   flags.slurm_tasks)
+                << "\n";
+    return kExitAccepted;
+  }
+  if (flags.merge) return summarize(batch, flags.json, console);
+  if (!batch.run()) {
+    observer.say("ended before all cases were registered; the same command goes on");
+    return kExitFailed;
+  }
+  return options.shard && options.shard->count > 1 ? print(batch.summary(), flags.json, console)
+                                                   : summarize(batch, flags.json, console);
+}
+
+}  // namespace
+
+void add_batch_command(CLI::App& app, Console& console, int& exit_status) {
+  auto flags = std::make_shared<BatchFlags>();
+  BatchOptions& options = flags->batch;
+  CLI::App* command = app.add_subcommand("batch", "Register many studies");
+  command->footer(
+      "\nExample:\n  isoshift batch exported/ -o results            # every session of X-rays below the folder\n"
+      "  isoshift batch --scan exported/ -o cases.csv   # only write down which files would make a case\n"
+      "  isoshift batch cases.csv -o results --jobs 4\n\n"
+      "Writes a folder per case, index.html, patients.html, summary.csv and summary.json. The same command goes on\n"
+      "where one was stopped.\n"
+      "Exit status: 0 all accepted, 1 failed or stopped, 2 usage, 3 some accepted, 4 none.");
+  command
+      ->add_option("cases", options.cases,
+                   "Folder with the files of many patients, or a manifest: CSV or JSON lines (docs/commands/batch.md)")
+      ->required()
+      ->type_name("PATH");
+  command->add_option("-o,--output", options.output, "Folder for the results; with --scan the manifest to write")
+      ->required()
+      ->type_name("PATH");
+  command->add_flag("--scan", flags->scan, "Only write the manifest of what is in the folder");
+  command->add_option("--jobs", options.jobs, "Cases at the same time, each in a process of its own")
+      ->type_name("N")
+      ->check(CLI::Range(1, 256))
+      ->capture_default_str();
+  const char* parts = "Beyond one machine";
+  command->add_option("--shard", flags->shard, "Only part I of N; --merge makes the summary of all")
+      ->type_name("I/N")
+      ->group(parts);
+  command->add_flag("--merge", flags->merge, "Only the summary of what has been registered")->group(parts);
+  command->add_option("--slurm", flags->slurm_tasks, "Submit N shards as a Slurm job array, and the merge after it")
+      ->type_name("N")
+      ->check(CLI::Range(1, 100000))
+      ->group(parts);
+  command->add_flag("--worker", flags->worker)->group("");  // not for people
+  command->add_flag("--json", flags->json, "Print summary.json instead of its figures");
+  add_result_options(*command, options.each);
+  add_study_switches(*command, options.each.study);
+  add_registration_switches(*command, options.each.registration);
+  command->callback([flags, command, &console, &exit_status] {
+    flags->batch.each.registration.settle();
+    flags->batch.kept = kept_options(*command);
+    exit_status = run_batch(*flags, console);
+  });
+}
+
+}  // namespace isoshift

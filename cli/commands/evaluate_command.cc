@@ -1,0 +1,97 @@
+// isoshift evaluate: many registrations from published starts, their errors against a known truth.
+
+#include <fmt/format.h>
+
+#include <memory>
+
+#include "base/error.h"
+#include "cli/commands/commands.h"
+#include "cli/switches/registration_switches.h"
+#include "cli/switches/study_switches.h"
+#include "workflow/evaluate/evaluate_study.h"
+#include "workflow/register/truth.h"
+
+namespace isoshift {
+namespace {
+
+struct EvaluateFlags {
+  EvaluateOptions evaluation;
+  std::string series = "bins";
+  std::optional<int> starts;
+  std::optional<double> distance_mm;
+  std::uint64_t start_seed = 1;
+  std::filesystem::path truth;
+  std::vector<std::filesystem::path> table;
+};
+
+StartProtocol protocol_of(const EvaluateFlags& flags) {
+  StartProtocol protocol = flags.series == "paper" ? StartProtocol::paper() : StartProtocol{};
+  protocol.count = flags.starts.value_or(protocol.count);
+  protocol.distance_mm = flags.distance_mm.value_or(protocol.distance_mm);
+  protocol.seed = flags.start_seed;
+  protocol.check();
+  return protocol;
+}
+
+void print_table(const std::vector<std::filesystem::path>& paths, Console& console) {
+  std::vector<std::pair<std::string, EvaluationSummary>> rows;
+  for (const std::filesystem::path& path : paths) {
+    const EvaluationFolder folder(path);
+    rows.emplace_back(path.filename().empty() ? path.parent_path().filename().string() : path.filename().string(),
+                      summarized(folder.runs(), folder.judged_by_mrpd()));
+  }
+  console.out << evaluation_table(rows);
+}
+
+void run_evaluate(EvaluateFlags& flags, Console& console) {
+  if (!flags.table.empty()) return print_table(flags.table, console);
+  EvaluateOptions& options = flags.evaluation;
+  if (flags.truth.empty() || options.output.empty())
+    throw UsageError("an evaluation needs --truth and -o (or --table to look at earlier ones)");
+  options.protocol = protocol_of(flags);
+  options.registration.settle();
+  options.truth = read_setup_error(flags.truth);
+  Notes notes;
+  ConsoleObserver observer(console);
+  const EvaluationFolder folder = evaluate_study(options, notes, observer);
+  print_warnings(notes.warnings, console);
+  console.out << evaluation_table(
+      {{options.output.filename().string(), summarized(folder.runs(), folder.judged_by_mrpd())}});
+}
+
+}  // namespace
+
+void add_evaluate_command(CLI::App& app, Console& console, int&) {
+  auto flags = std::make_shared<EvaluateFlags>();
+  EvaluateOptions& options = flags->evaluation;
+  CLI::App* command = app.add_subcommand("evaluate", "Measure how good registration is, from many starts");
+  command->footer(
+      "\nExample:\n  isoshift evaluate exported/ --truth exported/truth.json -o evaluation\n"
+      "  isoshift evaluate --table evaluation other_evaluation\n\n"
+      "Writes runs.csv, summary.json, success.svg and errors.svg. Started again on the same folder, it goes on where "
+      "it "
+      "was\nstopped. The protocol is that of van de Kraats et al. (2005): docs/evaluation.md.");
+  add_study_options(*command, options.study);
+  command->add_option("--truth", flags->truth, "truth.json of the study: the true setup error")->type_name("FILE");
+  command->add_option("-o,--output", options.output, "Folder for the results")->type_name("FOLDER");
+  command
+      ->add_option("--series", flags->series,
+                   "bins: 200 starts spread over 0 to 20 mm of mTRE; paper: 150 starts 25 mm away")
+      ->check(CLI::IsMember({"bins", "paper"}))
+      ->capture_default_str();
+  command->add_option("--starts", flags->starts, "How many starts")->type_name("N");
+  command->add_option("--distance", flags->distance_mm, "bins: the largest mTRE at the start; paper: the translation")
+      ->type_name("MM");
+  command->add_option("--start-seed", flags->start_seed, "Draws the starts")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
+  command
+      ->add_option("--jobs", options.jobs,
+                   "Registrations at a time, each on one thread; 1: one on all cores, for its time (default: cores)")
+      ->check(CLI::PositiveNumber);
+  command->add_option("--table", flags->table, "Print a table of evaluations made earlier")->type_name("FOLDER...");
+  add_registration_switches(*command, options.registration);
+  command->callback([flags, &console] { run_evaluate(*flags, console); });
+}
+
+}  // namespace isoshift

@@ -1,0 +1,195 @@
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <memory>
+
+#include "base/error.h"
+#include "cli/commands/commands.h"
+#include "drr/gl/context.h"
+#include "io/study/study.h"
+
+namespace isoshift {
+namespace {
+
+std::string or_missing(const std::optional<double>& value, std::string_view unit) {
+  return value ? fmt::format("{:.6g} {}", *value, unit) : "missing";
+}
+
+template <class Vector>
+std::string or_missing(const std::optional<Vector>& value, std::string_view unit) {
+  return value ? fmt::format("({:.6g}) {}", fmt::join(*value, ", "), unit) : "missing";
+}
+
+std::string or_missing(const std::optional<std::string>& value) { return value ? *value : "missing"; }
+
+std::string line(std::string_view name, std::string_view value) { return fmt::format("  {:<24} {}\n", name, value); }
+
+// The source and the panel's center in the room: what the angles and distances mean once put together.
+std::string geometry_as_understood(const RtImage& image) {
+  Notes notes;
+  const XrayView view = xray_view(image, Beam::kKilovoltage, notes);
+  const Ray center = view.ray(0.5 * (view.columns - 1), 0.5 * (view.rows - 1));
+  std::string text =
+      line("source, IEC fixed", fmt::format("({:.2f}) mm", fmt::join(view.source_room_mm, ", "))) +
+      line("panel center, IEC fixed", fmt::format("({:.2f}) mm", fmt::join(center.pixel_room_mm, ", "))) +
+      line("isocenter at pixel", fmt::format("({:.2f}) column, row; counted from 0",
+                                             fmt::join(view.project(Eigen::Vector3d::Zero()).value(), ", ")));
+  for (const std::string& warning : notes.warnings) text += line("note", warning);
+  return text;
+}
+
+std::string describe_rt_image(RtImage image, const std::optional<std::string>& planned_position,
+                              const std::optional<MachineProfile>& machine) {
+  Notes applied;
+  if (machine) image = with_machine(image, *machine, {}, applied);
+  if (!image.patient_position) image.patient_position = planned_position;
+  std::string text =
+      fmt::format("{} \"{}\", {}\n", image.is_rt_image() ? "RT Image" : "X-ray", image.label, image.path.string());
+  text += line("image type", image.image_type) + line("pixels", fmt::format("{} x {}", image.columns, image.rows)) +
+          line("values origin", or_missing(image.reported_values_origin)) +
+          line("SAD, SID", or_missing(image.sad_mm, "mm") + ", " + or_missing(image.sid_mm, "mm")) +
+          line("gantry angle", or_missing(image.gantry_angle_deg, "deg")) +
+          line("couch angle", or_missing(image.table.support_angle_deg, "deg")) +
+          line("receptor translation", or_missing(image.receptor_translation_mm, "mm")) +
+          line("receptor angle", or_missing(image.receptor_angle_deg, "deg")) +
+          line("pixel spacing", or_missing(image.pixel_spacing_mm, "mm, rows then columns")) +
+          line("RT Image Position", or_missing(image.position_mm, "mm")) +
+          line("patient position", or_missing(image.patient_position)) +
+          line("intensity",
+               or_missing(image.intensity_relationship) + ", sign " +
+                   (image.intensity_sign ? fmt::format("{:+}", *image.intensity_sign) : std::string("missing"))) +
+          line("KVP", or_missing(image.kvp, "kV")) +
+          line("frame of reference", or_missing(image.frame_of_reference_uid)) +
+          line("isocenter in that frame", or_missing(image.isocenter_mm, "mm")) +
+          line("acquired", or_missing(image.acquisition_date) + " " + or_missing(image.acquisition_time));
+  for (const std::string& override_ : applied.overrides) text += line("profile", override_);
+  const auto missing = missing_attributes(image);
+  for (const MissingAttribute& attribute : missing)
+    text += line("MISSING", fmt::format("{}; {}", described(attribute.tag),
+                                        attribute.supplied_by.empty() ? "no switch supplies it"
+                                                                      : "supplied by " + attribute.supplied_by));
+  // What stands in the way is told, not thrown: inspecting is for files that registration refuses, too.
+  try {
+    for (const Finding& finding : rt_image_findings(image))
+      text += line("CHECK", fmt::format("{}; allowed by --allow {}=REASON", finding.message, finding.key));
+    const bool has_geometry = image.pixel_from_room || (image.plane && image.pixel_spacing_mm && image.position_mm &&
+                                                        image.sad_mm && image.sid_mm && image.gantry_angle_deg);
+    if (has_geometry) text += geometry_as_understood(image);
+  } catch (const Error& error) {
+    text += line("REFUSED", error.what());
+  }
+  return text + "\n";
+}
+
+std::string describe_plan(const std::filesystem::path& path) {
+  const RtPlan plan = read_rt_plan(path);
+  std::string text = fmt::format("RT Plan \"{}\", {}\n", plan.label, path.string()) +
+                     line("approval", plan.approval_status.empty() ? "missing" : plan.approval_status) +
+                     line("frame of reference", or_missing(plan.frame_of_reference_uid));
+  for (const RtPlan::Beam& beam : plan.beams)
+    text += line(fmt::format("beam {} \"{}\"", beam.number, beam.name),
+                 fmt::format("isocenter {}, {}, couch {}", or_missing(beam.isocenter_patient_mm, "mm"),
+                             or_missing(beam.patient_position), or_missing(beam.support_angle_deg, "deg")));
+  return text + "\n";
+}
+
+std::string describe_structures(const std::filesystem::path& path) {
+  try {
+    const RtStructures read = read_rt_structures(path);
+    std::string text = fmt::format("RT Structure Set \"{}\", {}\n", read.label, path.string());
+    for (const Structure& structure : read.structures)
+      text += line(fmt::format("structure {} \"{}\"", structure.number, structure.name),
+                   fmt::format("{}, {} closed contours{}",
+                               structure.interpreted_type.empty() ? "type missing" : structure.interpreted_type,
+                               structure.contours.size(),
+                               structure.ignored_contours == 0
+                                   ? ""
+                                   : fmt::format(", {} that {} nothing", structure.ignored_contours,
+                                                 structure.ignored_contours == 1 ? "encloses" : "enclose")));
+    return text + "\n";
+  } catch (const Error& error) {
+    return fmt::format("RT Structure Set, {}\n", path.string()) + line("REFUSED", error.what()) + "\n";
+  }
+}
+
+std::string describe_ct(const std::string& series_uid, const std::vector<std::filesystem::path>& files,
+                        Console& console) {
+  std::string text = fmt::format("CT series {}\n", series_uid) +
+                     line("slices", fmt::format("{}, from {}", files.size(), files.front().parent_path().string()));
+  Notes notes;
+  try {
+    ProgressBar bar(console, "Reading CT");
+    const CtSeries ct = read_ct_series(files, {{"gaps", "inspection"}}, notes,
+                                       [&](std::size_t done, std::size_t total) { bar.update(done, total); });
+    const Eigen::Vector3d first = ct.hu.patient_from_voxel.translation();
+    const Eigen::Vector3d last = ct.hu.patient_from_voxel * Eigen::Vector3d((ct.hu.size.array() - 1).cast<double>());
+    text += line("voxels", fmt::format("{}, spacing ({:.4g}) mm", fmt::join(ct.hu.size, " x "),
+                                       fmt::join(ct.hu.spacing_mm(), ", "))) +
+            line("first voxel, patient", fmt::format("({:.2f}) mm", fmt::join(first, ", "))) +
+            line("last voxel, patient", fmt::format("({:.2f}) mm", fmt::join(last, ", "))) +
+            line("frame of reference", ct.frame_of_reference_uid);
+  } catch (const Error& error) {
+    text += line("REFUSED", error.what());
+  }
+  for (const std::string& note : notes.overrides) text += line("CHECK", note);
+  for (const std::string& note : notes.warnings) text += line("note", note);
+  return text + "\n";
+}
+
+void run_inspect(const std::vector<std::filesystem::path>& paths, const std::optional<MachineProfile>& machine,
+                 Console& console) {
+  const StudyFiles files = scan_study(paths);
+  std::optional<std::string> planned_position;
+  for (const StudyFiles::Plan& found : files.plans) {
+    console.out << describe_plan(found.file);
+    const RtPlan plan = read_rt_plan(found.file);
+    planned_position = common_patient_position(plan, plan.beams);
+  }
+  for (const StudyFiles::Ct& ct : files.cts) console.out << describe_ct(ct.series_instance_uid, ct.files, console);
+  for (const auto& images : {files.images, files.other_xrays})
+    for (const StudyFiles::Image& file : images) {
+      Notes notes;
+      for (const RtImage& image : read_rt_images(file.file, notes))
+        console.out << describe_rt_image(image, planned_position, machine);
+      for (const std::string& warning : notes.warnings) console.out << "note: " << warning << "\n";
+    }
+  for (const auto& structures : files.structures) console.out << describe_structures(structures.file);
+  for (const std::string& file : files.left_aside) console.out << "left aside: " << file << "\n";
+  for (const std::string& reason : files.unreadable) console.out << "unreadable: " << reason << "\n";
+  if (!files.unreadable.empty())
+    throw Error(fmt::format("{} of the files cannot be read; see above", files.unreadable.size()));
+  if (files.cts.empty() && files.images.empty() && files.other_xrays.empty() && files.plans.empty() &&
+      files.structures.empty())
+    throw Error(fmt::format("{}: nothing that isoshift reads", paths.front().string()));
+}
+
+}  // namespace
+
+void add_inspect_command(CLI::App& app, Console& console, int&) {
+  struct Options {
+    std::vector<std::filesystem::path> paths;
+    std::filesystem::path machine;
+    bool devices = false;
+  };
+  auto options = std::make_shared<Options>();
+  CLI::App* command =
+      app.add_subcommand("inspect", "Say what files hold, their geometry as understood, and all that is missing");
+  command->footer(
+      "\nExample:\n  isoshift inspect exported/\n  isoshift inspect RTIMAGE/KV_AP.dcm\n  isoshift inspect --devices");
+  auto* paths = command->add_option("path", options->paths, "Files or folders")->type_name("PATH");
+  command->add_option("--machine", options->machine, "Machine profile: what becomes of the X-rays with it")
+      ->type_name("FILE");
+  auto* devices = command->add_flag("--devices", options->devices, "Say what there is to render on");
+  command->require_option(1, 0);
+  paths->excludes(devices);
+  command->callback([options, &console] {
+    if (!options->devices)
+      return run_inspect(
+          options->paths,
+          options->machine.empty() ? std::nullopt : std::optional(read_machine_profile(options->machine)), console);
+    for (const std::string& line : describe_gl_devices()) console.out << "OpenGL, " << line << "\n";
+    console.out << fmt::format("--renderer auto is {}\n", has_hardware_gl() ? "raycast" : "cpu");
+  });
+}
+
+}  // namespace isoshift

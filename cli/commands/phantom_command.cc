@@ -1,0 +1,126 @@
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "base/error.h"
+#include "base/output_folder.h"
+#include "cli/commands/commands.h"
+#include "io/study/motion_trace.h"
+#include "phantom/study_writer.h"
+
+namespace isoshift {
+namespace {
+
+struct PhantomCommandOptions {
+  PhantomOptions phantom;
+  std::filesystem::path output;
+  std::string anatomy = "head";
+  std::filesystem::path trace;
+  std::vector<double> translation_mm = {4.3, -6.1, 3.2};
+  std::vector<double> rotation_deg = {1.4, -2.1, 1.8};
+  bool overwrite = false;
+};
+
+void run_phantom(PhantomCommandOptions options, Console& console) {
+  PhantomOptions& phantom = options.phantom;
+  using enum PhantomOptions::Anatomy;
+  phantom.anatomy = options.anatomy == "head" ? kHead : options.anatomy == "spine" ? kSpine : kThorax;
+  Notes notes;
+  if (!options.trace.empty()) phantom.breathing.trace = read_motion_trace(options.trace, notes);
+  print_warnings(notes.warnings, console);
+  phantom.placement.isocenter_patient_mm = Eigen::Vector3d(-12.5, 38.0, -410.0);
+  phantom.placement.translation_mm = Eigen::Vector3d(options.translation_mm.data());
+  phantom.placement.rotation_deg = Eigen::Vector3d(options.rotation_deg.data());
+  phantom.check();
+  OutputFolder output(options.output, options.overwrite);
+  {
+    ProgressBar bar(console, "Writing phantom");
+    write_phantom_study(phantom, output.path(), [&](std::size_t done, std::size_t total) { bar.update(done, total); });
+  }
+  output.commit();
+  console.out << fmt::format(
+      "{}: {} phantom study, seed {}; off plan by ({:.2f}) mm and ({:.2f}) degrees about x, y, z\n",
+      options.output.string(), options.anatomy, phantom.seed, fmt::join(options.translation_mm, ", "),
+      fmt::join(options.rotation_deg, ", "));
+}
+
+}  // namespace
+
+void add_phantom_command(CLI::App& app, Console& console, int&) {
+  auto options = std::make_shared<PhantomCommandOptions>();
+  CLI::App* command = app.add_subcommand("phantom", "Make a digital phantom study whose setup error is known");
+  command->footer(
+      "\nExample:\n  isoshift phantom -o study --translation 5,0,-3 --rotation 1,0,2\n"
+      "  isoshift register study -o result --truth study/truth.json\n"
+      "  isoshift phantom -o breathing --anatomy thorax --breathing 30 --image-pixels 256 --voxel-mm 2 --translation "
+      "0,0,0 --rotation 0,0,0");
+  command->add_option("-o,--output", options->output, "Folder to make")->required()->type_name("FOLDER");
+  command->add_option("--anatomy", options->anatomy, "What the body is")
+      ->check(CLI::IsMember({"head", "spine", "thorax"}))
+      ->capture_default_str();
+  command->add_option("--translation", options->translation_mm, "Setup error, mm, IEC 61217 fixed")
+      ->delimiter(',')
+      ->expected(3)
+      ->type_name("X,Y,Z")
+      ->capture_default_str();
+  command->add_option("--rotation", options->rotation_deg, "Setup error about x, y, z in degrees, R = Rz Rx Ry")
+      ->delimiter(',')
+      ->expected(3)
+      ->type_name("RX,RY,RZ")
+      ->capture_default_str();
+  command->add_option("--patient-position", options->phantom.placement.patient_position, "How the patient lies")
+      ->check(CLI::IsMember({"HFS", "HFP", "FFS", "FFP", "HFDR", "HFDL", "FFDR", "FFDL"}))
+      ->capture_default_str();
+  command->add_option("--couch-angle", options->phantom.placement.couch_angle_deg, "Patient support angle, IEC 61217")
+      ->type_name("DEG")
+      ->capture_default_str();
+  command->add_option("--gantry-angles", options->phantom.gantry_angles_deg, "One X-ray is taken at each")
+      ->delimiter(',')
+      ->type_name("DEG,...")
+      ->capture_default_str();
+  command
+      ->add_option("--receptor-angle", options->phantom.receptor_angle_deg,
+                   "X-Ray Image Receptor Angle: the panel's turn about the central ray, IEC 61217")
+      ->type_name("DEG")
+      ->capture_default_str();
+  command->add_option("--ct-tilt", options->phantom.ct_tilt_deg, "Tilt of the CT's slices about the patient's x axis")
+      ->type_name("DEG")
+      ->capture_default_str();
+  command
+      ->add_option("--voxel-mm", options->phantom.voxel_mm, "Pixel size of the CT; its slices are 1.5 times as thick")
+      ->type_name("MM")
+      ->capture_default_str();
+  command->add_option("--image-pixels", options->phantom.image_pixels, "Pixels along each edge of an X-ray")
+      ->capture_default_str();
+  command->add_option("--photons", options->phantom.photons, "Photons per open pixel; 0 for no noise")
+      ->capture_default_str();
+  command
+      ->add_option("--mv-angles", options->phantom.megavoltage_angles_deg,
+                   "Of the gantry angles, those taken with 6 MV")
+      ->delimiter(',')
+      ->type_name("DEG,...");
+  command
+      ->add_option("--breathing", options->phantom.breathing.seconds,
+                   "A thorax breathes for so long: X-rays at every moment, 4D CT, truth.csv")
+      ->type_name("S");
+  command->add_option("--rate", options->phantom.breathing.rate_hz, "Moments per second")
+      ->type_name("HZ")
+      ->capture_default_str();
+  command->add_option("--phases", options->phantom.breathing.phases, "Phases of the 4D CT")
+      ->check(CLI::Range(0, 20))
+      ->capture_default_str();
+  command
+      ->add_option(
+          "--trace", options->trace,
+          "Recorded motion for the target (t_s or Timestamp; x, y, z in patient axes, mm), from its first position")
+      ->type_name("CSV");
+  command
+      ->add_option("--fractions", options->phantom.fractions,
+                   "Days of treatment, each with X-rays and a random setup error of its own")
+      ->type_name("N")
+      ->capture_default_str();
+  command->add_option("--seed", options->phantom.seed, "Of anatomy, noise and UIDs")->capture_default_str();
+  command->add_flag("--overwrite", options->overwrite, "Replace an earlier study in that folder");
+  command->callback([options, &console] { run_phantom(*options, console); });
+}
+
+}  // namespace isoshift

@@ -1,0 +1,98 @@
+#include "cli/commands/register_command.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <chrono>
+#include <memory>
+
+#include "base/error.h"
+#include "base/output_folder.h"
+#include "cli/commands/commands.h"
+#include "cli/switches/registration_switches.h"
+#include "cli/switches/study_switches.h"
+#include "io/objects/spatial_registration.h"
+#include "io/report/formats.h"
+#include "io/report/result_folder.h"
+#include "setup/couch_shift.h"
+#include "workflow/register/setup_report_of.h"
+#include "workflow/register/truth.h"
+
+namespace isoshift {
+
+int exit_status_of(Verdict verdict) {
+  switch (verdict) {
+    case Verdict::kAccepted: return kExitAccepted;
+    case Verdict::kReview: return kExitReview;
+    case Verdict::kRejected: return kExitRejected;
+  }
+  return kExitFailed;
+}
+
+namespace {
+
+int run_register(RegisterOptions options, const std::filesystem::path& truth_file, bool as_json, Console& console) {
+  options.registration.settle();
+  std::optional<Eigen::Isometry3d> truth;
+  if (!truth_file.empty()) truth = read_setup_error(truth_file);
+  SharedWork none;
+  ConsoleObserver observer(console);
+  const SetupReport report = register_study(options, none, observer);
+  print_warnings(report.warnings, console);
+  console.out << (as_json ? json_report(report) : text_report(report_page(report)));
+  if (!as_json) {
+    if (truth) console.out << "\n" << compared_with_truth(report.setup_error, *truth);
+    console.out << fmt::format("\nWritten to {}\n",
+                               std::filesystem::absolute(options.output).lexically_normal().string());
+  }
+  return exit_status_of(report.verdict);
+}
+
+}  // namespace
+
+void add_result_options(CLI::App& command, RegisterOptions& options) {
+  command
+      .add_option("--site", options.site,
+                  "Site file: action levels, the couch's degrees of freedom and scale (docs/site-file.md)")
+      ->type_name("FILE");
+  command.add_option("--anatomy", options.anatomy, "Whose action level of the site file applies")->type_name("NAME");
+  command.add_flag("--write-reg-for-review", options.write_reg_for_review,
+                   "Write the registration object for a result that needs review, too, marked as not accepted");
+  command.add_flag("--accept-unobservable", options.accept_unobservable,
+                   "Write it with no setup error along directions that the views cannot measure, too");
+  command
+      .add_option_function<std::string>(
+          "--source-for",
+          [&options](const std::string& name) {
+            options.source = name == "treatment" ? RegistrationSource::kTreatment : RegistrationSource::kIecFixed;
+          },
+          "Axes that the registration object takes to the CT: the patient's as planned, or the room's")
+      ->check(CLI::IsMember({"treatment", "iec-fixed"}))
+      ->default_str("treatment");
+}
+
+void add_register_command(CLI::App& app, Console& console, int& exit_status) {
+  auto options = std::make_shared<RegisterOptions>();
+  CLI::App* command = app.add_subcommand("register", "Find the setup shift of an exported study");
+  command->footer(
+      "\nExample:\n  isoshift register exported/ -o result\n"
+      "  isoshift register images/ --ct planning_ct/ --plan RTPLAN.dcm -o result --couch-angle 0\n\n"
+      "Writes the report (report.pdf, .html, .txt, .csv, and .dcm: Encapsulated PDF), result.json, pictures per view\n"
+      "and, for an accepted result, spatial_registration.dcm.\n"
+      "Exit status: 0 accepted, 1 failed, 2 usage, 3 review, 4 rejected.");
+  auto truth = std::make_shared<std::filesystem::path>();
+  auto as_json = std::make_shared<bool>(false);
+  add_study_options(*command, options->study);
+  command->add_option("-o,--output", options->output, "Folder for the results")->required()->type_name("FOLDER");
+  command->add_option("--truth", *truth, "truth.json of a phantom study: print the result beside it")
+      ->type_name("FILE");
+  add_result_options(*command, *options);
+  command->add_flag("--overwrite", options->overwrite, "Replace an earlier output in that folder");
+  command->add_flag("--json", *as_json, "Print result.json instead of the report");
+  add_registration_switches(*command, options->registration);
+  command->callback([options, truth, as_json, &console, &exit_status] {
+    exit_status = run_register(*options, *truth, *as_json, console);
+  });
+}
+
+}  // namespace isoshift

@@ -1,0 +1,68 @@
+// isoshift release: sends a result that watch holds, and records who released it.
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <memory>
+
+#include "base/error.h"
+#include "cli/commands/commands.h"
+#include "io/config/watch_file.h"
+#include "workflow/room/deliver.h"
+#include "workflow/room/results_tree.h"
+
+namespace isoshift {
+namespace {
+
+void run_release(const std::filesystem::path& file, const std::string& session, const std::string& by,
+                 Console& console) {
+  if (by.find_first_not_of(' ') == std::string::npos) throw UsageError("--by: expected the name of who releases it");
+  const WatchFile watch = read_watch_file(file);
+  // What another user writes the watch could not read.
+  struct stat of_results {};
+  if (::stat(watch.results.c_str(), &of_results) == 0 && of_results.st_uid != ::geteuid())
+    throw Error(fmt::format("{}: belongs to another user, who runs isoshift watch: release as that one (sudo -u USER)",
+                            watch.results.string()));
+  const ResultsTree tree(watch.results);
+  const Release release = tree.release(session, by, watch.names_of_peers());
+  for (const Release::Object& object : release.objects)
+    console.out << fmt::format("{} goes to {}\n", object.file,
+                               release.peers.empty() ? "nobody: the watch file names no peers"
+                                                     : fmt::format("{}", fmt::join(release.peers, ", ")));
+  if (release.objects.size() == 1) console.out << "the session holds no registration object\n";
+  const auto lock = tree.try_lock();
+  ConsoleObserver observer(console);
+  if (lock) Deliverer(watch).deliver(std::stop_token(), observer);  // nobody else does
+  if (release.peers.empty()) return;
+  if (tree.pending_of(release).empty())
+    console.out << "sent\n";
+  else if (lock)
+    console.out << "not sent yet: isoshift watch, which does not run now, sends it, as often as it takes\n";
+  else
+    console.out << "isoshift watch sends it, as often as it takes\n";
+}
+
+}  // namespace
+
+void add_release_command(CLI::App& app, Console& console, int& exit_status) {
+  struct Options {
+    std::filesystem::path watch = "/etc/isoshift/watch.json";
+    std::string session, by;
+  };
+  auto options = std::make_shared<Options>();
+  CLI::App* command = app.add_subcommand("release", "Send a result of watch to its peers");
+  command->footer(
+      "\nExample:\n  isoshift release 3fa94c1e02b7 --by \"J. Doe\"\n\n"
+      "Records who released what, then sends spatial_registration.dcm, where there is one, and report.dcm.");
+  command->add_option("session", options->session, "As index.html names it")->required()->type_name("SESSION");
+  command->add_option("--by", options->by, "Who has looked at it and releases it")->required()->type_name("NAME");
+  command->add_option("--watch", options->watch, "The watch file")->type_name("FILE")->capture_default_str();
+  command->callback([options, &console, &exit_status] {
+    run_release(options->watch, options->session, options->by, console);
+    exit_status = kExitAccepted;
+  });
+}
+
+}  // namespace isoshift

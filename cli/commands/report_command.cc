@@ -1,0 +1,57 @@
+// isoshift report: all formats of a stored result, made again.
+
+#include <fmt/format.h>
+
+#include <memory>
+
+#include "base/error.h"
+#include "base/output_folder.h"
+#include "cli/commands/commands.h"
+#include "io/report/formats.h"
+#include "io/report/result_folder.h"
+#include "workflow/register/setup_report_of.h"
+
+namespace isoshift {
+namespace {
+
+struct ReportOptions {
+  std::filesystem::path result, output, site;
+  std::string anatomy;
+  bool overwrite = false;
+};
+
+void run_report(const ReportOptions& options, Console& console) {
+  SetupReport report = read_result(options.result);
+  report.site = chosen_site(named_site(options.site), options.anatomy, report.site);
+  OutputFolder output(options.output.empty() ? options.result : options.output, options.overwrite);
+  write_result(report, output.path());
+  if (options.site.empty())  // nothing in it has changed
+    std::filesystem::copy_file(options.result / kResultFile, output.path() / kResultFile,
+                               std::filesystem::copy_options::overwrite_existing);
+  if (const auto registration = options.result / kRegistrationFile; std::filesystem::exists(registration))
+    std::filesystem::copy_file(registration, output.path() / kRegistrationFile);
+  output.commit();
+  console.out << text_report(report_page(report)) << fmt::format("\nWritten to {}\n", output.destination().string());
+}
+
+}  // namespace
+
+void add_report_command(CLI::App& app, Console& console, int&) {
+  auto options = std::make_shared<ReportOptions>();
+  CLI::App* command = app.add_subcommand("report", "Make all formats of a stored result again");
+  command->footer(
+      "\nExample:\n  isoshift report result/ --overwrite\n  isoshift report result/ --site linac3.json -o "
+      "result_linac3\n\n"
+      "Reads result.json and the pictures, and writes what register writes. Nothing is registered again.");
+  command->add_option("result", options->result, "Folder of a result")->required()->type_name("FOLDER");
+  command->add_option("-o,--output", options->output, "Folder for the formats; else that of the result")
+      ->type_name("FOLDER");
+  command->add_option("--site", options->site, "Site file to apply instead of the one applied before")
+      ->type_name("FILE");
+  command->add_option("--anatomy", options->anatomy, "Whose action level of the site file applies; else that of before")
+      ->type_name("NAME");
+  command->add_flag("--overwrite", options->overwrite, "Replace what is there");
+  command->callback([options, &console] { run_report(*options, console); });
+}
+
+}  // namespace isoshift

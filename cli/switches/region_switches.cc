@@ -1,0 +1,33 @@
+#include "cli/switches/region_switches.h"
+
+namespace isoshift {
+
+void add_region_switches(CLI::App& command, RegionOptions& options) {
+  const char* group = "Region of interest";
+  command
+      .add_option("--structure", options.structures,
+                  "Register this structure of the RT Structure Set only (may be given more than once)")
+      ->type_name("NAME")
+      ->group(group);
+  command
+      .add_option("--around-isocenter", options.around_isocenter_mm,
+                  "Register what lies within this distance of the isocenter only")
+      ->type_name("MM")
+      ->group(group);
+  command
+      .add_option("--exclude", options.excluded,
+                  "Leave out a structure that moves on its own, such as the mandible, or the couch")
+      ->type_name("NAME")
+      ->group(group);
+  command
+      .add_option("--rectangle", options.rectangles, "Compare this part of the X-ray with that label only, in pixels")
+      ->type_name("LABEL=C0,R0,C1,R1")
+      ->group(group);
+  command.add_option("--margin", options.margin_mm, "Around every structure, mm")
+      ->type_name("MM")
+      ->check(CLI::Range(0.0, 100.0))
+      ->capture_default_str()
+      ->group(group);
+}
+
+}  // namespace isoshift

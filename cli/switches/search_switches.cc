@@ -1,0 +1,38 @@
+#include "cli/switches/search_switches.h"
+
+#include "registration/presets.h"
+
+namespace isoshift {
+namespace {
+
+template <class Kinds>
+std::vector<std::string> names_of(const Kinds& kinds) {
+  std::vector<std::string> names;
+  for (const auto kind : kinds) names.emplace_back(to_string(kind));
+  return names;
+}
+
+}  // namespace
+
+void add_search_switches(CLI::App& command, SearchRequest& options) {
+  command.add_option("--preset", options.preset, "How to search: docs/presets.md says what is in each")
+      ->check(CLI::IsMember(std::vector<std::string>(kPresets.begin(), kPresets.end())))
+      ->capture_default_str();
+  command.add_option("--similarity", options.similarity, "Of preset paper [src]")
+      ->check(CLI::IsMember(names_of(kSimilarityKinds)));
+  command.add_option("--optimizer", options.optimizer, "Of preset paper [nelder-mead]")
+      ->check(CLI::IsMember(names_of(kOptimizerKinds)));
+  command
+      .add_option("--pixel-fraction", options.pixel_fraction, "Of preset paper: share of the pixels compared [0.05]")
+      ->check(CLI::Range(0.001, 1.0));
+  command.add_option("--dof", options.dof, "Degrees of freedom: six, or the three translations")
+      ->check(CLI::IsMember({"rigid", "translation"}))
+      ->capture_default_str();
+  command.add_flag("--check-vertebrae", options.check_vertebrae,
+                   "Compare with the patient one vertebra further to the head and to the feet");
+  command.add_option("--seed", options.seed, "Draws the pixels compared; the only randomness")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
+}
+
+}  // namespace isoshift

@@ -1,0 +1,76 @@
+#include "cli/switches/study_switches.h"
+
+#include <fmt/format.h>
+
+namespace isoshift {
+namespace {
+
+std::string allow_keys_help() {
+  std::string help = "Allow what a check forbids, with the reason. KEY is one of";
+  for (const AllowKey& key : kAllowKeys) help += fmt::format("\n{}: {}", key.key, key.meaning);
+  return help;
+}
+
+}  // namespace
+
+void add_study_options(CLI::App& command, StudyOptions& options) {
+  command.add_option("study", options.study, "Folder of the exported study; its parts are found by what they are")
+      ->type_name("FOLDER");
+  const char* parts = "Parts of the study";
+  command.add_option("--ct", options.ct, "Folder or files of the planning CT")->type_name("PATH")->group(parts);
+  command
+      .add_option("--image", options.images,
+                  "RT Images (X-rays), files or folders; with --machine X-rays of other classes, too")
+      ->type_name("PATH")
+      ->group(parts);
+  command.add_option("--plan", options.plan, "RT Plan")->type_name("FILE")->group(parts);
+  command
+      .add_option("--structures", options.structures,
+                  "RT Structure Set; else the one that the plan refers to, else the only one drawn on the CT")
+      ->type_name("FILE")
+      ->group(parts);
+  add_study_switches(command, options);
+}
+
+void add_study_switches(CLI::App& command, StudyOptions& options) {
+  const char* lacking = "What the files lack (never guessed; each use is written into the result)";
+  command.add_option("--isocenter", options.isocenter, "Planned isocenter in patient coordinates of the CT, mm")
+      ->delimiter(',')
+      ->expected(3)
+      ->type_name("X,Y,Z")
+      ->group(lacking);
+  command.add_option("--patient-position", options.patient_position, "How the patient lies on the table")
+      ->check(CLI::IsMember({"HFS", "HFP", "FFS", "FFP", "HFDR", "HFDL", "FFDR", "FFDL"}))
+      ->group(lacking);
+  command.add_option("--couch-angle", options.couch_angle_deg, "Patient support angle at imaging, IEC 61217")
+      ->type_name("DEG")
+      ->group(lacking);
+  command.add_option("--gantry-angle", options.gantry_angles, "Gantry angle of the image with this label, IEC 61217")
+      ->type_name("LABEL=DEG")
+      ->group(lacking);
+  command.add_option("--sad", options.sad_mm, "Source to axis distance")->type_name("MM")->group(lacking);
+  command.add_option("--sid", options.sid_mm, "Source to image plane distance")->type_name("MM")->group(lacking);
+  command.add_option("--rt-image-position", options.rt_image_position, "Center of the first pixel on the receptor, mm")
+      ->delimiter(',')
+      ->expected(2)
+      ->type_name("X,Y")
+      ->group(lacking);
+  command.add_flag("--assume-centered", options.assume_centered, "Images without RT Image Position are centered")
+      ->group(lacking);
+  command
+      .add_option("--intensity", options.intensity,
+                  "Pixel intensity relationship, and its sign for stored values: + higher stored value, more X-ray")
+      ->check(CLI::IsMember({"LIN+", "LIN-", "LOG+", "LOG-"}))
+      ->group(lacking);
+  command.add_option("--beam", options.beam, "Beam quality of all images")
+      ->check(CLI::IsMember({"kv", "mv"}))
+      ->group(lacking);
+  command
+      .add_option("--machine", options.machine,
+                  "Machine profile: what a machine's files lack or say wrongly (docs/machine-profile.md)")
+      ->type_name("FILE")
+      ->group(lacking);
+  command.add_option("--allow", options.allow, allow_keys_help())->type_name("KEY=REASON")->group(lacking);
+}
+
+}  // namespace isoshift

@@ -1,0 +1,39 @@
+#pragma once
+// What a site knows about a machine and its files do not say, or say wrongly: a JSON file (docs/machine-profile.md).
+
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "io/dicom/rt_image.h"
+
+namespace isoshift {
+
+struct MachineProfile {
+  // For the images whose attributes are these.
+  struct Rule {
+    std::map<std::string, std::string, std::less<>> where;  // keyword of kEquipmentAttributes to value; all must match
+    double gantry_angle_offset_deg = 0.0;                   // source angle = GantryAngle + this
+    bool spacing_at_axis = false;  // spacing and position count in the plane of the axis, not of the receptor
+    Eigen::Vector2d receptor_offset_mm = Eigen::Vector2d::Zero();  // added to the receptor translation, x and y
+    RtImageSwitches switches;
+    std::optional<Eigen::Matrix<double, 3, 4>> pixel_from_room;  // for images of this size
+    int columns = 0, rows = 0;
+  };
+
+  std::filesystem::path path;
+  std::string name;
+  std::string sha256;  // of the file, hexadecimal
+  std::vector<Rule> rules;
+};
+
+// Throws Error naming the file, the place in it and what is expected there.
+MachineProfile read_machine_profile(const std::filesystem::path& path);
+
+// The image with the first rule that fits it applied, each change noted as an override. What the command line will
+// replace afterwards counts already where a rule needs SAD and SID. Throws Error if no rule fits.
+RtImage with_machine(RtImage image, const MachineProfile& profile, const RtImageSwitches& command_line, Notes& notes);
+
+}  // namespace isoshift

@@ -1,0 +1,61 @@
+#pragma once
+// What a site decided about its results: a JSON file (docs/site-file.md).
+
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "setup/couch_scale.h"
+#include "setup/couch_shift.h"
+
+namespace isoshift {
+
+constexpr double kMaxTimeSpanS = 600.0;        // between the views of one session
+constexpr double kDefaultUntoldSpanS = 120.0;  // between those without table read-outs, where no site file says other
+
+enum class LengthUnit { kMm, kCm };
+
+// From which a person must act. At least one is set.
+struct ActionLevel {
+  std::optional<double> translation_mm;  // along any axis
+  std::optional<double> vector_mm;       // length of the translation
+  std::optional<double> rotation_deg;    // about any axis
+};
+
+struct SiteFile {
+  struct Scale {
+    CouchScale scale = CouchScale::kIec61217;
+    std::string validated_by, validated_on;  // the day as YYYY-MM-DD
+  };
+  struct Release {
+    std::string by, on;
+  };
+
+  // When a session of X-rays is complete.
+  struct Sessions {
+    int views = 2;                            // so many X-rays are there,
+    double quiet_s = 0.0;                     // and nothing of the patient has come for so long
+    double max_span_s = kDefaultUntoldSpanS;  // between X-rays without table read-outs, or the result needs a review
+  };
+
+  std::filesystem::path path;
+  std::string name;
+  std::string sha256;                                             // of the file, hexadecimal
+  std::map<std::string, ActionLevel, std::less<>> action_levels;  // by anatomy; "default" where none is named
+  CouchDof couch_dof = CouchDof::kSix;
+  std::optional<Scale> couch_scale;  // shown beside IEC 61217
+  LengthUnit length_unit = LengthUnit::kMm;
+  std::optional<Sessions> sessions;
+  std::optional<Release> automatic_release;  // who allowed it, and when; unset: a person releases every result
+};
+
+// Throws Error naming the file, the place in it and what is expected there.
+SiteFile read_site_file(const std::filesystem::path& path);
+
+// The level for an anatomy; without one, for "default", and nothing where the site has none of that name. Throws
+// UsageError, with the names there are, for an anatomy the site does not know.
+std::optional<ActionLevel> action_level(const SiteFile& site, std::string_view anatomy);
+
+}  // namespace isoshift

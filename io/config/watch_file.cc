@@ -1,0 +1,133 @@
+#include "io/config/watch_file.h"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <fstream>
+
+#include "base/error.h"
+#include "base/json_file.h"
+
+namespace isoshift {
+namespace {
+
+namespace fs = std::filesystem;
+
+class Reader {
+ public:
+  explicit Reader(fs::path folder) : folder_(std::move(folder)) {}
+
+  std::string text(JsonSection& section, const char* key, const char* expected) const {
+    std::string text = section.required<std::string>(key, expected);
+    if (text.find_first_not_of(' ') == std::string::npos) section.refuse(key, expected);
+    return text;
+  }
+
+  fs::path place(JsonSection& section, const char* key, const char* expected) const {
+    return (folder_ / text(section, key, expected)).lexically_normal();
+  }
+
+  // A file that is there.
+  fs::path file(JsonSection& section, const char* key) const {
+    fs::path path = place(section, key, "the name of a file");
+    if (::access(path.c_str(), R_OK) != 0)
+      throw Error(fmt::format("{}: {}: {} cannot be read", section.where(), key, path.string()));
+    return path;
+  }
+
+  OrthancServer orthanc(JsonSection section) const {
+    constexpr const char* kUrl = "http://HOST:PORT or https://HOST:PORT";
+    OrthancServer server{.url = text(section, "url", kUrl)};
+    if (!server.url.starts_with("http://") && !server.url.starts_with("https://")) section.refuse("url", kUrl);
+    while (server.url.ends_with('/')) server.url.pop_back();
+    if (const auto user = section.find<std::string>("user", "a name")) {
+      server.user = *user;
+      std::ifstream password(file(section, "password_file"));
+      std::getline(password, server.password);
+    }
+    if (section.find<std::string>("ca", "the name of a file")) server.ca = file(section, "ca");
+    section.end();
+    return server;
+  }
+
+  DicomPeer peer(JsonSection section) const {
+    constexpr const char* kPort = "1 to 65535";
+    DicomPeer peer{.name = text(section, "name", "a name"), .host = text(section, "host", "a host")};
+    const auto is_allowed = [](unsigned char c) { return std::isalnum(c) != 0 || c == '_' || c == '-'; };
+    if (!std::ranges::all_of(peer.name, is_allowed)) section.refuse("name", "letters, digits, \"_\" and \"-\"");
+    const int port = section.required<int>("port", kPort);
+    if (port < 1 || port > 65535) section.refuse("port", kPort);
+    peer.port = static_cast<std::uint16_t>(port);
+    peer.called_aet = aet(section, "called_aet");
+    peer.calling_aet = aet(section, "calling_aet");
+    constexpr const char* kTls = "{\"ca\": FILE, \"certificate\": FILE, \"key\": FILE}, or false for none";
+    const auto tls = section.required<nlohmann::json>("tls", kTls);
+    if (tls.is_object()) {
+      JsonSection files(tls, section.where() + ": tls");
+      peer.tls = {.ca = file(files, "ca"), .certificate = file(files, "certificate"), .key = file(files, "key")};
+      files.end();
+    } else if (tls != false) {
+      section.refuse("tls", kTls);
+    }
+    section.end();
+    return peer;
+  }
+
+ private:
+  std::string aet(JsonSection& section, const char* key) const {
+    constexpr const char* kExpected = "an application entity title of at most 16 characters";
+    std::string title = text(section, key, kExpected);
+    if (title.size() > 16) section.refuse(key, kExpected);
+    return title;
+  }
+
+  fs::path folder_;
+};
+
+}  // namespace
+
+WatchFile read_watch_file(const fs::path& path) {
+  const JsonFile json = read_json_file(path);
+  JsonSection section(json.json, path.string());
+  const Reader read(fs::absolute(path).parent_path());
+  constexpr const char* kVersion = "1, the version of its format";
+  if (section.required<int>("watch_file", kVersion) != 1) section.refuse("watch_file", kVersion);
+  WatchFile watch{.path = path};
+  if (auto orthanc = section.section("orthanc")) watch.orthanc = read.orthanc(std::move(*orthanc));
+  if (section.find<std::string>("folder", "the name of a folder")) {
+    if (watch.orthanc) throw Error(fmt::format("{}: folder and orthanc: expected one of them", path.string()));
+    watch.folder = read.place(section, "folder", "the name of a folder");
+    if (!fs::is_directory(watch.folder))
+      throw Error(fmt::format("{}: folder: {} is no folder", path.string(), watch.folder.string()));
+  } else if (!watch.orthanc) {
+    section.refuse_missing("folder", "the folder to follow, or orthanc: the server");
+  }
+  watch.results = read.place(section, "results", "the name of a folder");
+  watch.site = read_site_file(read.file(section, "site"));
+  if (!watch.site.sessions)
+    throw Error(
+        fmt::format("{}: sessions: is missing, expected {{\"views\": 2, \"quiet_s\": 10}}: when the X-rays of a "
+                    "session are complete",
+                    watch.site.path.string()));
+  watch.registration = section.find<std::vector<std::string>>("register", "a list of flags of isoshift register")
+                           .value_or(std::vector<std::string>());
+  using List = std::vector<nlohmann::json>;
+  const List peers = section.find<List>("peers", "a list of peers").value_or(List());
+  for (std::size_t n = 0; n < peers.size(); ++n) {
+    DicomPeer peer = read.peer(JsonSection(peers[n], fmt::format("{}: peer {}", path.string(), n + 1)));
+    if (std::ranges::find(watch.peers, peer.name, &DicomPeer::name) != watch.peers.end())
+      throw Error(fmt::format("{}: peer {}: the name {} is there twice", path.string(), n + 1, peer.name));
+    watch.peers.push_back(std::move(peer));
+  }
+  section.end();
+  return watch;
+}
+
+std::vector<std::string> WatchFile::names_of_peers() const {
+  std::vector<std::string> names;
+  for (const DicomPeer& peer : peers) names.push_back(peer.name);
+  return names;
+}
+
+}  // namespace isoshift

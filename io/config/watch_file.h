@@ -1,0 +1,47 @@
+#pragma once
+// What isoshift watch follows, where it puts results and to whom released ones go: a JSON file
+// (docs/commands/watch.md).
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "io/config/site_file.h"
+
+namespace isoshift {
+
+// Who receives released results by C-STORE.
+struct DicomPeer {
+  struct Tls {
+    std::filesystem::path ca, certificate, key;  // PEM; the key without passphrase
+  };
+  std::string name, host;
+  std::uint16_t port = 104;
+  std::string called_aet, calling_aet;
+  std::optional<Tls> tls;  // unset only where the file says so
+};
+
+struct OrthancServer {
+  std::string url;  // "https://localhost:8042"
+  std::string user, password;
+  std::filesystem::path ca;  // of its certificate; empty: the system's
+};
+
+struct WatchFile {
+  std::filesystem::path path;
+  std::filesystem::path folder;          // that is followed, or
+  std::optional<OrthancServer> orthanc;  // the server
+  std::filesystem::path results;
+  SiteFile site;                          // with its rule for sessions
+  std::vector<std::string> registration;  // flags of isoshift register
+  std::vector<DicomPeer> peers;
+
+  std::vector<std::string> names_of_peers() const;
+};
+
+// Paths are relative to the file's folder. Throws Error naming the file, the place in it and what is expected there.
+WatchFile read_watch_file(const std::filesystem::path& path);
+
+}  // namespace isoshift

@@ -1,0 +1,197 @@
+#include "io/dicom/decode.h"
+
+#include <dcmtk/dcmdata/dccodec.h>
+#include <dcmtk/dcmdata/dcpixseq.h>
+#include <dcmtk/dcmdata/dcpxitem.h>
+#include <dcmtk/dcmdata/dcrledrg.h>
+#include <dcmtk/dcmdata/dctk.h>
+#include <dcmtk/dcmjpeg/djdecode.h>
+#include <dcmtk/dcmjpls/djdecode.h>
+#include <fmt/format.h>
+
+#include <cstring>
+#include <optional>
+#include <span>
+#include <utility>
+
+#include "base/error.h"
+#include "io/dicom/decoder_process.h"
+
+namespace isoshift {
+namespace {
+
+constexpr int kMaxEdge = 8192;
+constexpr int kMaxFrames = 20000;
+
+// DCMTK keeps its decoders in a global list: registered once, before any thread decodes, and removed at exit.
+void register_decoders() {
+  struct Decoders {
+    Decoders() {
+      DcmRLEDecoderRegistration::registerCodecs();
+      DJDecoderRegistration::registerCodecs();
+      DJLSDecoderRegistration::registerCodecs();
+    }
+    ~Decoders() {
+      DJLSDecoderRegistration::cleanup();
+      DJDecoderRegistration::cleanup();
+      DcmRLEDecoderRegistration::cleanup();
+    }
+  };
+  static const Decoders decoders;
+}
+
+int whole_number(const DicomItem& dataset, const DcmTagKey& tag, int max) {
+  const double value = dataset.required_number(tag);
+  if (!(value >= 1 && value <= max))
+    throw Error(fmt::format("{}: {} is {}, expected 1 to {}", dataset.where(), described(tag), value, max));
+  return static_cast<int>(value);
+}
+
+void expect(const DicomItem& dataset, const DcmTagKey& tag, double expected) {
+  const double found = dataset.required_number(tag);
+  if (found != expected)
+    throw Error(fmt::format("{}: {} is {}, expected {}", dataset.where(), described(tag), found, expected));
+}
+
+// The bytes of a frame that lies in the file as it is. 16-bit pixels come as words; 8-bit pixels as bytes or, in
+// implicit VR, as words of two.
+std::span<const std::uint8_t> native_frame(DcmItem& dataset, const PixelFormat& format, int frame,
+                                           const std::string& where) {
+  const Uint8* bytes = nullptr;
+  const Uint16* words = nullptr;
+  unsigned long available = 0;
+  if (format.bits_allocated == 8 && dataset.findAndGetUint8Array(DCM_PixelData, bytes, &available).good() &&
+      bytes != nullptr) {
+  } else if (dataset.findAndGetUint16Array(DCM_PixelData, words, &available).good() && words != nullptr) {
+    bytes = reinterpret_cast<const Uint8*>(words);
+    available *= 2;
+  } else {
+    throw Error(fmt::format("{}: {} is missing", where, described(DCM_PixelData)));
+  }
+  const std::size_t pixels = available / static_cast<std::size_t>(format.bits_allocated / 8);
+  if (pixels < format.pixels_per_frame() * static_cast<std::size_t>(format.frames))
+    throw Error(fmt::format("{}: {} holds {} pixels, expected {} x {}{}", where, described(DCM_PixelData), pixels,
+                            format.columns, format.rows,
+                            format.frames > 1 ? fmt::format(" in {} frames", format.frames) : ""));
+  return {bytes + static_cast<std::size_t>(frame) * format.bytes_per_frame(), format.bytes_per_frame()};
+}
+
+// The size that a JPEG stream itself gives, from its frame header (ITU-T T.81, B.2.2): columns and rows; nothing where
+// there is none. DCMTK's decoder takes its word and lets the header's Rows and Columns fall out of step.
+std::optional<std::pair<int, int>> jpeg_size(std::span<const Uint8> stream) {
+  for (std::size_t at = 2; at + 9 <= stream.size() && stream[at] == 0xFF;) {
+    const int marker = stream[at + 1];
+    const bool is_frame_header =
+        (marker >= 0xC0 && marker <= 0xCF && marker != 0xC4 && marker != 0xC8 && marker != 0xCC) || marker == 0xF7;
+    if (is_frame_header) return std::pair(stream[at + 7] << 8 | stream[at + 8], stream[at + 5] << 8 | stream[at + 6]);
+    at += 2 + static_cast<std::size_t>(stream[at + 2] << 8 | stream[at + 3]);
+  }
+  return std::nullopt;
+}
+
+void check_jpeg_size(DcmPixelData& pixels, const DcmDataset& dataset, int frame, const PixelFormat& format,
+                     const std::string& where) {
+  DcmPixelSequence* fragments = nullptr;
+  DcmPixelItem* fragment = nullptr;
+  Uint32 index = 0;
+  Uint8* bytes = nullptr;
+  const E_TransferSyntax syntax = dataset.getOriginalXfer();
+  if (syntax == EXS_RLELossless || pixels.getEncapsulatedRepresentation(syntax, nullptr, fragments).bad() ||
+      DcmCodec::determineStartFragment(static_cast<Uint32>(frame), format.frames, fragments, index).bad() ||
+      fragments->getItem(fragment, index).bad() || fragment->getUint8Array(bytes).bad() || bytes == nullptr)
+    return;  // the decoder will say what is wrong
+  if (const auto size = jpeg_size({bytes, fragment->getLength()});
+      size && *size != std::pair(format.columns, format.rows))
+    throw Error(fmt::format("{}: its compressed pixels are {} x {}, {} and {} say {} x {}", where, size->first,
+                            size->second, described(DCM_Columns), described(DCM_Rows), format.columns, format.rows));
+}
+
+}  // namespace
+
+PixelFormat pixel_format(const DicomItem& dataset) {
+  PixelFormat format;
+  format.columns = whole_number(dataset, DCM_Columns, kMaxEdge);
+  format.rows = whole_number(dataset, DCM_Rows, kMaxEdge);
+  if (dataset.has_value(DCM_NumberOfFrames)) format.frames = whole_number(dataset, DCM_NumberOfFrames, kMaxFrames);
+  expect(dataset, DCM_SamplesPerPixel, 1);
+  const double allocated = dataset.required_number(DCM_BitsAllocated);
+  if (allocated != 8 && allocated != 16)
+    throw Error(
+        fmt::format("{}: {} is {}, expected 8 or 16", dataset.where(), described(DCM_BitsAllocated), allocated));
+  const double stored = dataset.required_number(DCM_BitsStored);
+  if (stored < 8 || stored > allocated)
+    throw Error(
+        fmt::format("{}: {} is {}, expected 8 to {}", dataset.where(), described(DCM_BitsStored), stored, allocated));
+  format.bits_allocated = static_cast<int>(allocated);
+  format.bits_stored = static_cast<int>(stored);
+  expect(dataset, DCM_HighBit, stored - 1);
+  format.is_signed = dataset.required_number(DCM_PixelRepresentation) != 0;
+  return format;
+}
+
+void put_pixel_format(DicomItem dataset, const PixelFormat& format) {
+  dataset.put(DCM_SamplesPerPixel, 1);
+  dataset.put(DCM_PhotometricInterpretation, "MONOCHROME2");
+  dataset.put(DCM_Rows, format.rows);
+  dataset.put(DCM_Columns, format.columns);
+  dataset.put(DCM_BitsAllocated, format.bits_allocated);
+  dataset.put(DCM_BitsStored, format.bits_stored);
+  dataset.put(DCM_HighBit, format.bits_stored - 1);
+  dataset.put(DCM_PixelRepresentation, format.is_signed ? 1 : 0);
+}
+
+std::vector<std::int32_t> decode_frame(const DicomFile& file, const PixelFormat& format, int frame) {
+  auto& dataset = dynamic_cast<DcmDataset&>(file.dataset().dcmtk());
+  std::vector<std::uint8_t> decompressed;
+  std::span<const std::uint8_t> bytes;
+  if (DcmXfer(dataset.getOriginalXfer()).isEncapsulated()) {
+    decompressed = frame_from_decoder(file.path(), frame, format.bytes_per_frame());
+    bytes = decompressed;
+  } else {
+    bytes = native_frame(dataset, format, frame, file.path().string());
+  }
+
+  const auto mask = static_cast<std::uint32_t>((1U << format.bits_stored) - 1);
+  const auto sign = format.is_signed ? std::uint32_t{1} << (format.bits_stored - 1) : 0;
+  std::vector<std::int32_t> stored_values(format.pixels_per_frame());
+  for (std::size_t n = 0; n < stored_values.size(); ++n) {
+    std::uint32_t raw = bytes[n];
+    if (format.bits_allocated == 16) {
+      std::uint16_t word = 0;
+      std::memcpy(&word, bytes.data() + 2 * n, sizeof word);
+      raw = word;
+    }
+    stored_values[n] = static_cast<std::int32_t>((raw & mask) ^ sign) - static_cast<std::int32_t>(sign);
+  }
+  return stored_values;
+}
+
+std::vector<std::uint8_t> decompressed_frame(const DicomFile& file, int frame) {
+  register_decoders();
+  const std::string where = file.path().string();
+  const PixelFormat format = pixel_format(file.dataset());
+  const std::size_t size = format.bytes_per_frame();
+  auto& dataset = dynamic_cast<DcmDataset&>(file.dataset().dcmtk());
+  DcmElement* element = nullptr;
+  if (dataset.findAndGetElement(DCM_PixelData, element).bad() || dynamic_cast<DcmPixelData*>(element) == nullptr)
+    throw Error(fmt::format("{}: {} is missing", where, described(DCM_PixelData)));
+  auto& pixels = dynamic_cast<DcmPixelData&>(*element);
+  check_jpeg_size(pixels, dataset, frame, format, where);
+  Uint32 frame_size = 0;
+  Uint32 fragment = 0;  // found by the decoder
+  OFString color_model;
+  std::vector<std::uint8_t> bytes(size + size % 2);
+  if (pixels.getUncompressedFrameSize(&dataset, frame_size).bad() || frame_size > bytes.size() ||
+      pixels
+          .getUncompressedFrame(&dataset, static_cast<Uint32>(frame), fragment, bytes.data(),
+                                static_cast<Uint32>(bytes.size()), color_model)
+          .bad())
+    throw Error(
+        fmt::format("{}: pixel data in transfer syntax {} cannot be decoded.\n"
+                    "       Convert the file first: gdcmconv --raw IN.dcm OUT.dcm (Debian package libgdcm-tools)",
+                    where, DcmXfer(dataset.getOriginalXfer()).getXferName()));
+  bytes.resize(size);
+  return bytes;
+}
+
+}  // namespace isoshift

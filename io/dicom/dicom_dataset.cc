@@ -1,0 +1,315 @@
+#include "io/dicom/dicom_dataset.h"
+
+#include <dcmtk/dcmdata/dctk.h>
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <cstring>
+#include <fstream>
+#include <random>
+
+#include "base/error.h"
+#include "io/dicom/nesting.h"
+
+namespace isoshift {
+namespace {
+
+void check(const OFCondition& condition, const std::string& where, std::string_view doing) {
+  if (condition.bad()) throw Error(fmt::format("{}: {}: {}", where, doing, condition.text()));
+}
+
+// Once per process, before any thread reads a file.
+void configure_dcmtk() {
+  static const bool configured = [] {
+    // Contours longer than 65534 bytes come as UN (PS3.5 6.2.2); DCMTK's warnings may quote patient data.
+    dcmEnableUnknownVRConversion.set(OFTrue);
+    OFLog::configure(OFLogger::OFF_LOG_LEVEL);
+    return true;
+  }();
+  (void)configured;
+}
+
+std::string_view trimmed(std::string_view text) {
+  constexpr std::string_view kPadding("\0 \t\r\n", 5);
+  const auto begin = text.find_first_not_of(kPadding);
+  if (begin == std::string_view::npos) return {};
+  return text.substr(begin, text.find_last_not_of(kPadding) - begin + 1);
+}
+
+void make_printable(std::string& text) {
+  for (char& c : text)
+    if (static_cast<unsigned char>(c) < 0x20 || c == 0x7F) c = ' ';
+}
+
+bool is_text_vr(DcmEVR vr) { return vr == EVR_DS || vr == EVR_IS; }
+
+}  // namespace
+
+std::string described(const DcmTagKey& key) {
+  DcmTag tag(key);
+  return fmt::format("{} ({:04X},{:04X})", tag.getTagName(), key.getGroup(), key.getElement());
+}
+
+bool DicomItem::has_value(const DcmTagKey& tag) const { return item_->tagExistsWithValue(tag); }
+
+std::vector<std::string> DicomItem::texts(const DcmTagKey& tag) const {
+  DcmElement* element = nullptr;
+  if (!has_value(tag) || item_->findAndGetElement(tag, element).bad()) return {};
+  OFString whole;
+  if (element->getOFStringArray(whole).bad()) throw Error(fmt::format("{}: {} is no text", where_, described(tag)));
+  std::vector<std::string> values;
+  std::string_view rest = whole;
+  for (;;) {
+    const auto separator = rest.find('\\');
+    make_printable(values.emplace_back(trimmed(rest.substr(0, separator))));
+    if (separator == std::string_view::npos) break;
+    rest.remove_prefix(separator + 1);
+  }
+  return values;
+}
+
+std::optional<std::string> DicomItem::text(const DcmTagKey& tag) const {
+  auto value = raw_text(tag);
+  if (value) make_printable(*value);
+  return value;
+}
+
+std::optional<std::string> DicomItem::raw_text(const DcmTagKey& tag) const {
+  DcmElement* element = nullptr;
+  if (!has_value(tag) || item_->findAndGetElement(tag, element).bad()) return std::nullopt;
+  OFString whole;
+  if (element->getOFStringArray(whole).bad()) throw Error(fmt::format("{}: {} is no text", where_, described(tag)));
+  const std::string_view value = trimmed(whole);
+  if (value.empty()) return std::nullopt;
+  return std::string(value);
+}
+
+std::vector<double> DicomItem::numbers(const DcmTagKey& tag) const {
+  DcmElement* element = nullptr;
+  if (!has_value(tag) || item_->findAndGetElement(tag, element).bad()) return {};
+  std::vector<double> values;
+  if (is_text_vr(element->ident())) {
+    for (const std::string& written : texts(tag)) {
+      std::string_view digits = written;
+      if (digits.starts_with('+')) digits.remove_prefix(1);
+      double value = 0.0;
+      const auto [end, error] = std::from_chars(digits.begin(), digits.end(), value);
+      if (error != std::errc() || end != digits.end() || !std::isfinite(value))
+        throw Error(fmt::format("{}: {} holds \"{}\", which is no finite number", where_, described(tag), written));
+      values.push_back(value);
+    }
+    return values;
+  }
+  for (unsigned long n = 0; n < element->getVM(); ++n) {
+    Float64 wide = 0.0;
+    Float32 narrow = 0.0F;
+    Uint32 whole = 0;
+    Sint32 whole_signed = 0;
+    Uint16 small = 0;
+    Sint16 small_signed = 0;
+    if (element->getFloat64(wide, n).good())
+      values.push_back(wide);
+    else if (element->getFloat32(narrow, n).good())
+      values.push_back(narrow);
+    else if (element->getUint16(small, n).good())
+      values.push_back(small);
+    else if (element->getSint16(small_signed, n).good())
+      values.push_back(small_signed);
+    else if (element->getUint32(whole, n).good())
+      values.push_back(whole);
+    else if (element->getSint32(whole_signed, n).good())
+      values.push_back(whole_signed);
+    else
+      throw Error(fmt::format("{}: {} is no number", where_, described(tag)));
+    if (!std::isfinite(values.back()))
+      throw Error(fmt::format("{}: {} is not a finite number", where_, described(tag)));
+  }
+  return values;
+}
+
+std::optional<double> DicomItem::number(const DcmTagKey& tag) const {
+  const std::vector<double> values = numbers(tag);
+  if (values.empty()) return std::nullopt;
+  return values.front();
+}
+
+std::vector<DicomItem> DicomItem::items(const DcmTagKey& sequence_tag) const {
+  DcmSequenceOfItems* sequence = nullptr;
+  if (item_->findAndGetSequence(sequence_tag, sequence).bad() || sequence == nullptr) return {};
+  std::vector<DicomItem> items;
+  items.reserve(sequence->card());
+  // From one item to the next: getItem(n) counts from the first, which takes half a minute for 200 000 contours.
+  const std::string prefix = fmt::format("{}: {} item ", where_, described(sequence_tag));
+  for (DcmObject* item = sequence->nextInContainer(nullptr); item != nullptr; item = sequence->nextInContainer(item))
+    items.emplace_back(static_cast<DcmItem&>(*item), fmt::format("{}{}", prefix, items.size() + 1));
+  return items;
+}
+
+std::string DicomItem::required_text(const DcmTagKey& tag) const {
+  auto value = text(tag);
+  if (!value) throw Error(fmt::format("{}: {} is missing", where_, described(tag)));
+  return *value;
+}
+
+double DicomItem::required_number(const DcmTagKey& tag) const { return required_numbers(tag, 1).front(); }
+
+std::vector<double> DicomItem::required_numbers(const DcmTagKey& tag, std::size_t count) const {
+  std::vector<double> values = numbers(tag);
+  if (values.empty()) throw Error(fmt::format("{}: {} is missing", where_, described(tag)));
+  if (values.size() != count)
+    throw Error(fmt::format("{}: {} has {} values, expected {}", where_, described(tag), values.size(), count));
+  return values;
+}
+
+void DicomItem::put(const DcmTagKey& tag, std::string_view text) {
+  check(item_->putAndInsertOFStringArray(tag, OFString(text.data(), text.size())), where_, described(tag));
+}
+
+void DicomItem::put(const DcmTagKey& key, std::span<const double> numbers) {
+  const DcmEVR vr = DcmTag(key).getEVR();
+  if (is_text_vr(vr)) {
+    std::string joined;
+    for (const double number : numbers) joined += (joined.empty() ? "" : "\\") + ds_from(number);
+    put(key, joined);
+    return;
+  }
+  for (unsigned long n = 0; n < numbers.size(); ++n) {
+    const double number = numbers[n];
+    OFCondition done;
+    switch (vr) {
+      case EVR_xs:  // US or SS by PixelRepresentation
+      case EVR_US: done = item_->putAndInsertUint16(key, static_cast<Uint16>(number), n); break;
+      case EVR_SS: done = item_->putAndInsertSint16(key, static_cast<Sint16>(number), n); break;
+      case EVR_UL: done = item_->putAndInsertUint32(key, static_cast<Uint32>(number), n); break;
+      case EVR_FL: done = item_->putAndInsertFloat32(key, static_cast<Float32>(number), n); break;
+      case EVR_FD: done = item_->putAndInsertFloat64(key, number, n); break;
+      default: throw Error(fmt::format("{}: {} takes no number", where_, described(key)));
+    }
+    check(done, where_, described(key));
+  }
+}
+
+void DicomItem::put_pixels(std::span<const std::uint16_t> stored_values) {
+  check(item_->putAndInsertUint16Array(DCM_PixelData, stored_values.data(), stored_values.size()), where_,
+        described(DCM_PixelData));
+}
+
+void DicomItem::put_bytes(const DcmTagKey& tag, std::string_view bytes) {
+  std::string even(bytes);
+  if (even.size() % 2 != 0) even.push_back('\0');
+  check(item_->putAndInsertUint8Array(tag, reinterpret_cast<const Uint8*>(even.data()), even.size()), where_,
+        described(tag));
+}
+
+DicomItem DicomItem::append_item(const DcmTagKey& sequence) {
+  DcmItem* item = nullptr;
+  check(item_->findOrCreateSequenceItem(sequence, item, -2), where_, described(sequence));
+  return DicomItem(*item, fmt::format("{}: {}", where_, described(sequence)));
+}
+
+DicomItem DicomItem::append_reference(const DcmTagKey& sequence, std::string_view sop_class_uid,
+                                      std::string_view instance_uid) {
+  DicomItem item = append_item(sequence);
+  item.put(DCM_ReferencedSOPClassUID, sop_class_uid);
+  item.put(DCM_ReferencedSOPInstanceUID, instance_uid);
+  return item;
+}
+
+void DicomItem::put_empty_sequence(const DcmTagKey& sequence) {
+  check(item_->insertEmptyElement(sequence), where_, described(sequence));
+}
+
+void DicomItem::erase(const DcmTagKey& tag) {
+  if (item_->tagExists(tag)) check(item_->findAndDeleteElement(tag), where_, described(tag));
+}
+
+DicomFile::DicomFile() : path_("new DICOM object") {
+  configure_dcmtk();
+  file_ = std::make_unique<DcmFileFormat>();
+}
+DicomFile::DicomFile(DicomFile&&) noexcept = default;
+DicomFile& DicomFile::operator=(DicomFile&&) noexcept = default;
+DicomFile::~DicomFile() = default;
+
+DicomFile DicomFile::read(const std::filesystem::path& path, Extent extent) {
+  DicomFile file;
+  check_nesting(path);
+  file.path_ = path;
+  const OFCondition loaded = extent == Extent::kWhole
+                                 ? file.file_->loadFile(path.c_str())
+                                 : file.file_->loadFileUntilTag(path.c_str(), EXS_Unknown, EGL_noChange,
+                                                                DCM_MaxReadLength, ERM_autoDetect, DCM_PixelData);
+  if (loaded.bad()) throw Error(fmt::format("{}: cannot be read as a DICOM file: {}", path.string(), loaded.text()));
+  // Where the character set is unknown to the converter, the bytes stay as they are, together with their set.
+  (void)file.file_->getDataset()->convertToUTF8();
+  return file;
+}
+
+DicomItem DicomFile::dataset() const { return DicomItem(*file_->getDataset(), path_.string()); }
+
+void DicomFile::write(const std::filesystem::path& path) {
+  const std::string where = path.string();
+  if (std::filesystem::exists(path)) throw Error(fmt::format("{}: exists already", where));
+  check(file_->saveFile(path.c_str(), EXS_LittleEndianExplicit, EET_ExplicitLength, EGL_recalcGL, EPD_noChange, 0, 0,
+                        EWM_createNewMeta),
+        where, "cannot be written");
+}
+
+bool begins_like_dicom(const std::filesystem::path& path) {
+  std::ifstream stream(path, std::ios::binary);
+  std::array<char, 132> head{};
+  if (!stream) throw Error(fmt::format("{}: cannot be opened: {}", path.string(), std::strerror(errno)));
+  stream.read(head.data(), head.size());
+  if (stream.gcount() < 132) return false;
+  const std::string_view begin(head.data(), head.size());
+  if (begin.substr(128) == "DICM") return true;
+  // Little endian: an element of group 0008 up to SOP Instance UID, with its VR or, in implicit VR, a short length.
+  const auto byte = [&](std::size_t n) { return static_cast<unsigned char>(head[n]); };
+  if (byte(0) != 0x08 || byte(1) != 0 || byte(2) > 0x18 || byte(3) != 0) return false;
+  const std::string_view vr = begin.substr(4, 2);
+  return vr == "UL" || vr == "CS" || vr == "UI" || vr == "DA" || vr == "TM" || (byte(6) == 0 && byte(7) == 0);
+}
+
+std::string ds_from(double number) {
+  if (!std::isfinite(number)) throw Error("a DICOM decimal string cannot hold a number that is not finite");
+  if (std::abs(number) < 1e-12) return "0";
+  // Fewer digits until it fits: cutting the text could drop an exponent's last digit and change the value silently.
+  for (int digits = 17; digits > 0; --digits) {
+    std::array<char, 40> text{};
+    const auto result =
+        std::to_chars(text.data(), text.data() + text.size(), number, std::chars_format::general, digits);
+    if (const auto length = result.ptr - text.data(); length <= 16) return std::string(text.data(), result.ptr);
+  }
+  throw Error("a number does not fit into a DICOM decimal string");
+}
+
+std::string uid_from_random_bytes(std::array<std::uint8_t, 16> bytes) {
+  bytes[6] = (bytes[6] & 0x0F) | 0x40;  // RFC 4122: version 4
+  bytes[8] = (bytes[8] & 0x3F) | 0x80;  // and variant 1
+  std::string digits;
+  while (std::ranges::any_of(bytes, [](std::uint8_t byte) { return byte != 0; })) {
+    unsigned remainder = 0;  // long division of the whole number by ten
+    for (std::uint8_t& byte : bytes) {
+      const unsigned value = remainder * 256 + byte;
+      byte = static_cast<std::uint8_t>(value / 10);
+      remainder = value % 10;
+    }
+    digits.push_back(static_cast<char>('0' + remainder));
+  }
+  std::ranges::reverse(digits);
+  return "2.25." + digits;
+}
+
+std::string new_uid() {
+  std::random_device random;
+  std::array<std::uint8_t, 16> bytes{};
+  std::ranges::generate(bytes, [&] { return static_cast<std::uint8_t>(random()); });
+  return uid_from_random_bytes(bytes);
+}
+
+}  // namespace isoshift

@@ -1,0 +1,28 @@
+#include "io/dicom/notes.h"
+
+#include <fmt/format.h>
+
+#include "base/error.h"
+
+namespace isoshift {
+
+std::vector<Finding> not_allowed(const std::vector<Finding>& findings, const Allowances& allowed, Notes& notes) {
+  std::vector<Finding> others;
+  for (const Finding& finding : findings) {
+    if (const auto reason = allowed.find(finding.key); reason != allowed.end())
+      notes.overrides.push_back(fmt::format("{} (allowed by {}: {})", finding.message, finding.key, reason->second));
+    else
+      others.push_back(finding);
+  }
+  return others;
+}
+
+void settle(const std::vector<Finding>& findings, const Allowances& allowed, Notes& notes) {
+  std::string refused;
+  for (const Finding& finding : not_allowed(findings, allowed, notes))
+    refused += fmt::format("{}{}\n       If that is known to be right, allow it: --allow {}=REASON",
+                           refused.empty() ? "" : "\n", finding.message, finding.key);
+  if (!refused.empty()) throw Error(refused);
+}
+
+}  // namespace isoshift

@@ -1,0 +1,109 @@
+#include "io/dicom/rt_plan.h"
+
+#include <dcmtk/dcmdata/dcuid.h>
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <set>
+
+#include "base/error.h"
+
+namespace isoshift {
+namespace {
+
+RtPlan::Beam read_beam(const DicomItem& beam_item, const DcmTagKey& control_points, const DicomItem& plan) {
+  RtPlan::Beam beam;
+  beam.number = static_cast<int>(beam_item.required_number(DCM_BeamNumber));
+  beam.name = beam_item.text(DCM_BeamName).value_or("");
+  if (const auto points = beam_item.items(control_points); !points.empty()) {
+    if (points.front().has_value(DCM_IsocenterPosition))
+      beam.isocenter_patient_mm = Eigen::Vector3d(points.front().required_numbers(DCM_IsocenterPosition, 3).data());
+    beam.support_angle_deg = points.front().number(DCM_PatientSupportAngle);
+  }
+  const auto setup_number = beam_item.number(DCM_ReferencedPatientSetupNumber);
+  std::set<std::optional<std::string>> positions;
+  for (const DicomItem& setup : plan.items(DCM_PatientSetupSequence)) {
+    if (setup_number && setup.number(DCM_PatientSetupNumber) != setup_number) continue;
+    positions.insert(setup.text(DCM_PatientPosition));
+    const Eigen::Vector3d displacement_mm(setup.number(DCM_TableTopVerticalSetupDisplacement).value_or(0.0),
+                                          setup.number(DCM_TableTopLongitudinalSetupDisplacement).value_or(0.0),
+                                          setup.number(DCM_TableTopLateralSetupDisplacement).value_or(0.0));
+    if (displacement_mm.norm() > beam.setup_displacement_mm.norm()) beam.setup_displacement_mm = displacement_mm;
+  }
+  if (positions.size() == 1) beam.patient_position = *positions.begin();
+  return beam;
+}
+
+}  // namespace
+
+RtPlan read_rt_plan(const std::filesystem::path& path) {
+  const DicomFile file = DicomFile::read(path, DicomFile::Extent::kHeader);
+  const DicomItem dataset = file.dataset();
+  RtPlan plan;
+  plan.path = path;
+  plan.identity = read_identity(dataset);
+  plan.sop_class_uid = dataset.required_text(DCM_SOPClassUID);
+  plan.sop_instance_uid = dataset.required_text(DCM_SOPInstanceUID);
+  plan.series_instance_uid = dataset.text(DCM_SeriesInstanceUID).value_or("");
+  plan.label = dataset.text(DCM_RTPlanLabel).value_or("");
+  plan.frame_of_reference_uid = dataset.text(DCM_FrameOfReferenceUID);
+  plan.approval_status = dataset.text(DCM_ApprovalStatus).value_or("");
+  const bool is_ion = plan.sop_class_uid == UID_RTIonPlanStorage;
+  for (const DicomItem& beam : dataset.items(is_ion ? DCM_IonBeamSequence : DCM_BeamSequence)) {
+    if (is_ion && beam.text(DCM_PatientSupportType) == "CHAIR")
+      throw Error(fmt::format("{}: {} is CHAIR, expected TABLE", beam.where(), described(DCM_PatientSupportType)));
+    plan.beams.push_back(read_beam(beam, is_ion ? DCM_IonControlPointSequence : DCM_ControlPointSequence, dataset));
+  }
+  if (plan.beams.empty())
+    throw Error(fmt::format("{}: {} is missing or empty", path.string(),
+                            described(is_ion ? DCM_IonBeamSequence : DCM_BeamSequence)));
+  return plan;
+}
+
+std::vector<RtPlan::Beam> selected_beams(const RtPlan& plan, std::span<const int> beam_numbers) {
+  if (beam_numbers.empty()) return plan.beams;
+  std::vector<RtPlan::Beam> selected;
+  for (const int number : beam_numbers) {
+    const auto beam = std::ranges::find(plan.beams, number, &RtPlan::Beam::number);
+    if (beam == plan.beams.end())
+      throw Error(fmt::format("{}: has no beam {}, to which an image refers ({})", plan.path.string(), number,
+                              described(DCM_ReferencedBeamNumber)));
+    selected.push_back(*beam);
+  }
+  return selected;
+}
+
+Eigen::Vector3d common_isocenter(const RtPlan& plan, std::span<const RtPlan::Beam> beams) {
+  std::optional<Eigen::Vector3d> common;
+  for (const RtPlan::Beam& beam : beams) {
+    if (!beam.isocenter_patient_mm) continue;
+    if (common && (*beam.isocenter_patient_mm - *common).norm() > 0.01)
+      throw Error(
+          fmt::format("{}: beams have different isocenters ({}): ({}) and ({}) mm.\n"
+                      "       Say which one the patient was set up to: --isocenter X,Y,Z",
+                      plan.path.string(), described(DCM_IsocenterPosition), fmt::join(*common, ", "),
+                      fmt::join(*beam.isocenter_patient_mm, ", ")));
+    common = beam.isocenter_patient_mm;
+  }
+  if (!common)
+    throw Error(
+        fmt::format("{}: {} is missing in the first control point of every beam.\n"
+                    "       Supply it: --isocenter X,Y,Z",
+                    plan.path.string(), described(DCM_IsocenterPosition)));
+  return *common;
+}
+
+std::optional<std::string> common_patient_position(const RtPlan& plan, std::span<const RtPlan::Beam> beams) {
+  std::optional<std::string> common;
+  for (const RtPlan::Beam& beam : beams) {
+    if (!beam.patient_position) continue;
+    if (common && *common != *beam.patient_position)
+      throw Error(fmt::format("{}: beams have different patient positions ({}): {} and {}", plan.path.string(),
+                              described(DCM_PatientPosition), *common, *beam.patient_position));
+    common = beam.patient_position;
+  }
+  return common;
+}
+
+}  // namespace isoshift

@@ -1,0 +1,48 @@
+#pragma once
+// RT Plan and RT Ion Plan: the isocenter and the patient position (PS3.3 A.20, A.49, C.8.8.14).
+
+#include <Eigen/Core>
+#include <filesystem>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "io/dicom/identity.h"
+
+namespace isoshift {
+
+struct RtPlan {
+  struct Beam {
+    int number = 0;
+    std::string name;
+    std::optional<Eigen::Vector3d> isocenter_patient_mm;  // IsocenterPosition of the first control point
+    std::optional<double> support_angle_deg;              // PatientSupportAngle of the first control point
+    // Of the patient setup that the beam refers to; without one what all setups agree on, and the largest displacement.
+    std::optional<std::string> patient_position;
+    Eigen::Vector3d setup_displacement_mm = Eigen::Vector3d::Zero();  // vertical, longitudinal, lateral (300A,01D2..6)
+  };
+
+  std::filesystem::path path;
+  Identity identity;
+  std::string sop_class_uid;
+  std::string sop_instance_uid;
+  std::string series_instance_uid;
+  std::string label;
+  std::optional<std::string> frame_of_reference_uid;
+  std::string approval_status;
+  std::vector<Beam> beams;
+};
+
+RtPlan read_rt_plan(const std::filesystem::path& path);
+
+// The beams with the given numbers; all beams where the list is empty. Throws Error for a number the plan lacks.
+std::vector<RtPlan::Beam> selected_beams(const RtPlan& plan, std::span<const int> beam_numbers);
+
+// The isocenter that the beams share within 0.01 mm. Throws Error where they differ or none has one.
+Eigen::Vector3d common_isocenter(const RtPlan& plan, std::span<const RtPlan::Beam> beams);
+
+// The patient position that the beams share; nothing where none says. Throws Error where they differ.
+std::optional<std::string> common_patient_position(const RtPlan& plan, std::span<const RtPlan::Beam> beams);
+
+}  // namespace isoshift

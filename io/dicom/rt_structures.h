@@ -1,0 +1,44 @@
+#pragma once
+// RT Structure Set: what was drawn on the planning CT (PS3.3 A.19, C.8.8.5, C.8.8.6; docs/dicom.md, SS-1).
+
+#include <Eigen/Core>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "io/dicom/identity.h"
+
+namespace isoshift {
+
+// A closed planar polygon: the last point is joined to the first.
+struct Contour {
+  std::vector<Eigen::Vector3d> points_patient_mm;  // at least three
+  std::optional<double> slab_thickness_mm;         // ContourSlabThickness (retired), where it is more than 0
+};
+
+struct Structure {
+  int number = 0;
+  std::string name;
+  std::string interpreted_type;                       // RTROIInterpretedType, such as ORGAN; empty where not told
+  std::optional<std::string> frame_of_reference_uid;  // ReferencedFrameOfReferenceUID
+  std::vector<Contour> contours;
+  int ignored_contours = 0;  // those that enclose nothing: points, open lines, fewer than three points
+};
+
+struct RtStructures {
+  std::filesystem::path path;
+  Identity identity;
+  std::string sop_instance_uid;
+  std::string label;
+  std::vector<Structure> structures;
+};
+
+RtStructures read_rt_structures(const std::filesystem::path& path);
+
+// The structure of this name; where none is spelt so, the only one that differs in upper and lower case alone. Throws
+// Error, with the names there are, where none or several are meant, or where it has no closed contour.
+const Structure& structure_named(const RtStructures& structures, std::string_view name);
+
+}  // namespace isoshift

@@ -1,0 +1,45 @@
+#pragma once
+// Where the treatment table stood when an X-ray was taken, as its file says, and whether it moved between two X-rays.
+
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "io/dicom/dicom_dataset.h"
+#include "io/dicom/notes.h"
+
+namespace isoshift {
+
+constexpr double kMaxTableMoveMm = 0.5;
+constexpr double kMaxTableTurnDeg = 0.1;
+
+// IEC 61217 read-outs; an optional without value is absent or empty in the file.
+struct TableReadOuts {
+  std::optional<double> lateral_mm, longitudinal_mm, vertical_mm;
+  std::optional<double> support_angle_deg, eccentric_angle_deg, pitch_deg, roll_deg;
+
+  bool has_position() const { return lateral_mm && longitudinal_mm && vertical_mm; }
+  bool operator==(const TableReadOuts&) const = default;
+};
+
+// `number` gives the value of an attribute of the X-ray.
+TableReadOuts read_table_read_outs(const std::function<std::optional<double>(const DcmTagKey&)>& number);
+
+// A read-out with its attribute, for whoever goes through all of them.
+struct TableReadOut {
+  std::optional<double> TableReadOuts::*value;
+  DcmTagKey tag;
+  bool is_angle;
+};
+const std::vector<TableReadOut>& table_read_outs();
+
+// How a read-out differs between two X-rays, in words ("moved by 3.1 mm"); nothing where it does not, or where one of
+// them has no value.
+std::optional<std::string> table_change(const TableReadOut& read_out, const TableReadOuts& now,
+                                        const TableReadOuts& before);
+
+// Whether any read-out that both have differs.
+bool has_table_moved(const TableReadOuts& now, const TableReadOuts& before);
+
+}  // namespace isoshift

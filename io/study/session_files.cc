@@ -1,0 +1,213 @@
+#include "io/study/session_files.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <iterator>
+#include <set>
+#include <span>
+#include <tuple>
+
+#include "base/sha256.h"
+#include "io/study/session.h"
+
+namespace isoshift {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::size_t kNameLength = 12;
+
+std::string name_of(const std::vector<StudyFiles::Image>& images) {
+  std::set<std::string> uids;
+  for (const StudyFiles::Image& image : images) uids.insert(image.sop_instance_uid);
+  std::string all;
+  for (const std::string& uid : uids) all += uid + "\n";
+  return sha256_of(all).substr(0, kNameLength);
+}
+
+using Images = std::span<const StudyFiles::Image>;
+
+bool has_label(Images images, const std::string& label) {
+  return !label.empty() && std::ranges::find(images, label, &StudyFiles::Image::label) != images.end();
+}
+
+// X-rays of one patient and plan, in the order of their times, and which of them have a result already.
+struct Timeline {
+  Images images;
+  const std::set<std::string>& registered;
+
+  bool is_free(std::size_t n) const { return !registered.contains(images[n].sop_instance_uid); }
+  double gap_s(std::size_t n) const { return *images[n + 1].at_s - *images[n].at_s; }
+
+  // Whether an X-ray may be of the session that the ones from `oldest` to `newest` make.
+  bool may_join(std::size_t n, std::size_t oldest, std::size_t newest) const {
+    const Images session = images.subspan(oldest, newest - oldest + 1);
+    return is_free(n) && *images[newest].at_s - *images[n].at_s <= kMaxTimeSpanS &&
+           !has_label(session, images[n].label) && std::ranges::none_of(session, [&](const auto& image) {
+             return has_table_moved(image.table, images[n].table);
+           });
+  }
+
+  // Whether an X-ray lies nearer to the one before than to the one after it, as far as is known without a couch move in
+  // between.
+  bool is_nearer_to_earlier(std::size_t n) const {
+    return n > 0 && gap_s(n - 1) < gap_s(n) && !has_table_moved(images[n].table, images[n - 1].table);
+  }
+
+  // Where the session begins that ends with `newest`.
+  std::size_t oldest_with(std::size_t newest) const {
+    std::size_t oldest = newest;
+    while (oldest > 0 && may_join(oldest - 1, oldest, newest)) --oldest;
+    while (oldest < newest && is_nearer_to_earlier(oldest)) ++oldest;
+    return oldest;
+  }
+
+  // Which X-rays of a session repeat a label of an earlier one that is not in it.
+  std::vector<std::string> retakes(std::size_t oldest, std::size_t newest) const {
+    std::vector<std::string> words;
+    for (std::size_t n = oldest; n <= newest; ++n)
+      for (std::size_t before = oldest; before-- > 0 && *images[n].at_s - *images[before].at_s <= kMaxTimeSpanS;)
+        if (!images[n].label.empty() && images[before].label == images[n].label) {
+          words.push_back(fmt::format("{} was taken again {:.0f} s after {}", images[n].label,
+                                      *images[n].at_s - *images[before].at_s, images[before].file.string()));
+          break;
+        }
+    return words;
+  }
+
+  std::vector<SessionFiles> sessions() const {
+    std::vector<SessionFiles> all;
+    for (std::size_t end = images.size(); end > 0;) {
+      const std::size_t newest = end - 1, oldest = is_free(newest) ? oldest_with(newest) : newest;
+      if (is_free(newest))
+        all.push_back({.patient = images[newest].patient,
+                       .images = {images.begin() + static_cast<std::ptrdiff_t>(oldest),
+                                  images.begin() + static_cast<std::ptrdiff_t>(end)},
+                       .remarks = retakes(oldest, newest)});
+      end = oldest;
+    }
+    std::ranges::reverse(all);
+    return all;
+  }
+};
+
+// X-rays without a time, of one patient, plan and folder: one session, unless a label or the table tells that they are
+// several. Then nobody knows which of them belong together.
+std::vector<SessionFiles> untimed_sessions(Images images, const std::set<std::string>& registered) {
+  std::vector<SessionFiles> all;
+  bool is_one = true;
+  for (std::size_t n = 1; n < images.size(); ++n)
+    is_one = is_one && !has_label(images.first(n), images[n].label) &&
+             !has_table_moved(images[n].table, images.front().table);
+  for (const StudyFiles::Image& image : images) {
+    if (registered.contains(image.sop_instance_uid)) continue;
+    if (all.empty() || !is_one) all.push_back({.patient = image.patient});
+    all.back().images.push_back(image);
+    if (!is_one)
+      all.back().remarks.push_back(fmt::format(
+          "{} is of several sessions, and without acquisition times nobody knows which X-rays belong together",
+          image.file.string()));
+  }
+  return all;
+}
+
+}  // namespace
+
+std::vector<SessionFiles> sessions_of(const StudyFiles& files, bool other_xrays,
+                                      const std::set<std::string>& registered) {
+  std::vector<StudyFiles::Image> images;
+  std::set<std::string> seen;
+  const auto take_new = [&](const std::vector<StudyFiles::Image>& from) {
+    std::ranges::copy_if(from, std::back_inserter(images),
+                         [&](const auto& image) { return seen.insert(image.sop_instance_uid).second; });
+  };
+  take_new(files.images);
+  if (other_xrays) take_new(files.other_xrays);
+  // Those without a time come first, by folder.
+  const auto place_of = [](const StudyFiles::Image& image) {
+    return image.at_s ? fs::path() : image.file.parent_path();
+  };
+  std::ranges::stable_sort(images, {}, [&](const StudyFiles::Image& image) {
+    return std::tuple(image.patient, image.plan_uid, image.at_s, place_of(image), image.file);
+  });
+  const auto whose = [&](const StudyFiles::Image& image) {
+    return std::tuple(image.patient, image.plan_uid, image.at_s.has_value(), place_of(image));
+  };
+  std::vector<SessionFiles> sessions;
+  for (auto begin = images.begin(); begin != images.end();) {
+    const auto end =
+        std::find_if(begin, images.end(), [&](const auto& image) { return whose(image) != whose(*begin); });
+    std::vector<SessionFiles> found = begin->at_s
+                                          ? Timeline{.images = Images(begin, end), .registered = registered}.sessions()
+                                          : untimed_sessions(Images(begin, end), registered);
+    std::ranges::move(found, std::back_inserter(sessions));
+    begin = end;
+  }
+  for (SessionFiles& session : sessions) session.name = name_of(session.images);
+  return sessions;
+}
+
+StudyFiles files_for(const SessionFiles& session, const StudyFiles& files) {
+  StudyFiles own;
+  const std::string id = patient_id_of(session.patient);
+  std::set<std::string> issued = {session.patient};  // patients of this ID whose issuer is named
+  const auto find_issuers = [&](const auto& entries) {
+    for (const auto& entry : entries)
+      if (patient_id_of(entry.patient) == id) issued.insert(entry.patient);
+  };
+  find_issuers(files.cts);
+  find_issuers(files.plans);
+  find_issuers(files.structures);
+  find_issuers(files.images);
+  find_issuers(files.other_xrays);
+  issued.erase(id + "\\");
+  const auto take = [&](auto& to, const auto& from) {
+    std::ranges::copy_if(from, std::back_inserter(to), [&](const auto& entry) {
+      return entry.patient == session.patient || (issued.size() <= 1 && patient_id_of(entry.patient) == id);
+    });
+  };
+  take(own.cts, files.cts);
+  take(own.plans, files.plans);
+  take(own.structures, files.structures);
+  own.images = session.images;
+  return own;
+}
+
+std::string missing_ct_images(const StudyFiles& of_session) {
+  for (const StudyFiles::Plan& plan : of_session.plans) {
+    const auto is_imaged = [&](const auto& image) { return image.plan_uid == plan.sop_instance_uid; };
+    if (std::ranges::none_of(of_session.images, is_imaged)) continue;
+    for (const StudyFiles::Structures& structures : of_session.structures) {
+      if (structures.sop_instance_uid != plan.structure_set_uid) continue;
+      const auto absent = std::ranges::count_if(structures.ct_sop_instance_uids, [&](const std::string& uid) {
+        return std::ranges::none_of(of_session.cts, [&](const auto& ct) { return ct.sop_instance_uids.contains(uid); });
+      });
+      if (absent > 0)
+        return fmt::format("{} of the {} CT images of the RT Structure Set", absent,
+                           structures.ct_sop_instance_uids.size());
+    }
+  }
+  return "";
+}
+
+std::vector<std::string> missing_parts(const StudyFiles& of_session) {
+  std::vector<std::string> missing;
+  if (of_session.cts.empty()) missing.emplace_back("the CT");
+  std::set<std::string> plan_uids;
+  for (const StudyFiles::Image& image : of_session.images)
+    if (!image.plan_uid.empty()) plan_uids.insert(image.plan_uid);
+  for (const std::string& uid : plan_uids) {
+    const auto plan = std::ranges::find(of_session.plans, uid, &StudyFiles::Plan::sop_instance_uid);
+    if (plan == of_session.plans.end())
+      missing.push_back(fmt::format("the RT Plan {}", uid));
+    else if (!plan->structure_set_uid.empty() &&
+             std::ranges::find(of_session.structures, plan->structure_set_uid,
+                               &StudyFiles::Structures::sop_instance_uid) == of_session.structures.end())
+      missing.push_back(fmt::format("the RT Structure Set {}", plan->structure_set_uid));
+  }
+  if (std::string images = missing_ct_images(of_session); !images.empty()) missing.push_back(std::move(images));
+  return missing;
+}
+
+}  // namespace isoshift

@@ -1,0 +1,292 @@
+#include "io/study/study.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <set>
+#include <tuple>
+
+#include "base/error.h"
+#include "io/dicom/decode.h"
+
+namespace isoshift {
+namespace {
+
+std::vector<Finding> patient_findings(const Study& study) {
+  std::vector<Finding> findings;
+  const auto compare = [&](const Identity& identity, const std::filesystem::path& path) {
+    std::ranges::move(patient_findings(study.ct->identity, identity, path.string()), std::back_inserter(findings));
+  };
+  if (study.plan) compare(study.plan->identity, study.plan->path);
+  if (study.structures) compare(study.structures->identity, study.structures->path);
+  for (const RtImage& image : study.rt_images) compare(image.identity, image.path);
+  return findings;
+}
+
+std::vector<Finding> plan_findings(const Study& study, Notes& notes) {
+  std::vector<Finding> findings;
+  if (!study.plan) return findings;
+  const RtPlan& plan = *study.plan;
+  if (!plan.frame_of_reference_uid)
+    notes.warnings.push_back(
+        fmt::format("the plan has no {}; taken as that of the CT", described(DCM_FrameOfReferenceUID)));
+  else if (*plan.frame_of_reference_uid != study.ct->frame_of_reference_uid)
+    findings.push_back(
+        {"for-mismatch", fmt::format("{}: {} is not that of the CT, so the plan's isocenter does not apply "
+                                     "to it",
+                                     plan.path.string(), described(DCM_FrameOfReferenceUID))});
+  if (plan.approval_status != "APPROVED")
+    notes.warnings.push_back(
+        fmt::format("the plan is not approved ({} is \"{}\")", described(DCM_ApprovalStatus), plan.approval_status));
+  for (const RtImage& image : study.rt_images) {
+    if (!image.plan_sop_instance_uid)
+      notes.warnings.push_back(fmt::format("{}: does not say to which plan it belongs ({})", image.label,
+                                           described(DCM_ReferencedRTPlanSequence)));
+    else if (*image.plan_sop_instance_uid != plan.sop_instance_uid)
+      findings.push_back({"plan-mismatch",
+                          fmt::format("{}: belongs to another plan than {} ({}): it refers to {}, the plan is {}",
+                                      image.path.string(), plan.path.string(), described(DCM_ReferencedRTPlanSequence),
+                                      *image.plan_sop_instance_uid, plan.sop_instance_uid)});
+  }
+  return findings;
+}
+
+// What is drawn in another frame of reference would lie anywhere on the CT.
+std::vector<Finding> structure_findings(const Study& study, Notes& notes) {
+  std::vector<std::string> unknown, elsewhere;
+  if (study.structures)
+    for (const Structure& structure : study.structures->structures) {
+      if (!structure.frame_of_reference_uid)
+        unknown.push_back(fmt::format("\"{}\"", structure.name));
+      else if (*structure.frame_of_reference_uid != study.ct->frame_of_reference_uid)
+        elsewhere.push_back(fmt::format("\"{}\"", structure.name));
+    }
+  if (!unknown.empty())
+    notes.warnings.push_back(fmt::format("structures {} have no {}; taken as that of the CT", fmt::join(unknown, ", "),
+                                         described(DCM_ReferencedFrameOfReferenceUID)));
+  if (elsewhere.empty()) return {};
+  return {{"for-mismatch", fmt::format("{}: {} of {} is not that of the CT, so they do not apply to it",
+                                       study.structures->path.string(), described(DCM_ReferencedFrameOfReferenceUID),
+                                       fmt::join(elsewhere, ", "))}};
+}
+
+void check_one_patient_position(const Study& study) {
+  const RtImage& first = study.rt_images.front();
+  for (const RtImage& image : study.rt_images)
+    if (image.patient_position != first.patient_position)
+      throw Error(fmt::format("{}: {} is {}, that of {} is {}", image.path.string(), described(DCM_PatientPosition),
+                              image.patient_position.value_or("missing"), first.path.string(),
+                              first.patient_position.value_or("missing")));
+}
+
+// Whether two images of one UID show the same from the same place.
+bool is_same_xray(const RtImage& a, const RtImage& b) {
+  const auto geometry = [](const RtImage& image) {
+    return std::tie(image.sad_mm, image.sid_mm, image.gantry_angle_deg, image.table.support_angle_deg,
+                    image.pixel_spacing_mm, image.position_mm, image.orientation, image.receptor_translation_mm,
+                    image.receptor_angle_deg, image.acquisition_time);
+  };
+  if (geometry(a) != geometry(b)) return false;
+  const auto pixels = [](const RtImage& image) {
+    const DicomFile file = DicomFile::read(image.path, DicomFile::Extent::kWhole);
+    return decode_frame(file, pixel_format(file.dataset()), image.frame);
+  };
+  return pixels(a) == pixels(b);
+}
+
+// An X-ray that lies there twice is one view (C.12.1: the UID is the instance's own).
+void drop_repeated_images(std::vector<RtImage>& images, Notes& notes) {
+  for (auto image = images.begin(); image != images.end();) {
+    const auto first = std::find_if(images.begin(), image, [&](const RtImage& other) {
+      return other.sop_instance_uid == image->sop_instance_uid && other.frame == image->frame;
+    });
+    if (first == image) {
+      ++image;
+      continue;
+    }
+    if (!is_same_xray(*first, *image))
+      throw Error(fmt::format("{}: has the {} of {}, but shows something else", image->path.string(),
+                              described(DCM_SOPInstanceUID), first->path.string()));
+    notes.left_aside.push_back(fmt::format("{}: the same X-ray as {}", image->path.string(), first->path.string()));
+    image = images.erase(image);
+  }
+}
+
+// Frames of one imager have one label but for the number behind it.
+void keep_earliest_of_each_imager(std::vector<RtImage>& images) {
+  std::ranges::stable_sort(images, {}, &acquisition_seconds);
+  std::set<std::string> seen;
+  std::erase_if(images, [&](const RtImage& image) { return !seen.insert(imager_label(image)).second; });
+  for (RtImage& image : images) image.label = imager_label(image);
+}
+
+void check_labels(const RtImageSwitches& switches, const std::vector<RtImage>& images) {
+  for (const auto& [label, angle_deg] : switches.gantry_angle_deg)
+    if (const auto count = std::ranges::count(images, label, &RtImage::label); count != 1)
+      throw UsageError(
+          fmt::format("--gantry-angle {}={}: {} images have this label, expected one", label, angle_deg, count));
+}
+
+void check_nothing_missing(const std::vector<RtImage>& images, std::string refused) {
+  for (const RtImage& image : images)
+    for (const MissingAttribute& missing : missing_attributes(image)) {
+      if (!refused.empty()) refused += '\n';
+      refused += fmt::format("{}: {} is missing.\n       {}", image.path.string(), described(missing.tag),
+                             missing.supplied_by.empty() ? "No switch supplies it: the image cannot be used."
+                                                         : "Supply it: " + missing.supplied_by);
+    }
+  if (!refused.empty()) throw Error(refused);
+}
+
+// The beams that the images name in the plan; all beams where one of them names none.
+std::vector<RtPlan::Beam> imaged_beams(const Study& study) {
+  std::vector<int> numbers;
+  for (const RtImage& image : study.rt_images) {
+    if (!image.beam_number || image.plan_sop_instance_uid != study.plan->sop_instance_uid) return study.plan->beams;
+    numbers.push_back(*image.beam_number);
+  }
+  return selected_beams(*study.plan, numbers);
+}
+
+void warn_of_planned_displacement(const std::vector<RtPlan::Beam>& beams, Notes& notes) {
+  for (const RtPlan::Beam& beam : beams)
+    if (beam.setup_displacement_mm.norm() > 0.0)
+      notes.warnings.push_back(fmt::format(
+          "beam {} of the plan moves the table by ({:.1f}) mm (vertical, longitudinal, lateral) from marks to "
+          "treatment "
+          "({}): find out whether the X-rays were taken before or after that move",
+          beam.number, fmt::join(beam.setup_displacement_mm, ", "), described(DCM_TableTopVerticalSetupDisplacement)));
+}
+
+void warn_of_planned_couch_angle(const Study& study, const std::vector<RtPlan::Beam>& beams, Notes& notes) {
+  for (const RtPlan::Beam& beam : beams) {
+    if (!beam.support_angle_deg) continue;
+    const double change_rad = wrapped_rad(rad_from_deg(*beam.support_angle_deg) - study.table.support_rad);
+    if (std::abs(change_rad) > rad_from_deg(kMaxTableTurnDeg))
+      notes.warnings.push_back(fmt::format(
+          "beam {} of the plan has couch angle {:.1f} degrees, the images {:.1f} degrees; the images' counts",
+          beam.number, *beam.support_angle_deg, deg_from_rad(study.table.support_rad)));
+  }
+}
+
+bool is_inside(const Eigen::VectorXd& position, const Eigen::VectorXd& size) {
+  return (position.array() >= -0.5).all() && (position.array() <= size.array() - 0.5).all();  // false for NaN
+}
+
+void check_isocenter(const Study& study) {
+  const Eigen::Vector3d voxel = study.ct->hu.patient_from_voxel.inverse() * study.isocenter_patient_mm;
+  if (!is_inside(voxel, study.ct->hu.size.cast<double>()))
+    throw Error(fmt::format("the isocenter ({:.1f}) mm lies outside the CT ({})",
+                            fmt::join(study.isocenter_patient_mm, ", "), described(DCM_IsocenterPosition)));
+  for (std::size_t n = 0; n < study.xrays.size(); ++n) {
+    const XrayView& view = study.xrays[n].view;
+    const auto pixel = view.project(Eigen::Vector3d::Zero());
+    if (!pixel || !is_inside(*pixel, Eigen::Vector2d(view.columns, view.rows)))
+      throw Error(fmt::format("{}: the isocenter is projected outside the image ({}, {})",
+                              study.rt_images[n].path.string(), described(DCM_RTImagePosition),
+                              described(DCM_XRayImageReceptorTranslation)));
+  }
+}
+
+}  // namespace
+
+Study load_study(const StudyRequest& request, Notes& notes, const Progress& progress, CtStore& cts) {
+  NamedParts named = request.parts;
+  named.takes_other_xrays = request.machine.has_value();
+  const StudyParts parts = find_parts(named);
+  Study study;
+  study.machine = request.machine;
+  study.image_files = parts.images;
+  notes.left_aside = parts.left_aside;
+  if (parts.plan) study.plan = read_rt_plan(*parts.plan);
+  if (parts.structures) study.structures = read_rt_structures(*parts.structures);
+  for (const std::filesystem::path& path : parts.images)
+    std::ranges::move(read_rt_images(path, notes), std::back_inserter(study.rt_images));
+  if (study.rt_images.empty()) throw Error("no frame of the X-rays has a geometry");
+  drop_repeated_images(study.rt_images, notes);
+  if (request.one_per_imager) keep_earliest_of_each_imager(study.rt_images);
+  check_labels(request.switches, study.rt_images);
+  for (RtImage& image : study.rt_images) {
+    if (request.machine) image = with_machine(image, *request.machine, request.switches, notes);
+    image = with_switches(image, request.switches, notes);
+  }
+  std::ranges::stable_sort(study.rt_images, {}, [](const RtImage& image) { return acquisition_seconds(image); });
+
+  // A patient position that only the plan has.
+  std::vector<RtPlan::Beam> beams;
+  if (study.plan) {
+    beams = imaged_beams(study);
+    const auto planned_position = common_patient_position(*study.plan, beams);
+    for (RtImage& image : study.rt_images)
+      if (!image.patient_position) image.patient_position = planned_position;
+  }
+  std::string refused;
+  std::vector<Finding> findings;
+  for (const RtImage& image : study.rt_images)
+    std::ranges::move(rt_image_findings(image), std::back_inserter(findings));
+  try {
+    settle(findings, request.allowed, notes);
+  } catch (const Error& error) {
+    refused = error.what();  // said together with all that is missing
+  }
+  check_nothing_missing(study.rt_images, refused);
+  for (const RtImage& image : study.rt_images)
+    if (image.is_lossy)
+      notes.warnings.push_back(
+          fmt::format("{}: has been compressed with loss ({})", image.label, described(DCM_LossyImageCompression)));
+  for (const RtImage& image : study.rt_images)
+    if (image.is_rt_image() && !image.reported_values_origin)
+      notes.warnings.push_back(fmt::format("{}: does not say whether its angles were measured ({} is missing)",
+                                           image.label, described(DCM_ReportedValuesOrigin)));
+
+  study.ct = cts.get(parts.ct, request.allowed, notes, progress);
+  findings = patient_findings(study);
+  std::ranges::move(plan_findings(study, notes), std::back_inserter(findings));
+  std::ranges::move(structure_findings(study, notes), std::back_inserter(findings));
+  std::ranges::move(session_findings(study.rt_images, notes), std::back_inserter(findings));
+  settle(findings, request.allowed, notes);
+  for (const Finding& doubt : not_allowed(session_doubts(study.rt_images, request.max_span_s), request.allowed, notes))
+    study.doubts.push_back(fmt::format("{} (--allow {}=REASON)", doubt.message, doubt.key));
+  check_one_patient_position(study);
+
+  study.patient_position = patient_position_from(study.rt_images.front().patient_position.value()).value();
+  study.table = table_angles(study.rt_images, notes);
+  if (request.isocenter_patient_mm) {
+    study.isocenter_patient_mm = *request.isocenter_patient_mm;
+    notes.overrides.push_back(fmt::format("{}: ({}) mm by --isocenter", described(DCM_IsocenterPosition),
+                                          fmt::join(study.isocenter_patient_mm, ", ")));
+  } else if (study.plan) {
+    study.isocenter_patient_mm = common_isocenter(*study.plan, beams);
+  } else {
+    throw Error(fmt::format(
+        "no RT Plan found ({}), so the planned isocenter is unknown.\n"
+        "       Name the plan (--plan FILE) or supply the isocenter: --isocenter X,Y,Z",
+        request.parts.study.empty() ? "no study folder was given" : "searched " + request.parts.study.string()));
+  }
+  if (const auto planned = study.plan ? common_patient_position(*study.plan, beams) : std::nullopt;
+      planned && *planned != to_string(study.patient_position))
+    throw Error(fmt::format(
+        "{}: {} is {}, that of {} is {}",
+        request.switches.patient_position ? "--patient-position" : study.rt_images.front().path.string(),
+        described(DCM_PatientPosition), to_string(study.patient_position), study.plan->path.string(), *planned));
+  if (!study.ct->patient_position.empty() && study.ct->patient_position != to_string(study.patient_position))
+    notes.warnings.push_back(fmt::format("the CT was scanned in {}, the patient is treated in {} ({})",
+                                         study.ct->patient_position, to_string(study.patient_position),
+                                         described(DCM_PatientPosition)));
+  warn_of_planned_couch_angle(study, beams, notes);
+  warn_of_planned_displacement(beams, notes);
+  study.planned_room_from_patient =
+      planned_room_from_patient(study.patient_position, study.table, study.isocenter_patient_mm);
+  std::optional<DicomFile> file;  // of several frames read once
+  for (const RtImage& image : study.rt_images) {
+    if (!file || file->path() != image.path) file = DicomFile::read(image.path, DicomFile::Extent::kWhole);
+    study.xrays.push_back(read_xray_image(*file, image, xray_view(image, beam_of(image, notes), notes)));
+  }
+  check_isocenter(study);
+  return study;
+}
+
+}  // namespace isoshift

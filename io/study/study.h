@@ -1,0 +1,55 @@
+#pragma once
+// From a folder to everything one registration needs, checked: DICOM ends here.
+
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "geometry/patient_setup.h"
+#include "geometry/xray_image.h"
+#include "io/config/machine_profile.h"
+#include "io/dicom/notes.h"
+#include "io/dicom/rt_image.h"
+#include "io/dicom/rt_plan.h"
+#include "io/dicom/rt_structures.h"
+#include "io/study/ct_store.h"
+#include "io/study/session.h"
+#include "io/study/study_files.h"
+
+namespace isoshift {
+
+// What to register and what a person supplies or allows.
+struct StudyRequest {
+  NamedParts parts;
+  std::optional<Eigen::Vector3d> isocenter_patient_mm;
+  RtImageSwitches switches;
+  std::optional<MachineProfile> machine;
+  Allowances allowed;
+  double max_span_s = kDefaultUntoldSpanS;  // between views without table read-outs, or the result needs a review
+  bool one_per_imager = false;  // of X-rays with one label only the earliest: those of a moving target come later
+};
+
+struct Study {
+  std::shared_ptr<const CtSeries> ct;
+  std::optional<RtPlan> plan;
+  std::optional<RtStructures> structures;
+  std::vector<std::filesystem::path> image_files;  // of all X-rays that belong to it, those left out for others too
+  std::vector<RtImage> rt_images;  // headers with machine profile and switches applied, in order of acquisition
+  std::vector<XrayImage> xrays;    // the same images, ready for registration
+  std::optional<MachineProfile> machine;
+  PatientPosition patient_position = PatientPosition::kHfs;
+  TableAngles table;  // at imaging, the same for all views
+  Eigen::Vector3d isocenter_patient_mm = Eigen::Vector3d::Zero();
+  Eigen::Isometry3d planned_room_from_patient = Eigen::Isometry3d::Identity();
+  std::vector<std::string> doubts;  // why a result of this study needs a person's review, whatever registration finds
+};
+
+// Finds, reads and checks the parts. Everything the images lack is reported in one Error, with the switch that supplies
+// it; so is every check that fails without being allowed. The CT is taken from the store if it was the last one.
+Study load_study(const StudyRequest& request, Notes& notes, const Progress& progress, CtStore& cts);
+inline Study load_study(const StudyRequest& request, Notes& notes, const Progress& progress) {
+  CtStore none;
+  return load_study(request, notes, progress, none);
+}
+
+}  // namespace isoshift

@@ -1,0 +1,379 @@
+#include "io/study/study_files.h"
+
+#include <dcmtk/dcmdata/dcuid.h>
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <iterator>
+#include <utility>
+
+#include "base/error.h"
+#include "io/dicom/dicom_dataset.h"
+#include "io/dicom/rt_image.h"
+
+namespace isoshift {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string first_reference(const DicomItem& dataset, const DcmTagKey& sequence) {
+  for (const DicomItem& item : dataset.items(sequence)) return item.text(DCM_ReferencedSOPInstanceUID).value_or("");
+  return "";
+}
+
+// The series that a structure set was drawn on (PS3.3 C.8.8.5), and its images.
+struct DrawnOn {
+  std::set<std::string> series_uids, image_uids;
+};
+DrawnOn drawn_on(const DicomItem& structures) {
+  DrawnOn drawn;
+  for (const DicomItem& frame : structures.items(DCM_ReferencedFrameOfReferenceSequence))
+    for (const DicomItem& study : frame.items(DCM_RTReferencedStudySequence))
+      for (const DicomItem& series : study.items(DCM_RTReferencedSeriesSequence)) {
+        if (const auto uid = series.text(DCM_SeriesInstanceUID)) drawn.series_uids.insert(*uid);
+        for (const DicomItem& image : series.items(DCM_ContourImageSequence))
+          if (const auto uid = image.text(DCM_ReferencedSOPInstanceUID)) drawn.image_uids.insert(*uid);
+      }
+  return drawn;
+}
+
+// The frames of reference of the structures: every one has its own (PS3.3 C.8.8.5).
+std::set<std::string> drawn_in(const DicomItem& structures) {
+  std::set<std::string> frame_uids;
+  for (const DicomItem& roi : structures.items(DCM_StructureSetROISequence))
+    if (const auto uid = roi.text(DCM_ReferencedFrameOfReferenceUID)) frame_uids.insert(*uid);
+  return frame_uids;
+}
+
+// Whose file it is: IDs of two issuers are two patients.
+std::string patient_of(const DicomItem& dataset) {
+  return dataset.text(DCM_PatientID).value_or("") + "\\" + dataset.text(DCM_IssuerOfPatientID).value_or("");
+}
+
+// A read-out of the dataset, else of its first exposure that has it.
+std::optional<double> read_out(const DicomItem& dataset, const DcmTagKey& tag) {
+  if (const auto value = dataset.number(tag)) return value;
+  for (const DicomItem& exposure : dataset.items(DCM_ExposureSequence))
+    if (const auto value = exposure.number(tag)) return value;
+  return std::nullopt;
+}
+
+StudyFiles::Image xray(const fs::path& path, const DicomItem& dataset) {
+  RtImage timed;
+  read_acquisition_time(dataset, timed);
+  return {.file = path,
+          .patient = patient_of(dataset),
+          .sop_instance_uid = dataset.required_text(DCM_SOPInstanceUID),
+          .plan_uid = first_reference(dataset, DCM_ReferencedRTPlanSequence),
+          .label = dataset.text(DCM_RTImageLabel).value_or(""),
+          .at_s = acquisition_seconds(timed),
+          .acquired = acquired(timed),
+          .table = read_table_read_outs([&](const DcmTagKey& tag) { return read_out(dataset, tag); })};
+}
+
+void add_ct_slice(const fs::path& path, const DicomItem& dataset, StudyFiles& files) {
+  const auto type = dataset.texts(DCM_ImageType);
+  if (type.size() > 2 && type[2] == "LOCALIZER") {
+    files.left_aside.push_back(fmt::format("{}: a CT localizer", path.string()));
+    return;
+  }
+  files.cts.push_back({.patient = patient_of(dataset),
+                       .series_instance_uid = dataset.required_text(DCM_SeriesInstanceUID),
+                       .frame_of_reference_uid = dataset.text(DCM_FrameOfReferenceUID).value_or(""),
+                       .files = {path},
+                       .sop_instance_uids = {dataset.required_text(DCM_SOPInstanceUID)}});
+}
+
+bool is_other_xray(const std::string& sop_class) {
+  return sop_class == UID_ComputedRadiographyImageStorage || sop_class == UID_DigitalXRayImageStorageForPresentation ||
+         sop_class == UID_DigitalXRayImageStorageForProcessing || sop_class == UID_XRayAngiographicImageStorage ||
+         sop_class == UID_XRayRadiofluoroscopicImageStorage;
+}
+
+// Where one kind of part was looked for, for a message: what was named for it, else the study.
+std::string searched(const std::vector<fs::path>& named, const fs::path& study) {
+  if (!named.empty()) return "searched " + named.front().string() + (named.size() > 1 ? " and others" : "");
+  return study.empty() ? "no study folder was given" : "searched " + study.string();
+}
+
+// A file that cannot be read may be a slice or a view: what is left would be another study.
+StudyFiles scan_readable(const std::vector<fs::path>& paths) {
+  StudyFiles files = scan_study(paths);
+  if (!files.unreadable.empty()) throw Error(files.unreadable.front());
+  return files;
+}
+
+// The plan that all images with a reference refer to, or the only one there is; nothing if there is none.
+const StudyFiles::Plan* choose_plan(const StudyFiles& files, bool was_named) {
+  if (files.plans.empty()) return nullptr;
+  if (files.plans.size() == 1) return &files.plans.front();
+  std::vector<const StudyFiles::Plan*> referred;
+  for (const StudyFiles::Plan& plan : files.plans)
+    if (std::ranges::find(files.images, plan.sop_instance_uid, &StudyFiles::Image::plan_uid) != files.images.end())
+      referred.push_back(&plan);
+  if (referred.size() == 1) return referred.front();
+  std::string list;
+  for (const StudyFiles::Plan& plan : files.plans) list += "\n       " + plan.file.string();
+  throw Error(
+      fmt::format("{} RT Plans {}, and the X-rays do not tell which one is meant:{}\n       Name the plan: --plan FILE",
+                  files.plans.size(), was_named ? "named" : "found", list));
+}
+
+// The CT in whose frame of reference the plan was made; of several, the one its structure set was drawn on.
+const StudyFiles::Ct& choose_ct(const StudyFiles& files, const StudyFiles::Plan* plan) {
+  if (files.cts.size() == 1) return files.cts.front();
+  std::vector<const StudyFiles::Ct*> candidates;
+  for (const StudyFiles::Ct& ct : files.cts)
+    if (plan == nullptr || ct.frame_of_reference_uid == plan->frame_of_reference_uid) candidates.push_back(&ct);
+  if (candidates.size() > 1 && plan != nullptr)
+    for (const StudyFiles::Structures& structures : files.structures)
+      if (structures.sop_instance_uid == plan->structure_set_uid)
+        std::erase_if(candidates,
+                      [&](const auto* ct) { return !structures.ct_series_uids.contains(ct->series_instance_uid); });
+  if (candidates.size() == 1) return *candidates.front();
+  std::string list;
+  for (const StudyFiles::Ct& ct : files.cts)
+    list += fmt::format("\n       {} slices, series {}, first file {}", ct.files.size(), ct.series_instance_uid,
+                        ct.files.front().string());
+  throw Error(fmt::format("{} CT series found, and {}:{}\n       Name the planning CT: --ct FOLDER", files.cts.size(),
+                          candidates.empty() ? "none is in the plan's frame of reference"
+                                             : "the plan does not tell which one it was made on",
+                          list));
+}
+
+// Whether a structure set was drawn on the CT. One that names no images may have been, if it is in the CT's frame.
+bool is_drawn_on(const StudyFiles::Ct& ct, const StudyFiles::Structures& structures) {
+  return structures.ct_series_uids.empty() ? structures.frame_of_reference_uids.contains(ct.frame_of_reference_uid)
+                                           : structures.ct_series_uids.contains(ct.series_instance_uid);
+}
+
+// The structure set that the plan refers to, else all drawn on the CT; copies of one count once.
+std::vector<const StudyFiles::Structures*> candidates_of(const std::vector<StudyFiles::Structures>& all,
+                                                         const StudyFiles::Plan* plan, const StudyFiles::Ct& ct) {
+  std::vector<const StudyFiles::Structures*> candidates;
+  const auto add_where = [&](auto&& is_candidate) {
+    for (const StudyFiles::Structures& structures : all)
+      if (is_candidate(structures) && std::ranges::none_of(candidates, [&](const auto* earlier) {
+            return earlier->sop_instance_uid == structures.sop_instance_uid;
+          }))
+        candidates.push_back(&structures);
+  };
+  if (plan != nullptr)
+    add_where([&](const auto& structures) { return structures.sop_instance_uid == plan->structure_set_uid; });
+  if (candidates.empty()) add_where([&](const auto& structures) { return is_drawn_on(ct, structures); });
+  return candidates;
+}
+
+void choose_structures(const std::vector<StudyFiles::Structures>& all, const StudyFiles::Plan* plan,
+                       const StudyFiles::Ct& ct, StudyParts& parts) {
+  const auto candidates = candidates_of(all, plan, ct);
+  if (candidates.size() == 1) parts.structures = candidates.front()->file;
+  for (const StudyFiles::Structures& structures : all) {
+    if (structures.file == parts.structures) continue;
+    std::string reason = "an RT Structure Set that was not drawn on the CT";
+    if (candidates.size() == 1 && structures.sop_instance_uid == candidates.front()->sop_instance_uid)
+      reason = fmt::format("the same RT Structure Set as {}", parts.structures->string());
+    else if (candidates.size() == 1 && is_drawn_on(ct, structures))
+      reason = "an RT Structure Set that the plan does not refer to";
+    else if (is_drawn_on(ct, structures))
+      reason = fmt::format("one of {} RT Structure Sets drawn on the CT; name the one meant: --structures FILE",
+                           candidates.size());
+    parts.left_aside.push_back(fmt::format("{}: {}", structures.file.string(), reason));
+  }
+}
+
+// A structure set that a person named; those found in the folder are others.
+void take_named_structures(const fs::path& named, const std::vector<StudyFiles::Structures>& found, StudyParts& parts) {
+  const std::vector<StudyFiles::Structures> structures = scan_readable({named}).structures;
+  if (structures.size() != 1)
+    throw Error(fmt::format("{}: holds {} RT Structure Sets, expected one.\n       Name the file: --structures FILE",
+                            named.string(), structures.empty() ? "no" : fmt::format("{}", structures.size())));
+  parts.structures = structures.front().file;
+  for (const StudyFiles::Structures& other : found)
+    if (other.sop_instance_uid != structures.front().sop_instance_uid)
+      parts.left_aside.push_back(fmt::format("{}: an RT Structure Set that was not named", other.file.string()));
+}
+
+// The parts among scanned files, of which a person may have named some.
+StudyParts chosen(StudyFiles files, std::vector<StudyFiles::Plan> other_plans, const NamedParts& named) {
+  for (const StudyFiles::Image& xray : files.other_xrays) {
+    if (named.takes_other_xrays)
+      files.images.push_back(xray);
+    else
+      files.left_aside.push_back(
+          fmt::format("{}: an X-ray that is no RT Image; a machine profile can supply its geometry: --machine FILE",
+                      xray.file.string()));
+  }
+  if (files.cts.empty())
+    throw Error(
+        fmt::format("no CT series found ({}).\n       Name its folder: --ct FOLDER", searched(named.ct, named.study)));
+  if (files.images.empty())
+    throw Error(fmt::format("no RT Image found ({}).\n       {}", searched(named.images, named.study),
+                            files.other_xrays.empty() ? "Name the X-rays: --image FILE"
+                                                      : "For X-rays of other classes their geometry is needed: "
+                                                        "--machine FILE"));
+  if (named.plan && files.plans.empty()) throw Error(fmt::format("{}: holds no RT Plan", named.plan->string()));
+
+  StudyParts parts{.left_aside = files.left_aside};
+  const StudyFiles::Plan* plan = choose_plan(files, named.plan.has_value());
+  const StudyFiles::Ct& ct = choose_ct(files, plan);
+  parts.ct = ct.files;
+  for (const StudyFiles::Ct& other : files.cts)
+    if (&other != &ct)
+      parts.left_aside.push_back(fmt::format("{} and {} more: CT series {}, not the one the plan was made on",
+                                             other.files.front().string(), other.files.size() - 1,
+                                             other.series_instance_uid));
+  if (plan != nullptr) {
+    parts.plan = plan->file;
+    for (const StudyFiles::Plan& other : files.plans)
+      if (&other != plan) other_plans.push_back(other);
+  }
+  std::erase_if(other_plans,
+                [&](const auto& other) { return plan && other.sop_instance_uid == plan->sop_instance_uid; });
+  for (const StudyFiles::Plan& other : other_plans)
+    parts.left_aside.push_back(fmt::format("{}: an RT Plan that {}", other.file.string(),
+                                           named.plan ? "was not named" : "no X-ray refers to"));
+  if (named.structures)
+    take_named_structures(*named.structures, files.structures, parts);
+  else
+    choose_structures(files.structures, plan, ct, parts);
+  // An image of another plan that lies here too belongs to that one; an image of an unknown plan is a matter for
+  // checks.
+  for (const StudyFiles::Image& image : files.images) {
+    const bool of_other =
+        std::ranges::find(other_plans, image.plan_uid, &StudyFiles::Plan::sop_instance_uid) != other_plans.end();
+    if (of_other && named.images.empty())
+      parts.left_aside.push_back(fmt::format("{}: an X-ray of another plan", image.file.string()));
+    else
+      parts.images.push_back(image.file);
+  }
+  if (parts.images.empty())
+    throw Error(fmt::format("no X-ray found refers to {} ({}).\n       Name the X-rays: --image FILE",
+                            parts.plan->string(), searched(named.images, named.study)));
+  return parts;
+}
+
+}  // namespace
+
+std::string patient_id_of(const std::string& patient) { return patient.substr(0, patient.find('\\')); }
+
+std::vector<fs::path> files_below(const std::vector<fs::path>& paths, const std::unordered_set<std::string>& but,
+                                  std::set<fs::path>* unsearchable) {
+  std::vector<fs::path> files;
+  const auto add = [&](const fs::path& file) {
+    if (!but.contains(file.native())) files.push_back(file);
+  };
+  for (const fs::path& path : paths) {
+    std::error_code error;
+    const auto status = fs::status(path, error);
+    if (!fs::exists(status)) throw Error(fmt::format("{}: no such file or folder", path.string()));
+    if (!fs::is_directory(status)) {
+      add(path);
+      continue;
+    }
+    for (auto entry = fs::recursive_directory_iterator(path, error); !error && entry != fs::end(entry);
+         entry.increment(error)) {
+      if (entry->is_directory() && ::access(entry->path().c_str(), R_OK | X_OK) != 0) {
+        if (unsearchable == nullptr)
+          throw Error(fmt::format("{}: cannot be searched: {}", entry->path().string(), std::strerror(errno)));
+        unsearchable->insert(entry->path());
+        entry.disable_recursion_pending();
+        continue;
+      }
+      if (!entry->path().filename().native().starts_with('.') && entry->is_regular_file()) add(entry->path());
+    }
+    if (error) throw Error(fmt::format("{}: cannot be searched: {}", path.string(), error.message()));
+  }
+  std::ranges::sort(files);
+  files.erase(std::unique(files.begin(), files.end()), files.end());
+  return files;
+}
+
+StudyFiles scan_file(const fs::path& path) {
+  StudyFiles files;
+  if (!begins_like_dicom(path)) {
+    files.left_aside.push_back(fmt::format("{}: not a DICOM file", path.string()));
+    return files;
+  }
+  const DicomFile file = DicomFile::read(path, DicomFile::Extent::kHeader);
+  const DicomItem dataset = file.dataset();
+  const std::string sop_class = dataset.text(DCM_SOPClassUID).value_or("");
+  if (sop_class == UID_CTImageStorage || sop_class == UID_EnhancedCTImageStorage ||
+      sop_class == UID_LegacyConvertedEnhancedCTImageStorage) {
+    add_ct_slice(path, dataset, files);
+  } else if (sop_class == UID_RTImageStorage) {
+    files.images.push_back(xray(path, dataset));
+  } else if (is_other_xray(sop_class)) {
+    files.other_xrays.push_back(xray(path, dataset));
+  } else if (sop_class == UID_RTPlanStorage || sop_class == UID_RTIonPlanStorage) {
+    files.plans.push_back({.file = path,
+                           .patient = patient_of(dataset),
+                           .sop_instance_uid = dataset.required_text(DCM_SOPInstanceUID),
+                           .frame_of_reference_uid = dataset.text(DCM_FrameOfReferenceUID).value_or(""),
+                           .structure_set_uid = first_reference(dataset, DCM_ReferencedStructureSetSequence)});
+  } else if (sop_class == UID_RTStructureSetStorage) {
+    DrawnOn drawn = drawn_on(dataset);
+    files.structures.push_back({.file = path,
+                                .patient = patient_of(dataset),
+                                .sop_instance_uid = dataset.required_text(DCM_SOPInstanceUID),
+                                .ct_series_uids = std::move(drawn.series_uids),
+                                .ct_sop_instance_uids = std::move(drawn.image_uids),
+                                .frame_of_reference_uids = drawn_in(dataset)});
+  } else {
+    files.left_aside.push_back(
+        fmt::format("{}: {}", path.string(), dcmFindNameOfUID(sop_class.c_str(), "an object of unknown class")));
+  }
+  return files;
+}
+
+void merge(StudyFiles from, StudyFiles& files) {
+  for (StudyFiles::Ct& ct : from.cts) {
+    const auto same = std::ranges::find(files.cts, ct.series_instance_uid, &StudyFiles::Ct::series_instance_uid);
+    if (same == files.cts.end()) {
+      files.cts.push_back(std::move(ct));
+      continue;
+    }
+    std::ranges::move(ct.files, std::back_inserter(same->files));
+    same->sop_instance_uids.merge(ct.sop_instance_uids);
+  }
+  const auto append = [&](auto member) { std::ranges::move(from.*member, std::back_inserter(files.*member)); };
+  append(&StudyFiles::plans);
+  append(&StudyFiles::images);
+  append(&StudyFiles::other_xrays);
+  append(&StudyFiles::structures);
+  append(&StudyFiles::left_aside);
+  append(&StudyFiles::unreadable);
+}
+
+StudyFiles scan_study(const std::vector<fs::path>& paths) {
+  StudyFiles files;
+  for (const fs::path& path : files_below(paths)) {
+    try {
+      merge(scan_file(path), files);
+    } catch (const Error& error) {
+      files.unreadable.emplace_back(error.what());
+    }
+  }
+  return files;
+}
+
+StudyParts find_parts(const NamedParts& named) {
+  StudyFiles files;
+  if (!named.study.empty()) files = scan_readable({named.study});
+  std::vector<StudyFiles::Plan> other_plans;  // a named plan makes those found in the folder others
+  if (!named.ct.empty()) files.cts = scan_readable(named.ct).cts;
+  if (!named.images.empty()) {
+    StudyFiles images = scan_readable(named.images);
+    std::swap(files.images, images.images);
+    std::swap(files.other_xrays, images.other_xrays);
+  }
+  if (named.plan) std::swap(other_plans, files.plans), files.plans = scan_readable({*named.plan}).plans;
+  return chosen(std::move(files), std::move(other_plans), named);
+}
+
+StudyParts choose_parts(const StudyFiles& files) { return chosen(files, {}, {}); }
+
+}  // namespace isoshift

@@ -1,0 +1,103 @@
+#include "base/output_folder.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <sstream>
+
+#include "base/error.h"
+#include "tests/support/temporary_folder.h"
+
+namespace isoshift {
+namespace {
+
+std::string content(const std::filesystem::path& path) {
+  std::ifstream file(path);
+  std::ostringstream text;
+  text << file.rdbuf();
+  return text.str();
+}
+
+int entries(const std::filesystem::path& folder) {
+  return static_cast<int>(std::distance(std::filesystem::directory_iterator(folder), {}));
+}
+
+TEST(OutputFolder, AppearsWhole) {
+  TemporaryFolder folder;
+  OutputFolder output(folder / "deep" / "out", false);
+  write_text(output.path() / "a.txt", "hello");
+  EXPECT_FALSE(std::filesystem::exists(folder / "deep" / "out"));
+  output.commit();
+  EXPECT_EQ(content(folder / "deep" / "out" / "a.txt"), "hello");
+  EXPECT_EQ(entries(folder / "deep"), 1);
+}
+
+TEST(OutputFolder, LeavesNothingBehindWithoutCommit) {
+  TemporaryFolder folder;
+  {
+    OutputFolder output(folder / "out", false);
+    write_text(output.path() / "a.txt", "hello");
+  }
+  EXPECT_EQ(entries(folder.path()), 0);
+}
+
+TEST(OutputFolder, RefusesAFolderThatHoldsSomething) {
+  TemporaryFolder folder;
+  std::ofstream(folder / "precious.txt") << "keep me";
+  EXPECT_THROW(OutputFolder(folder.path(), false), Error);
+  EXPECT_EQ(content(folder / "precious.txt"), "keep me");
+}
+
+TEST(OutputFolder, OverwritingReplacesAnEarlierOutputAsAWhole) {
+  TemporaryFolder folder;
+  {
+    OutputFolder earlier(folder / "out", false);
+    write_text(earlier.path() / "result.json", "old");
+    write_text(earlier.path() / "spatial_registration.dcm", "old");
+    earlier.commit();
+  }
+  OutputFolder output(folder / "out", true);
+  write_text(output.path() / "result.json", "new");
+  EXPECT_EQ(content(folder / "out" / "result.json"), "old");
+  output.commit();
+  EXPECT_EQ(content(folder / "out" / "result.json"), "new");
+  EXPECT_FALSE(std::filesystem::exists(folder / "out" / "spatial_registration.dcm"));
+  EXPECT_EQ(entries(folder.path()), 1);
+}
+
+TEST(OutputFolder, OverwritingSparesWhatItDidNotWrite) {
+  TemporaryFolder folder;
+  {
+    OutputFolder earlier(folder / "out", false);
+    write_text(earlier.path() / "result.json", "old");
+    earlier.commit();
+  }
+  std::ofstream(folder / "out" / "note.txt") << "mine";
+  try {
+    OutputFolder(folder / "out", true);
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_THAT(error.what(), testing::HasSubstr("note.txt: was not written by isoshift"));
+  }
+  EXPECT_EQ(content(folder / "out" / "note.txt"), "mine");
+  EXPECT_EQ(content(folder / "out" / "result.json"), "old");
+}
+
+TEST(OutputFolder, DoesNotReplaceWhatAppearedMeanwhile) {
+  TemporaryFolder folder;
+  OutputFolder output(folder / "out", false);
+  std::filesystem::create_directory(folder / "out");
+  std::ofstream(folder / "out" / "note.txt") << "mine";
+  EXPECT_THROW(output.commit(), Error);
+  EXPECT_EQ(content(folder / "out" / "note.txt"), "mine");
+}
+
+TEST(OutputFolder, TakesTheParentsItMadeAwayAgain) {
+  TemporaryFolder folder;
+  { OutputFolder output(folder / "a" / "b" / "out", false); }
+  EXPECT_EQ(entries(folder.path()), 0);
+}
+
+}  // namespace
+}  // namespace isoshift

@@ -1,0 +1,196 @@
+// Every decoder against the same pixels uncompressed; the compressed copies are made by DCMTK's and GDCM's tools.
+
+#include "io/dicom/decode.h"
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstring>
+#include <fstream>
+
+#include "base/error.h"
+#include "base/output_folder.h"
+#include "io/dicom/decoder_process.h"
+#include "tests/support/command.h"
+#include "tests/support/small_study.h"
+
+namespace isoshift {
+namespace {
+
+std::string read_text(const std::filesystem::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+class DecodeTest : public testing::Test {
+ protected:
+  std::vector<std::int32_t> pixels_of(const std::filesystem::path& path) {
+    const DicomFile file = DicomFile::read(path, DicomFile::Extent::kWhole);
+    return decode_frame(file, pixel_format(file.dataset()), 0);
+  }
+
+  // The slice compressed by `command`, to which source and target are appended.
+  std::filesystem::path compressed_by(const std::string& command) {
+    const std::filesystem::path target = study_.path() / "compressed.dcm";
+    const CommandOutcome made =
+        run_shell(fmt::format("{} {} {}", command, study_.ct_slice(18).string(), target.string()));
+    EXPECT_EQ(made.exit_status, 0) << made.out;
+    return target;
+  }
+
+  SmallStudy study_;
+};
+
+TEST_F(DecodeTest, LosslessSyntaxesGiveTheSamePixels) {
+  const std::vector<std::int32_t> expected = pixels_of(study_.ct_slice(18));
+  EXPECT_GT(*std::ranges::max_element(expected), 500);  // there is bone in it
+  for (const char* command :
+       {"dcmcrle", "dcmcjpeg +e1", "dcmcjpeg +el", "dcmcjpls +el", "dcmconv +td", "dcmconv +ti", "dcmconv +tb"}) {
+    EXPECT_EQ(pixels_of(compressed_by(command)), expected) << command;
+    std::filesystem::remove(study_.path() / "compressed.dcm");
+  }
+}
+
+TEST_F(DecodeTest, BaselineJpegGivesNearlyTheSamePixels) {
+  // Baseline holds 8 bits: an image of 8 bits, and a lossy one.
+  edit(study_.ct_slice(18), [](DicomItem d) {
+    std::vector<std::uint16_t> ramp;
+    const auto columns = static_cast<int>(d.required_number(DCM_Columns));
+    for (int row = 0; row < d.required_number(DCM_Rows); ++row)
+      for (int column = 0; column < columns; ++column)
+        ramp.push_back(static_cast<std::uint16_t>(40 + 2 * column + row));
+    d.put(DCM_BitsStored, 8);
+    d.put(DCM_HighBit, 7);
+    d.put(DCM_PixelRepresentation, 0);
+    d.put_pixels(ramp);
+  });
+  const std::vector<std::int32_t> expected = pixels_of(study_.ct_slice(18));
+  const std::vector<std::int32_t> found = pixels_of(compressed_by("dcmcjpeg +eb +q 100"));
+  ASSERT_EQ(found.size(), expected.size());
+  // dcmcjpeg stretches the values to its 8 bits; what counts is that the ramp is still one.
+  double sum_xy = 0, sum_x = 0, sum_y = 0, sum_xx = 0, sum_yy = 0;
+  const auto n = static_cast<double>(found.size());
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    sum_x += expected[i], sum_y += found[i], sum_xy += static_cast<double>(expected[i]) * found[i];
+    sum_xx += static_cast<double>(expected[i]) * expected[i], sum_yy += static_cast<double>(found[i]) * found[i];
+  }
+  const double correlation =
+      (sum_xy - sum_x * sum_y / n) / std::sqrt((sum_xx - sum_x * sum_x / n) * (sum_yy - sum_y * sum_y / n));
+  EXPECT_GT(correlation, 0.9999);
+}
+
+TEST_F(DecodeTest, Jpeg2000IsRefusedWithTheWayAround) {
+  const std::filesystem::path compressed = compressed_by("gdcmconv --j2k");
+  try {
+    pixels_of(compressed);
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_EQ(std::string(error.what()),
+              fmt::format("{}: pixel data in transfer syntax JPEG 2000 (Lossless only) cannot be decoded.\n"
+                          "       Convert the file first: gdcmconv --raw IN.dcm OUT.dcm (Debian package libgdcm-tools)",
+                          compressed.string()));
+  }
+  // And the way around works.
+  const std::filesystem::path converted = study_.path() / "converted.dcm";
+  EXPECT_EQ(run_shell(fmt::format("gdcmconv --raw {} {}", compressed.string(), converted.string())).exit_status, 0);
+  EXPECT_EQ(pixels_of(converted), pixels_of(study_.ct_slice(18)));
+}
+
+TEST_F(DecodeTest, FormatsThatAreNoneAreNamed) {
+  const auto error_of = [&](const DcmTagKey& tag, double value) -> std::string {
+    edit(study_.ct_slice(1), [&](DicomItem d) { d.put(tag, value); });
+    try {
+      pixels_of(study_.ct_slice(1));
+    } catch (const Error& error) {
+      return error.what();
+    }
+    return "no error";
+  };
+  EXPECT_THAT(error_of(DCM_HighBit, 12), testing::HasSubstr("HighBit (0028,0102) is 12, expected 15"));
+  EXPECT_THAT(error_of(DCM_SamplesPerPixel, 3), testing::HasSubstr("SamplesPerPixel (0028,0002) is 3, expected 1"));
+  EXPECT_THAT(error_of(DCM_Rows, 9000), testing::HasSubstr("Rows (0028,0010) is 9000, expected 1 to 8192"));
+}
+
+// Other programs in the decoder's place, as a hostile file may make of it.
+class DecoderThatFailsTest : public DecodeTest {
+ protected:
+  ~DecoderThatFailsTest() override { use_decoder(ISOSHIFT_PROGRAM); }
+
+  std::string error_with_decoder(const std::string& script) {
+    const std::filesystem::path program = study_.path() / "decoder";
+    std::filesystem::remove(program);
+    write_text(program, "#!/bin/sh\n" + script + "\n");
+    std::filesystem::permissions(program, std::filesystem::perms::owner_all);
+    use_decoder(program);
+    try {
+      frame_from_decoder(compressed_, 0, 1);
+    } catch (const Error& error) {
+      return error.what();
+    }
+    return "no error";
+  }
+
+  std::filesystem::path compressed_ = compressed_by("dcmcjpls +el");
+};
+
+TEST_F(DecoderThatFailsTest, OneThatDiesIsAnErrorThatNamesTheFile) {
+  EXPECT_THAT(error_with_decoder("kill -SEGV $$"),
+              testing::AllOf(testing::StartsWith(compressed_.string()),
+                             testing::HasSubstr("the decoder ended with signal 11")));
+  EXPECT_THAT(error_with_decoder("exit 3"), testing::HasSubstr("the decoder ended with status 3"));
+}
+
+TEST_F(DecoderThatFailsTest, OneThatStallsIsEnded) {
+  EXPECT_THAT(error_with_decoder("exec sleep 60"), testing::HasSubstr("were not decoded within 10 s"));
+}
+
+TEST_F(DecoderThatFailsTest, AnAnswerOfAnotherLengthIsRefused) {
+  // is_error, padding, and a length of 2^40.
+  EXPECT_THAT(error_with_decoder("printf '\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\1\\0\\0'; exec sleep 5"),
+              testing::HasSubstr("was decoded to 1099511627776 bytes, expected 1"));
+}
+
+// What the stream says of its size counts, not only what the header says.
+TEST_F(DecodeTest, AStreamOfAnotherSizeThanTheHeaderIsRefused) {
+  for (const char* command : {"dcmcjpeg +e1", "dcmcjpls +el"}) {
+    const std::filesystem::path compressed = compressed_by(command);
+    std::string bytes = read_text(compressed);
+    std::filesystem::remove(compressed);
+    const auto multiply = [&](std::string_view element, double factor) {
+      const std::size_t at = bytes.find(element) + element.size();
+      std::uint16_t value = 0;
+      std::memcpy(&value, bytes.data() + at, 2);
+      value = static_cast<std::uint16_t>(value * factor);
+      std::memcpy(bytes.data() + at, &value, 2);
+    };
+    multiply({"\x28\x00\x10\x00US\x02\x00", 8}, 0.5);  // Rows
+    multiply({"\x28\x00\x11\x00US\x02\x00", 8}, 2.0);  // Columns
+    write_text(compressed, bytes);
+    EXPECT_THROW(
+        {
+          try {
+            pixels_of(compressed);
+          } catch (const Error& error) {
+            EXPECT_THAT(error.what(), testing::HasSubstr("Rows (0028,0010) say"));
+            throw;
+          }
+        },
+        Error)
+        << command;
+  }
+}
+
+TEST_F(DecodeTest, ADamagedFileIsRefusedAndTheNextOneRead) {
+  const std::vector<std::int32_t> expected = pixels_of(study_.ct_slice(18));
+  const std::filesystem::path compressed = compressed_by("dcmcjpls +el");
+  std::string bytes = read_text(compressed);
+  const std::filesystem::path damaged = study_.path() / "damaged.dcm";
+  write_text(damaged, bytes.replace(bytes.size() - 600, 400, 400, '\xFF'));
+  EXPECT_THROW(pixels_of(damaged), Error);
+  EXPECT_EQ(pixels_of(compressed), expected);
+}
+
+}  // namespace
+}  // namespace isoshift

@@ -1,0 +1,102 @@
+#include "io/dicom/rt_plan.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "base/error.h"
+#include "tests/support/pose_near.h"
+#include "tests/support/small_study.h"
+
+namespace isoshift {
+namespace {
+
+using testing::HasSubstr;
+
+class RtPlanTest : public testing::Test {
+ protected:
+  void change_beam(int number, const std::function<void(DicomItem control_point)>& change) {
+    edit(study_.plan(), [&](DicomItem d) {
+      change(d.items(DCM_BeamSequence)[static_cast<std::size_t>(number - 1)].items(DCM_ControlPointSequence).front());
+    });
+  }
+
+  std::string error_of(const std::function<void(const RtPlan&)>& use) {
+    try {
+      use(read_rt_plan(study_.plan()));
+    } catch (const Error& error) {
+      return error.what();
+    }
+    return "no error";
+  }
+
+  SmallStudy study_;
+};
+
+TEST_F(RtPlanTest, ReadsIsocenterPositionAndCouchOfEveryBeam) {
+  const RtPlan plan = read_rt_plan(study_.plan());
+  ASSERT_EQ(plan.beams.size(), 2U);
+  EXPECT_EQ(plan.beams[1].name, "KV_G090");
+  EXPECT_EQ(plan.beams[1].patient_position, "HFS");
+  EXPECT_EQ(plan.beams[1].support_angle_deg, 0.0);
+  EXPECT_THAT(common_isocenter(plan, plan.beams), VectorNear(Eigen::Vector3d(-12.5, 38, -410), 1e-12));
+}
+
+TEST_F(RtPlanTest, DifferentIsocentersAreRefusedUnlessTheBeamIsNamed) {
+  change_beam(2, [](DicomItem point) { point.put(DCM_IsocenterPosition, "-12.5\\48\\-410"); });
+  EXPECT_THAT(
+      error_of([](const RtPlan& plan) { common_isocenter(plan, plan.beams); }),
+      HasSubstr("beams have different isocenters (IsocenterPosition (300A,012C)): (-12.5, 38, -410) and (-12.5, 48, "
+                "-410) mm.\n       Say which one the patient was set up to: --isocenter X,Y,Z"));
+  const RtPlan plan = read_rt_plan(study_.plan());
+  const std::array second = {2};
+  EXPECT_THAT(common_isocenter(plan, selected_beams(plan, second)),
+              VectorNear(Eigen::Vector3d(-12.5, 48, -410), 1e-12));
+}
+
+TEST_F(RtPlanTest, AMissingIsocenterIsNamedWithItsSwitch) {
+  change_beam(1, [](DicomItem point) { point.put(DCM_IsocenterPosition, ""); });
+  EXPECT_EQ(error_of([](const RtPlan& plan) { common_isocenter(plan, plan.beams); }),
+            "no error");  // the other beam has it
+  change_beam(2, [](DicomItem point) { point.erase(DCM_IsocenterPosition); });
+  EXPECT_THAT(error_of([](const RtPlan& plan) { common_isocenter(plan, plan.beams); }),
+              HasSubstr("Supply it: --isocenter X,Y,Z"));
+}
+
+TEST_F(RtPlanTest, ABeamThatIsNotThereIsNamed) {
+  EXPECT_THAT(error_of([](const RtPlan& plan) { selected_beams(plan, std::array{7}); }),
+              HasSubstr("has no beam 7, to which an image refers"));
+}
+
+// An ion plan holds the same under other names.
+TEST_F(RtPlanTest, IonPlansAreReadAndChairsRefused) {
+  edit(study_.plan(), [](DicomItem d) {
+    d.put(DCM_SOPClassUID, "1.2.840.10008.5.1.4.1.1.481.8");
+    DicomItem beam = d.append_item(DCM_IonBeamSequence);
+    beam.put(DCM_BeamNumber, 1);
+    beam.put(DCM_PatientSupportType, "TABLE");
+    beam.put(DCM_ReferencedPatientSetupNumber, 1);
+    beam.append_item(DCM_IonControlPointSequence).put(DCM_IsocenterPosition, "1\\2\\3");
+    d.erase(DCM_BeamSequence);
+  });
+  const RtPlan plan = read_rt_plan(study_.plan());
+  EXPECT_THAT(common_isocenter(plan, plan.beams), VectorNear(Eigen::Vector3d(1, 2, 3), 1e-12));
+  EXPECT_EQ(plan.beams.front().patient_position, "HFS");
+  edit(study_.plan(), [](DicomItem d) { d.items(DCM_IonBeamSequence).front().put(DCM_PatientSupportType, "CHAIR"); });
+  EXPECT_THAT(error_of([](const RtPlan&) {}), HasSubstr("PatientSupportType (300A,0350) is CHAIR, expected TABLE"));
+}
+
+TEST_F(RtPlanTest, ASetupDisplacementAndAMissingApprovalAreWarnedOf) {
+  edit(study_.plan(), [](DicomItem d) {
+    d.put(DCM_ApprovalStatus, "UNAPPROVED");
+    DicomItem setup = d.items(DCM_PatientSetupSequence).front();
+    setup.put(DCM_TableTopVerticalSetupDisplacement, -12.0);
+    d.append_item(DCM_PatientSetupSequence).put(DCM_PatientSetupNumber, 77);  // of no beam
+  });
+  const CommandOutcome outcome = register_study(study_);
+  EXPECT_NE(outcome.exit_status, 1) << outcome.err;
+  EXPECT_THAT(outcome.err, HasSubstr("of the plan moves the table by (-12.0, 0.0, 0.0) mm"));
+  EXPECT_THAT(outcome.err, HasSubstr("the plan is not approved (ApprovalStatus (300E,0002) is \"UNAPPROVED\")"));
+}
+
+}  // namespace
+}  // namespace isoshift

@@ -1,0 +1,165 @@
+#include "io/objects/registration_check.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "base/error.h"
+#include "geometry/rotation.h"
+#include "io/objects/spatial_registration.h"
+#include "tests/support/small_study.h"
+
+namespace isoshift {
+namespace {
+
+using testing::HasSubstr;
+
+// An object as isoshift writes it, to be spoiled.
+class RegistrationCheckTest : public testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    static const SmallStudy small;
+    StudyRequest request;
+    request.parts.study = small.path();
+    Notes notes;
+    study_ = new Study(load_study(request, notes, {}));
+  }
+  static void TearDownTestSuite() { delete study_; }
+
+  RegistrationCheckTest() {
+    Notes notes;
+    Eigen::Isometry3d actual = study_->planned_room_from_patient;
+    actual.pretranslate(Eigen::Vector3d(3.0, -2.0, 1.5));
+    actual.prerotate(Eigen::AngleAxisd(rad_from_deg(2.0), Eigen::Vector3d(1, 2, 3).normalized()));
+    write_spatial_registration(*study_, actual, {}, path_, notes);
+  }
+
+  static DicomItem item(const DicomItem& dataset, std::size_t n) { return dataset.items(DCM_RegistrationSequence)[n]; }
+  static DicomItem matrix(const DicomItem& dataset, std::size_t n) {
+    return item(dataset, n).items(DCM_MatrixRegistrationSequence)[0].items(DCM_MatrixSequence)[0];
+  }
+  static void put_matrix(const DicomItem& dataset, std::size_t n, const Eigen::Matrix4d& values) {
+    const Eigen::Matrix<double, 4, 4, Eigen::RowMajor> rows = values;
+    matrix(dataset, n).put(DCM_FrameOfReferenceTransformationMatrix, std::span(rows.data(), 16));
+  }
+  Eigen::Matrix4d result() const { return check_registration(path_).registered_from_source->matrix(); }
+
+  // Spoils the object and expects one error, and nothing else, that holds `words`.
+  void expect_error(const std::string& words, const std::function<void(DicomItem)>& spoil) {
+    edit(path_, spoil);
+    const CheckedRegistration checked = check_registration(path_);
+    std::vector<std::string> errors;
+    for (const RegistrationFinding& finding : checked.findings)
+      if (finding.is_error) errors.push_back(finding.text);
+    EXPECT_THAT(errors, testing::ElementsAre(HasSubstr(words)));
+    EXPECT_TRUE(checked.has_errors());
+  }
+
+  static Study* study_;
+  TemporaryFolder folder_;
+  std::filesystem::path path_ = folder_ / "registration.dcm";
+};
+Study* RegistrationCheckTest::study_ = nullptr;
+
+TEST_F(RegistrationCheckTest, OursPassesAndSaysItsMatrix) {
+  const CheckedRegistration checked = check_registration(path_);
+  EXPECT_TRUE(checked.findings.empty()) << checked.findings.front().text;
+  EXPECT_EQ(checked.registered_frame_uid, study_->ct->frame_of_reference_uid);
+  EXPECT_NE(checked.source_frame_uid, checked.registered_frame_uid);
+  const SpatialRegistration read = read_spatial_registration(path_);
+  EXPECT_EQ(checked.registered_from_source->matrix(), read.items[1].registered_from_source.matrix());
+}
+
+TEST_F(RegistrationCheckTest, AScaledRigidMatrixIsFound) {
+  Eigen::Matrix4d scaled = result();
+  scaled.topLeftCorner<3, 3>() *= 1.3;
+  expect_error("item 2: the matrix is not rigid: its columns have the lengths 1.3, 1.3, 1.3",
+               [&](DicomItem d) { put_matrix(d, 1, scaled); });
+  EXPECT_FALSE(as_rigid(*check_registration(path_).registered_from_source));
+}
+
+TEST_F(RegistrationCheckTest, AMirroringMatrixIsFound) {
+  Eigen::Matrix4d mirrored = result();
+  mirrored.col(0) *= -1.0;
+  expect_error("the matrix mirrors", [&](DicomItem d) { put_matrix(d, 1, mirrored); });
+}
+
+TEST_F(RegistrationCheckTest, AMatrixThatMovesThePlaneAtInfinityIsFound) {
+  Eigen::Matrix4d projective = result();
+  projective(3, 0) = 0.1;
+  expect_error("the last row", [&](DicomItem d) { put_matrix(d, 1, projective); });
+}
+
+TEST_F(RegistrationCheckTest, TwelveNumbersAreNoMatrix) {
+  expect_error("has 12 values, expected 16", [&](DicomItem d) {
+    matrix(d, 1).put(DCM_FrameOfReferenceTransformationMatrix, R"(1\0\0\1\0\1\0\2\0\0\1\3)");
+  });
+}
+
+// A number cut to 16 characters may lose its exponent (docs/dicom.md, REG-DS rule).
+TEST_F(RegistrationCheckTest, ACutNumberIsNamed) {
+  expect_error("holds \"-4.909883469673e\", which is no finite number", [&](DicomItem d) {
+    matrix(d, 1).put(DCM_FrameOfReferenceTransformationMatrix, R"(1\-4.909883469673e\0\0\0\1\0\0\0\0\1\0\0\0\0\1)");
+  });
+}
+
+TEST_F(RegistrationCheckTest, AFirstItemThatIsNotTheIdentityIsFound) {
+  expect_error("item 1: is not the registered frame with an exact identity", [&](DicomItem d) {
+    const std::string source = item(d, 1).text(DCM_FrameOfReferenceUID).value();
+    const Eigen::Matrix4d moved = result();
+    put_matrix(d, 1, Eigen::Matrix4d::Identity());
+    put_matrix(d, 0, moved);
+    item(d, 1).put(DCM_FrameOfReferenceUID, study_->ct->frame_of_reference_uid);
+    item(d, 0).put(DCM_FrameOfReferenceUID, source);
+  });
+}
+
+TEST_F(RegistrationCheckTest, AFrameMovedAgainstItselfIsFound) {
+  expect_error("item 2: moves the registered frame against itself",
+               [](DicomItem d) { item(d, 1).put(DCM_FrameOfReferenceUID, study_->ct->frame_of_reference_uid); });
+}
+
+TEST_F(RegistrationCheckTest, SeveralMatricesInAnItemAreComposedAndFound) {
+  const Eigen::Matrix4d once = result();
+  expect_error("SlicerRT multiplies them the other way", [&](DicomItem d) {
+    DicomItem more = item(d, 1).items(DCM_MatrixRegistrationSequence)[0].append_item(DCM_MatrixSequence);
+    const std::array<double, 16> shift = {1, 0, 0, 10, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
+    more.put(DCM_FrameOfReferenceTransformationMatrix, shift);
+    more.put(DCM_FrameOfReferenceTransformationMatrixType, "RIGID");
+  });
+  EXPECT_NEAR(result()(0, 3), once(0, 3) + 10.0, 1e-9);  // the first one is applied first
+}
+
+TEST_F(RegistrationCheckTest, AMissingReferenceIsNamed) {
+  const std::string lost = study_->ct->sop_instance_uids.front();
+  expect_error("the first one " + lost, [&](DicomItem d) {
+    for (const DicomItem& series : d.items(DCM_ReferencedSeriesSequence))
+      for (DicomItem instance : series.items(DCM_ReferencedInstanceSequence))
+        if (instance.text(DCM_ReferencedSOPInstanceUID) == lost) instance.put(DCM_ReferencedSOPInstanceUID, "1.2.3");
+  });
+}
+
+TEST_F(RegistrationCheckTest, MissingAndMalformedAttributesAreNamed) {
+  expect_error("ContentLabel (0070,0080) is missing", [](DicomItem d) { d.erase(DCM_ContentLabel); });
+  edit(path_, [](DicomItem d) { d.put(DCM_ContentLabel, "SETUP"); });
+  expect_error("\"1.02.3\", which is no UID", [](DicomItem d) { d.put(DCM_SOPInstanceUID, "1.02.3"); });
+  edit(path_, [](DicomItem d) { d.put(DCM_SOPInstanceUID, "1.2.3"); });
+  expect_error("expected RIGID",
+               [](DicomItem d) { matrix(d, 1).put(DCM_FrameOfReferenceTransformationMatrixType, "AFFINE"); });
+}
+
+TEST_F(RegistrationCheckTest, OtherObjectsAreRefused) { EXPECT_THROW(check_registration(study_->plan->path), Error); }
+
+TEST(RegistrationDifference, IsWhereTheIsocentersLieAndHowTheyAreTurned) {
+  Eigen::Isometry3d a = Eigen::Isometry3d::Identity(), b = a;
+  a.translate(Eigen::Vector3d(100.0, -50.0, 300.0));
+  b.translate(Eigen::Vector3d(101.0, -52.0, 302.0));
+  b.rotate(Eigen::AngleAxisd(rad_from_deg(2.0), Eigen::Vector3d::UnitZ()));
+  const RegistrationDifference difference = difference_between(a, b);
+  EXPECT_NEAR(difference.translation_mm, 3.0, 1e-9);
+  EXPECT_NEAR(difference.angle_rad, rad_from_deg(2.0), 1e-9);
+  EXPECT_FALSE(difference.other_is_inverted);
+  EXPECT_TRUE(difference_between(a, b.inverse()).other_is_inverted);
+}
+
+}  // namespace
+}  // namespace isoshift

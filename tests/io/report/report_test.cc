@@ -1,0 +1,504 @@
+// What reports say, in every format: the same numbers, rounded once, and no shift where there is none.
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <fstream>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <random>
+#include <regex>
+
+#include "base/error.h"
+#include "base/output_folder.h"
+#include "io/report/canvas.h"
+#include "io/report/formats.h"
+#include "io/report/result_folder.h"
+#include "io/report/rounding.h"
+#include "tests/support/command.h"
+#include "tests/support/temporary_folder.h"
+
+namespace isoshift {
+namespace {
+
+using testing::HasSubstr;
+using testing::Not;
+
+// A view of another size than its picture.
+SetupReport::View view_with_picture(const std::string& label) {
+  SetupReport::View view{.label = label,
+                         .sop_class_uid = "1.2.840.10008.5.1.4.1.1.481.1",
+                         .sop_instance_uid = "1.2.3.4",
+                         .sha256 = std::string(64, 'a'),
+                         .gantry_deg = 45,
+                         .columns = 120,
+                         .rows = 90};
+  ViewPicture& picture = view.picture;
+  for (auto* image : {&picture.xray, &picture.drr_planned, &picture.drr_found}) {
+    *image = Image<std::uint8_t>(60, 45, 30);
+    for (int row = 10; row < 30; ++row)
+      for (int column = 15; column < 40; ++column) image->at(column, row) = 200;
+  }
+  picture.isocenter_px = {29.5, 22.0};
+  picture.pixels_per_mm = 0.4;
+  picture.directions = {"R", "L", "H", "F"};
+  picture.field = {{{1, 1}, {58, 1}, {58, 43}, {1, 43}}};
+  picture.structures = {
+      {.name = "PTV", .planned = {{{20, 20}, {30, 20}, {25, 30}}}, .found = {{{21, 20}, {31, 20}, {26, 30}}}}};
+  return view;
+}
+
+// head-oblique at its truth, the worked example of docs/conventions.md.
+SetupReport oblique_report(Verdict verdict) {
+  SetupReport report;
+  report.made_on = "2026-03-01T10:16:02+0100";
+  report.version = "0.1.0";
+  report.commit = "abc";
+  report.verdict = verdict;
+  report.reasons.clear();
+  report.identity = {.character_set = "ISO_IR 192",
+                     .patient_id = "ID-1",
+                     .patient_name = "Example",
+                     .study_instance_uid = "1.2.3",
+                     .study_date = "20260301"};
+  report.plan_uid = "1.2.9";
+  report.plan_class_uid = "1.2.840.10008.5.1.4.1.1.481.5";
+  report.patient_position = "HFS";
+  report.table.support_rad = rad_from_deg(10.0);
+  report.setup_error.translation() = Eigen::Vector3d(-7.4, 3.9, -5.2);
+  report.setup_error.linear() = rotation_from_zxy({rad_from_deg(-2.9), rad_from_deg(-2.3), rad_from_deg(1.7)});
+  report.views = {view_with_picture("KV_45")};
+  return report;
+}
+
+SetupReport::Site small_couch() {
+  return {.name = "Linac 3",
+          .sha256 = std::string(64, 'b'),
+          .level = ActionLevel{.translation_mm = 5.0, .rotation_deg = 3.0},
+          .couch_dof = CouchDof::kFour,
+          .couch_scale = SiteFile::Scale{CouchScale::kVarianIec, "J. Doe", "2026-03-01"}};
+}
+
+std::string text_of(const SetupReport& report) { return text_report(report_page(report)); }
+std::string html_of(const SetupReport& report) { return html_report(report, report_page(report)); }
+
+// The text of a PDF, in the order it is read.
+std::string text_of_pdf(const SetupReport& report, int last_page = 99) {
+  const TemporaryFolder folder;
+  write_text(folder / "report.pdf", pdf_report(report, report_page(report)));
+  const CommandOutcome outcome =
+      run_shell(fmt::format("pdftotext -layout -enc UTF-8 -l {} {} -", last_page, (folder / "report.pdf").string()));
+  EXPECT_EQ(outcome.exit_status, 0) << outcome.out;
+  return outcome.out;
+}
+
+std::vector<std::string> cells_of(const std::string& line) {
+  std::vector<std::string> cells(1);
+  bool quoted = false;
+  for (const char c : line) {
+    if (c == '"')
+      quoted = !quoted;
+    else if (c == ',' && !quoted)
+      cells.emplace_back();
+    else if (c != '\r' && c != '\n')
+      cells.back() += c;
+  }
+  return cells;
+}
+
+// Names and values of the one row.
+std::map<std::string, std::string> csv_of(const SetupReport& report) {
+  const std::string csv = csv_report(report);
+  const auto end = csv.find("\r\n");
+  const std::vector<std::string> names = cells_of(csv.substr(0, end)), cells = cells_of(csv.substr(end + 2));
+  EXPECT_EQ(names.size(), cells.size());
+  std::map<std::string, std::string> row;
+  for (std::size_t n = 0; n < names.size(); ++n) row[names[n]] = cells[n];
+  return row;
+}
+
+// The first group of the first match, "" if there is none.
+std::string found(const std::string& text, const std::string& pattern) {
+  std::smatch match;
+  return std::regex_search(text, match, std::regex(pattern)) ? match[1].str() : "";
+}
+
+TEST(Report, JsonHoldsTheWorkedExample) {
+  const auto json = nlohmann::json::parse(json_report(oblique_report(Verdict::kAccepted)));
+  EXPECT_NEAR(json["couch_shift"]["lateral_mm"], 6.610, 5e-4);
+  EXPECT_NEAR(json["couch_shift"]["longitudinal_mm"], -5.126, 5e-4);
+  EXPECT_NEAR(json["couch_shift"]["vertical_mm"], 5.2, 1e-12);
+  EXPECT_NEAR(json["couch_shift"]["yaw_deg"], 2.969, 5e-4);
+  EXPECT_NEAR(json["couch_shift"]["pitch_deg"], 1.861, 5e-4);
+  EXPECT_NEAR(json["couch_shift"]["roll_deg"], -2.172, 5e-4);
+  EXPECT_NEAR(json["couch_target_deg"]["yaw"], 12.969, 5e-4);
+  EXPECT_NEAR(json["setup_error"]["rotation_deg"]["rx"], -2.3, 1e-9);
+  EXPECT_EQ(json["verdict"], "accepted");
+  EXPECT_EQ(json["action"], "unset");
+}
+
+TEST(Report, TextSaysWhichWayToMove) {
+  const std::string text = text_of(oblique_report(Verdict::kAccepted));
+  EXPECT_THAT(text, HasSubstr("  Lateral          +6.6 mm   to the right, seen facing the gantry\n"));
+  EXPECT_THAT(text, HasSubstr("  Longitudinal     -5.1 mm   away from the gantry\n"));
+  EXPECT_THAT(text, HasSubstr("  Vertical         +5.2 mm   up\n"));
+  EXPECT_THAT(text, HasSubstr("  Yaw              +3.0 deg  counter-clockwise, seen from above\n"));
+  EXPECT_THAT(text, HasSubstr("Not for clinical use unless validated by the site."));
+}
+
+// The numbers of all formats, for many results: equal, and those of result.json rounded once.
+TEST(Report, AllFormatsShowTheSameNumbers) {
+  std::mt19937_64 random(11);
+  const auto uniform = [&](double low, double high) {
+    return std::uniform_real_distribution<double>(low, high)(random);
+  };
+  for (int n = 0; n < 20; ++n) {
+    SetupReport report = oblique_report(Verdict::kAccepted);
+    report.table.support_rad = rad_from_deg(uniform(-90, 90));
+    report.setup_error.translation() = Eigen::Vector3d(uniform(-30, 30), uniform(-3, 3), uniform(-0.2, 0.2));
+    report.setup_error.linear() = rotation_from_zxy({uniform(-0.1, 0.1), uniform(-0.02, 0.02), uniform(-0.002, 0.002)});
+    const double wide = n % 2 == 0 ? 1.5 : 0.2;  // sigma: rounded to 1 or to 0.1
+    report.sigma = {.translation_mm = {wide, 0.04, 0.1}, .rotation_deg = {0.05, wide, 0.01}};
+    const auto json = nlohmann::json::parse(json_report(report));
+    const std::string pdf = text_of_pdf(report, 1), html = html_of(report), text = text_of(report);
+    const auto csv = csv_of(report);
+    const ShownShift shown = shown_shift(report);
+
+    const auto check = [&](const std::string& name, const std::string& column, double exact, double two_sigma) {
+      const std::string value = rounded(exact, two_sigma);
+      const std::string escaped = std::regex_replace(value, std::regex("[.+]"), "\\$&");
+      EXPECT_EQ(found(pdf, "\n *" + name + " +([-+0-9.]+)"), value) << name;
+      EXPECT_EQ(found(html, "<th>" + name + "</th><td class=\"value\">([-+0-9.]+)<"), value) << name;
+      EXPECT_EQ(found(text, "\n  " + name + " +([-+0-9.]+)"), value) << name;
+      EXPECT_EQ(csv.at(column), value.starts_with('+') ? value.substr(1) : value) << name;
+    };
+    const auto& couch = json["couch_shift"];
+    const auto sigma = [&](std::size_t axis) { return 2.0 * shown.couch_sigma_mm[axis].value(); };
+    check("Lateral", "lateral_mm", couch["lateral_mm"], sigma(0));
+    check("Longitudinal", "longitudinal_mm", couch["longitudinal_mm"], sigma(1));
+    check("Vertical", "vertical_mm", couch["vertical_mm"], sigma(2));
+    check("Yaw", "yaw_deg", couch["yaw_deg"], 0.02);
+    check("Pitch", "pitch_deg", couch["pitch_deg"], 0.1);
+    check("Roll", "roll_deg", couch["roll_deg"], 2.0 * wide);
+    const auto& error = json["setup_error"];
+    check("x", "error_x_mm", error["translation_mm"][0], 2.0 * wide);
+    check("y", "error_y_mm", error["translation_mm"][1], 0.08);
+    check("about x", "error_about_x_deg", error["rotation_deg"]["rx"], 0.1);
+    check("about y", "error_about_y_deg", error["rotation_deg"]["ry"], 2.0 * wide);
+    EXPECT_EQ(csv.at("two_sigma_error_x_mm"), rounded_up(2.0 * wide));
+    EXPECT_THAT(pdf, HasSubstr("± " + rounded_up(2.0 * wide) + " mm"));
+  }
+}
+
+TEST(Report, RejectedResultsShowNoShiftInAnyFormat) {
+  SetupReport report = oblique_report(Verdict::kRejected);
+  report.site = small_couch();
+  const auto json = nlohmann::json::parse(json_report(report));
+  EXPECT_TRUE(json["couch_shift"].is_null());
+  EXPECT_TRUE(json["couch_target_deg"].is_null());
+  EXPECT_TRUE(json["left_over"].empty());
+  EXPECT_EQ(json["action"], "unset");
+  for (const std::string& shown : {text_of(report), text_of_pdf(report), html_of(report)}) {
+    EXPECT_THAT(shown, HasSubstr("withheld"));
+    for (const char* number : {"6.6", "-5.1", "5.2", "7.4", "+3.9", "13.0", "-2.9", "+3.0", "347.0"})
+      EXPECT_THAT(shown, Not(HasSubstr(number)));
+  }
+  const auto csv = csv_of(report);
+  for (const char* column :
+       {"lateral_mm", "longitudinal_mm", "vertical_mm", "yaw_deg", "pitch_deg", "roll_deg", "error_x_mm"})
+    EXPECT_EQ(csv.at(column), "") << column;
+}
+
+TEST(Report, UnobservableComponentsAreNull) {
+  SetupReport report = oblique_report(Verdict::kReview);
+  // Gantry 45: the view cannot tell along (sin 45, 0, cos 45); at couch 10 that enters all three table axes.
+  report.unobservable_room = {Eigen::Vector3d(std::sqrt(0.5), 0, std::sqrt(0.5))};
+  const auto json = nlohmann::json::parse(json_report(report));
+  EXPECT_TRUE(json["setup_error"]["translation_mm"][0].is_null());
+  EXPECT_NEAR(json["setup_error"]["translation_mm"][1], 3.9, 1e-12);
+  EXPECT_TRUE(json["setup_error"]["translation_mm"][2].is_null());
+  EXPECT_TRUE(json["couch_shift"]["lateral_mm"].is_null());
+  EXPECT_TRUE(json["couch_shift"]["longitudinal_mm"].is_null());
+  EXPECT_TRUE(json["couch_shift"]["vertical_mm"].is_null());
+  EXPECT_THAT(text_of(report), HasSubstr("  Vertical       not determined\n"));
+  EXPECT_EQ(found(text_of_pdf(report), "Vertical +(not determined)"), "not determined");
+  EXPECT_EQ(csv_of(report).at("vertical_mm"), "");
+}
+
+TEST(Report, RoundsHalvesAwayFromZeroAndNeverToMinusZero) {
+  EXPECT_EQ(rounded(0.25), "+0.3");
+  EXPECT_EQ(rounded(-0.25), "-0.3");
+  EXPECT_EQ(rounded(-0.04), "0.0");
+  EXPECT_EQ(rounded(12.34), "+12.3");
+}
+
+TEST(Report, RoundsCoarselyWhereTheUncertaintyIsLarge) {
+  EXPECT_EQ(rounded(4.46, 1.0), "+4.5");
+  EXPECT_EQ(rounded(4.5, 1.01), "+5");
+  EXPECT_EQ(rounded(-0.4, 3.0), "0");
+  EXPECT_EQ(rounded_up(1.01), "2");
+  EXPECT_EQ(rounded_up(0.11), "0.2");
+  EXPECT_EQ(rounded_up(0.2), "0.2");
+}
+
+TEST(Report, CentimetersAreRoundedAsMillimetersAre) {
+  EXPECT_EQ(rounded_length(4.25, LengthUnit::kMm), "+4.3");
+  EXPECT_EQ(rounded_length(4.25, LengthUnit::kCm), "+0.43");
+  EXPECT_EQ(rounded_length(-14.6, LengthUnit::kCm, 2.0), "-1.5");
+  EXPECT_EQ(rounded_length(0.04, LengthUnit::kCm), "0.00");
+  SetupReport report = oblique_report(Verdict::kAccepted);
+  report.site = small_couch();
+  report.site->length_unit = LengthUnit::kCm;
+  EXPECT_THAT(text_of(report), HasSubstr("  Lateral         +0.66 cm   to the right"));
+  EXPECT_EQ(csv_of(report).at("lateral_mm"), "6.6");
+}
+
+TEST(Report, ActionSaysWhatExceedsTheLevel) {
+  SetupReport report = oblique_report(Verdict::kAccepted);
+  report.site = small_couch();
+  EXPECT_EQ(shown_shift(report).action, Action::kExceeds);
+  EXPECT_THAT(shown_shift(report).action_reasons, testing::ElementsAre("setup error along x, z: more than 5 mm"));
+  report.site->level = ActionLevel{.translation_mm = 7.5, .vector_mm = 9.0};
+  EXPECT_THAT(shown_shift(report).action_reasons, testing::ElementsAre("length of the translation: more than 9 mm"));
+  report.site->level->vector_mm = 10.0;
+  EXPECT_EQ(shown_shift(report).action, Action::kWithin);
+  EXPECT_THAT(text_of(report), HasSubstr("ACTION       The shift is within the action level\n"));
+  EXPECT_EQ(nlohmann::json::parse(json_report(report))["action"], "within");
+
+  // What was not determined may be anything; what was may be enough.
+  report.unobservable_room = {Eigen::Vector3d::UnitZ()};
+  EXPECT_EQ(shown_shift(report).action, Action::kUnset);
+  report.site->level->vector_mm = 8.0;
+  EXPECT_EQ(shown_shift(report).action, Action::kExceeds);
+  report.site->level->vector_mm = 10.0;
+  report.site->level->translation_mm = 1.0;
+  EXPECT_EQ(shown_shift(report).action, Action::kExceeds);
+}
+
+TEST(Report, SmallCouchesSayWhatTheyApplyAndWhatRemains) {
+  SetupReport report = oblique_report(Verdict::kAccepted);
+  report.site = small_couch();
+  report.table_position_mm = Eigen::Vector3d(0.0, 1350.0, -135.0);
+  report.points = {{"centroid of PTV", {10, 20, 30}}};
+  const std::string text = text_of(report);
+  EXPECT_THAT(text, HasSubstr("  Yaw              +3.0 deg"));
+  EXPECT_THAT(text, HasSubstr("  Pitch          not applied: this couch has 4 degrees of freedom\n"));
+  EXPECT_THAT(text, HasSubstr("IEC table angles after the move: yaw +13.0, pitch 0.0, roll 0.0 deg"));
+  // Vertical counts down on this display: 135.0 mm below the isocenter is 135.0, 5.2 mm higher 129.8.
+  EXPECT_THAT(text, HasSubstr("Varian IEC scale, validated by J. Doe on 2026-03-01"));
+  EXPECT_THAT(text, HasSubstr("  Vertical         -5.2 mm   from 135.0 to 129.8 mm\n"));
+  EXPECT_THAT(text, HasSubstr("from 350.0 to 347.0 deg"));
+  for (const auto& left : shown_shift(report).left_over) {
+    const CouchShift applied =
+        applicable(couch_shift_for(report.setup_error, report.table), report.table, CouchDof::kFour);
+    if (left.at != "centroid of PTV") continue;
+    EXPECT_LT((left.mm - left_over_mm(report.setup_error, report.table, applied, {10, 20, 30})).norm(), 1e-12);
+    EXPECT_GT(left.mm.norm(), 0.1);
+  }
+  EXPECT_EQ(shown_shift(report).left_over.size(), 4U);
+  report.site->couch_dof = CouchDof::kSix;
+  EXPECT_TRUE(report_page(report).left_over.empty());
+}
+
+// dicom.md 5.1: 50 mm superior with a couch of 4 degrees of freedom; feet first the patient points the other way.
+TEST(Report, WhatRemainsIsThatOfDicomMd51) {
+  SetupReport report = oblique_report(Verdict::kAccepted);
+  report.table = {};
+  report.site = small_couch();
+  report.setup_error.translation() = Eigen::Vector3d(3, -2, 1.5);
+  report.setup_error.linear() = rotation_from_zxy({rad_from_deg(1), rad_from_deg(-0.5), rad_from_deg(0.8)});
+  const Eigen::Vector3d toward_gantry(-0.006, -0.002, -0.436);
+  for (const auto& [position, sign] : {std::pair("HFS", 1.0), std::pair("FFS", -1.0)}) {
+    report.patient_position = position;
+    const auto left_over = shown_shift(report).left_over;
+    EXPECT_EQ(left_over[1].at, "50 mm superior");
+    EXPECT_LT((left_over[1].mm - sign * toward_gantry).norm(), 1e-3) << position;
+    EXPECT_LT((left_over[2].mm + sign * toward_gantry).norm(), 1e-3) << position;
+  }
+}
+
+// The table top's axes turn with the couch: at 90 degrees its lateral axis points toward the gantry.
+TEST(Report, WordsAreThoseOfTheRoomWhereverTheCouchStands) {
+  SetupReport report = oblique_report(Verdict::kAccepted);
+  report.setup_error = Eigen::Isometry3d::Identity();
+  report.setup_error.translation() = Eigen::Vector3d(5, -3, 0);  // to the right, away from the gantry
+  const auto words = [&](double couch_deg) {
+    report.table.support_rad = rad_from_deg(couch_deg);
+    const ReportPage page = report_page(report);
+    return std::pair(page.couch[0].words, page.couch[1].words);
+  };
+  EXPECT_EQ(words(0), std::pair(std::string("to the left, seen facing the gantry"), std::string("toward the gantry")));
+  EXPECT_EQ(words(90), std::pair(std::string("toward the gantry"), std::string("to the left, seen facing the gantry")));
+  EXPECT_EQ(words(270),
+            std::pair(std::string("toward the gantry"), std::string("to the left, seen facing the gantry")));
+  EXPECT_EQ(words(45).second, "toward the gantry and to the left, seen facing the gantry");
+  EXPECT_EQ(words(180),
+            std::pair(std::string("to the left, seen facing the gantry"), std::string("toward the gantry")));
+}
+
+// What was not measured is in no number, however little of it an axis holds.
+TEST(Report, NothingIsMadeOfWhatWasNotMeasured) {
+  SetupReport report = oblique_report(Verdict::kReview);
+  report.table.support_rad = rad_from_deg(2.0);
+  report.unobservable_room = {Eigen::Vector3d::UnitX()};
+  const auto longitudinal = [&](double x_mm) {
+    report.setup_error.translation().x() = x_mm;
+    return shown_shift(report).couch_mm[1].value();
+  };
+  EXPECT_NEAR(longitudinal(19.0), longitudinal(0.0), 1e-12);
+  const SetupReport read = report_from_json(json_report(report), "result.json");
+  EXPECT_NEAR(shown_shift(read).couch_mm[1].value(), longitudinal(19.0), 1e-12);
+}
+
+TEST(Report, RotationsThatWereNotSearchedAreNoNumbers) {
+  SetupReport report = oblique_report(Verdict::kAccepted);
+  report.setup_error.linear().setIdentity();
+  report.translation_only = true;
+  report.site = small_couch();
+  report.site->level = ActionLevel{.rotation_deg = 1.0};
+  EXPECT_EQ(shown_shift(report).action, Action::kUnset);
+  EXPECT_THAT(text_of(report), HasSubstr("  Yaw            taken as 0: only translations were searched\n"));
+  EXPECT_EQ(csv_of(report).at("yaw_deg"), "");
+}
+
+TEST(Report, NamesComeOutRightAndHarmless) {
+  SetupReport report = oblique_report(Verdict::kAccepted);
+  report.identity.patient_name = "Müller-Lüdenscheidt^Jürgen=山田^太郎=やまだ^たろう";
+  report.plan_label = "<script>alert(1)</script><!--WHO-->";
+  report.views[0].label = "</script><b>\"KV\"";
+  report.identity.patient_id = "=1+1";
+  const std::string pdf = text_of_pdf(report), html = html_of(report);
+  for (const std::string& shown : {pdf, html, text_of(report)})
+    EXPECT_THAT(shown, HasSubstr("Müller-Lüdenscheidt Jürgen (山田 太郎)"));
+  EXPECT_THAT(pdf, HasSubstr("<script>alert(1)</script>"));
+  EXPECT_THAT(html, HasSubstr("&lt;script&gt;alert(1)&lt;/script&gt;"));
+  EXPECT_THAT(html, Not(HasSubstr("<script>alert")));
+  EXPECT_THAT(html, HasSubstr("\\u003c/script>"));
+  EXPECT_EQ(csv_of(report).at("patient_id"), "'=1+1");
+  for (const char* hostile : {"http://", "https://", "src=\"//", "@import"}) EXPECT_THAT(html, Not(HasSubstr(hostile)));
+}
+
+TEST(Report, SurvivesNamesThatAreNoText) {
+  SetupReport report = oblique_report(Verdict::kAccepted);
+  report.identity.patient_name = "Evil\nVERDICT      ACCEPTED\x1b[31m";
+  report.views[0].label = "\xff\xfe";
+  for (const char* forged : {"\nVERDICT      ACCEPTED\x1b", "\nVERDICT      ACCEPTED [31m"})
+    EXPECT_THAT(text_of(report), Not(HasSubstr(forged)));
+  EXPECT_EQ(printable("a\u009Bb\u202Ec\u2028d\u2066e"), "a b c d e");
+  EXPECT_NO_THROW(nlohmann::json::parse(json_report(report)));
+  EXPECT_NO_THROW(html_of(report));
+  EXPECT_THAT(csv_report(report), Not(HasSubstr("\nVERDICT")));
+}
+
+TEST(Report, FirstPageHoldsAllThatIsSigned) {
+  SetupReport report = oblique_report(Verdict::kReview);
+  report.site = small_couch();
+  report.reasons =
+      std::vector<std::string>(12, "a reason that is told at some length, as reasons are, to fill the page");
+  for (int n = 0; n < 5; ++n) report.views.push_back(view_with_picture(fmt::format("VIEW {}", n)));
+  report.warnings = std::vector<std::string>(80, "a warning");
+  const std::string first = text_of_pdf(report, 1), all = text_of_pdf(report);
+  for (const char* words : {"Example", "REVIEW", "MOVE THE COUCH BY", "Approved by", "Decision", "IEC 61217:",
+                            "Not for clinical use unless validated by the site.", "and 8 more, on the next page"})
+    EXPECT_THAT(first, HasSubstr(words));
+  for (int n = 0; n < 5; ++n) EXPECT_THAT(all, HasSubstr(fmt::format("VIEW {}", n)));
+  for (const char* words : {"Geometry as understood", "Provenance", "SHA-256"}) EXPECT_THAT(all, HasSubstr(words));
+  std::size_t pages = 0, disclaimers = 0;
+  for (const char c : all) pages += c == '\f';
+  for (std::size_t at = all.find("Not for clinical"); at != std::string::npos;
+       at = all.find("Not for clinical", at + 1))
+    ++disclaimers;
+  EXPECT_EQ(disclaimers, pages + 1);  // on every page, on the first one twice
+}
+
+class ResultFolderTest : public testing::Test {
+ protected:
+  ResultFolderTest() {
+    report_.site = small_couch();
+    report_.sigma = {.translation_mm = {0.1, 0.2, 0.3}, .rotation_deg = {0.1, 0.2, 0.3}};
+    report_.stages = {{.name = "fine",
+                       .similarity = "ncc",
+                       .optimizer = "bobyqa",
+                       .parameters = {{"pixel_mm", 1.0}},
+                       .evaluations = 3,
+                       .termination = "converged",
+                       .best = {0.1, 0.4, 0.9}}};
+    report_.points = {{"centroid of PTV", {1, 2, 3}}};
+    report_.table_position_mm = Eigen::Vector3d(1, 2, 3);
+    report_.spatial_registration_uid = "2.25.1";
+    report_.views.front().parts = {{.center_px = {20, 20}, .width_px = 10, .disagrees = true}};
+    write_result(report_, folder_.path());
+  }
+  TemporaryFolder folder_;
+  SetupReport report_ = oblique_report(Verdict::kAccepted);
+};
+
+TEST_F(ResultFolderTest, IsReadBackWhole) {
+  const SetupReport read = read_result(folder_.path());
+  EXPECT_EQ(json_report(read), json_report(report_));
+  EXPECT_EQ(read.views[0].picture.drr_found.pixels, report_.views[0].picture.drr_found.pixels);
+  EXPECT_EQ(csv_report(read), csv_report(report_));
+  EXPECT_EQ(text_of(read), text_of(report_));
+}
+
+TEST_F(ResultFolderTest, ThePdfIsADicomObjectToo) {
+  const CommandOutcome checked = run_shell("dciodvfy -new " + (folder_ / "report.dcm").string());
+  EXPECT_THAT(checked.out, Not(HasSubstr("Error"))) << checked.out;
+  const CommandOutcome read = run_shell(fmt::format(
+      "/usr/bin/python3 -c \"import pydicom, sys; d = pydicom.dcmread('{0}/report.dcm'); "
+      "sys.exit(0 if d.EncapsulatedDocument[:d.EncapsulatedDocumentLength] == open('{0}/report.pdf', 'rb').read() and "
+      "[s.ReferencedSOPInstanceUID for s in d.SourceInstanceSequence] == ['1.2.9', '1.2.3.4', '2.25.1'] and "
+      "d.StudyInstanceUID == '1.2.3' and d.PatientID == 'ID-1' and d.BurnedInAnnotation == 'YES' else 1)\"",
+      folder_.path().string()));
+  EXPECT_EQ(read.exit_status, 0) << read.out;
+}
+
+TEST_F(ResultFolderTest, WhatIsMissingOrSpoiledIsNamed) {
+  std::filesystem::remove(folder_ / "view1_found.png");
+  EXPECT_THROW(
+      {
+        try {
+          read_result(folder_.path());
+        } catch (const Error& error) {
+          EXPECT_THAT(error.what(), HasSubstr("view1_found.png: cannot be read as a PNG"));
+          throw;
+        }
+      },
+      Error);
+  EXPECT_THROW(report_from_json("{\"schema\": 2}", "result.json"), Error);
+  EXPECT_THROW(report_from_json("no json", "result.json"), Error);
+  EXPECT_THROW(read_result(folder_ / "nowhere"), Error);
+}
+
+// Opened, slid and seen in a browser.
+TEST_F(ResultFolderTest, ThePageWorksInABrowser) {
+  const CommandOutcome outcome = run_shell(fmt::format("/usr/bin/python3 {}/tests/io/report/html_report_in_browser.py {}",
+                                                       ISOSHIFT_SOURCE_DIR, (folder_ / "report.html").string()));
+  EXPECT_EQ(outcome.exit_status, 0) << outcome.out;
+}
+
+TEST(ViewPicture, DirectionsAreTheStrongestFirst) {
+  EXPECT_EQ(orientation_letters({1, 0, 0}), "L");
+  EXPECT_EQ(orientation_letters({-0.2, 0, -1}), "F");
+  EXPECT_EQ(orientation_letters({-0.6, -0.8, 0}), "AR");
+  EXPECT_EQ(orientation_letters({0, 1, 0.5}), "PH");
+}
+
+TEST(ViewPicture, GraysAreThoseOfTheXrayForADrrOfAnotherScale) {
+  Image<float> xray(20, 20), drr(20, 20);
+  for (std::size_t n = 0; n < xray.pixels.size(); ++n) {
+    drr.pixels[n] = static_cast<float>(n);
+    xray.pixels[n] = 3.0F * drr.pixels[n] + 50.0F;
+  }
+  ViewPicture picture;
+  put_grays(picture, xray, drr, drr, Image<std::uint8_t>(20, 20, 1));
+  for (std::size_t n = 0; n < xray.pixels.size(); ++n)
+    EXPECT_NEAR(picture.drr_found.pixels[n], picture.xray.pixels[n], 1);
+  const auto gray = overlay(picture.xray, picture.drr_found);
+  EXPECT_NEAR(gray.at(10, 10)[0], gray.at(10, 10)[1], 1);
+}
+
+}  // namespace
+}  // namespace isoshift

@@ -1,0 +1,90 @@
+#include "io/study/motion_trace.h"
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "base/error.h"
+#include "tests/support/command.h"
+#include "tests/support/temporary_folder.h"
+
+namespace isoshift {
+namespace {
+
+using testing::HasSubstr;
+
+class MotionTraceTest : public testing::Test {
+ protected:
+  std::vector<MotionSample> read(const std::string& text) {
+    std::ofstream(path_, std::ios::trunc) << text;
+    return read_motion_trace(path_, notes_);
+  }
+  std::string error_of(const std::string& text) {
+    try {
+      read(text);
+    } catch (const Error& error) {
+      return error.what();
+    }
+    return "no error";
+  }
+
+  TemporaryFolder folder_;
+  std::filesystem::path path_ = folder_ / "trace.csv";
+  Notes notes_;
+};
+
+TEST_F(MotionTraceTest, ReadsSemicolonsDecimalCommasAndMilliseconds) {
+  const auto trace = read(
+      "\"Frame\";\"Timestamp\";\"x\";\"y\";\"z\"\r\n0;0;-490,7;4,1;64,7\r\n7;117;-490,5;4,3;64,2\r\n0;0;0;0;0\r\n0;0;0;"
+      "0;0\r\n");
+  ASSERT_EQ(trace.size(), 2U);
+  EXPECT_EQ(trace[1].time_s, 0.117);
+  EXPECT_EQ(trace[1].position_mm, Eigen::Vector3d(-490.5, 4.3, 64.2));
+}
+
+TEST_F(MotionTraceTest, ReadsTheTraceOfTrack) {
+  const auto trace =
+      read("t_s,measured_x_mm,measured_y_mm,measured_z_mm,status\n0,1,2,3,measured\n0.2,,,,late\n0.4,2,3,4,measured\n");
+  ASSERT_EQ(trace.size(), 2U);
+  EXPECT_EQ(trace[1].position_mm, Eigen::Vector3d(2, 3, 4));
+}
+
+TEST_F(MotionTraceTest, ASingleWrongTimeIsLeftOutWithAWarning) {
+  std::string text = "t_s,x,y,z\n";
+  for (int n = 0; n < 200; ++n) text += (n == 100 ? "3" : std::to_string(n)) + ",1,2,3\n";
+  EXPECT_EQ(read(text).size(), 199U);
+  EXPECT_THAT(notes_.warnings, testing::ElementsAre(HasSubstr("1 of 200 rows have a time before")));
+}
+
+TEST_F(MotionTraceTest, MistakesAreNamed) {
+  EXPECT_THAT(error_of("a,b\n1,2\n"), HasSubstr("has the columns a, b; expected t_s"));
+  EXPECT_THAT(error_of("t_s,x,y,z\n0,1,2,3\n1,1,two,3\n"), HasSubstr("line 3: \"two\" is no number"));
+  EXPECT_THAT(error_of("t_s,x,y,z\n0,1,2,3\n,1,2,3\n"), HasSubstr("line 3: has no time"));
+  EXPECT_THAT(error_of("t_s,x,y,z\n5,1,2,3\n4,1,2,3\n3,1,2,3\n"),
+              HasSubstr("the times of 2 of 3 rows do not increase"));
+  EXPECT_THAT(error_of(""), HasSubstr("is empty"));
+}
+
+TEST_F(MotionTraceTest, PredictScoresTracesAndWritesAChart) {
+  std::string text = "t_s,x,y,z\n";
+  for (int n = 0; n < 1200; ++n) text += fmt::format("{},0,{},0\n", 0.1 * n, 5.0 * std::sin(1.5 * 0.1 * n));
+  read(text);
+  const std::string output = (folder_ / "out").string();
+  const CommandOutcome outcome =
+      run_command({"predict", path_.string(), "--latency", "200,400", "-o", output, "--json"});
+  ASSERT_EQ(outcome.exit_status, 0) << outcome.err;
+  const auto json = nlohmann::json::parse(outcome.out);
+  EXPECT_GT(json["trace"]["hold-last"]["200"]["rmse_mm"], 0.5);
+  EXPECT_LT(json["trace"]["rls"]["400"]["rmse_mm"], 0.2);
+  EXPECT_TRUE(std::filesystem::exists(folder_ / "out" / "prediction.svg"));
+  EXPECT_THAT(run_command({"predict", path_.string()}).out, HasSubstr("hold-last"));
+  EXPECT_EQ(run_command({"predict", path_.string(), "--latency", "-3"}).exit_status, 2);
+  EXPECT_EQ(run_command({"predict", path_.string(), "--train-s", "3600"}).exit_status, 1);
+}
+
+}  // namespace
+}  // namespace isoshift

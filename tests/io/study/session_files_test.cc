@@ -1,0 +1,170 @@
+#include "io/study/session_files.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <set>
+
+namespace isoshift {
+namespace {
+
+StudyFiles::Image image(const std::string& uid, const std::string& label, std::optional<double> at_s,
+                        const std::string& patient = "P", const std::string& plan = "1") {
+  return {
+      .file = "/x/" + uid, .patient = patient, .sop_instance_uid = uid, .plan_uid = plan, .label = label, .at_s = at_s};
+}
+
+std::vector<std::size_t> sizes(const std::vector<StudyFiles::Image>& images) {
+  StudyFiles files;
+  files.images = images;
+  std::vector<std::size_t> sizes;
+  for (const SessionFiles& session : sessions_of(files, false)) sizes.push_back(session.images.size());
+  return sizes;
+}
+
+TEST(Sessions, ArePatientsPlansAndMoments) {
+  using testing::ElementsAre;
+  EXPECT_THAT(sizes({image("1", "A", 0), image("2", "B", 599)}), ElementsAre(2));
+  EXPECT_THAT(sizes({image("2", "B", 601), image("1", "A", 0)}), ElementsAre(1, 1));
+  EXPECT_THAT(sizes({image("1", "A", 0), image("2", "B", 1, "Q")}), ElementsAre(1, 1));
+  EXPECT_THAT(sizes({image("1", "A", 0), image("2", "B", 1, "P", "2")}), ElementsAre(1, 1));
+  // Taken again after a move: a label that comes again begins another session.
+  EXPECT_THAT(sizes({image("1", "A", 0), image("2", "B", 5), image("3", "A", 60), image("4", "B", 65)}),
+              ElementsAre(2, 2));
+  EXPECT_THAT(sizes({image("1", "A", 0), image("1", "A", 0)}), ElementsAre(1));  // twice the same
+  EXPECT_THAT(sizes({image("1", "A", std::nullopt), image("2", "B", std::nullopt)}), ElementsAre(2));
+}
+
+// The UIDs of each session's X-rays, joined.
+std::vector<std::string> grouped(const std::vector<StudyFiles::Image>& images,
+                                 const std::set<std::string>& registered = {}) {
+  StudyFiles files;
+  files.images = images;
+  std::vector<std::string> sessions;
+  for (const SessionFiles& session : sessions_of(files, false, registered)) {
+    std::string& uids = sessions.emplace_back();
+    for (const StudyFiles::Image& image : session.images) uids += image.sop_instance_uid;
+  }
+  return sessions;
+}
+
+StudyFiles::Image at_table(StudyFiles::Image image, double vertical_mm) {
+  image.table = {.lateral_mm = 0.0, .longitudinal_mm = 0.0, .vertical_mm = vertical_mm};
+  return image;
+}
+
+TEST(Sessions, ARetakeIsNotPairedAcrossACouchMove) {
+  using testing::ElementsAre;
+  // AP and LAT at 10:15, LAT again at 10:16, the couch moves, AP at 10:20, LAT at 10:20:10.
+  const std::vector<StudyFiles::Image> day = {image("a", "AP", 0), image("b", "LAT", 10), image("c", "LAT", 60),
+                                              image("d", "AP", 300), image("e", "LAT", 310)};
+  EXPECT_THAT(grouped(day), ElementsAre("ab", "c", "de"));
+  EXPECT_THAT(grouped(day, {"a", "b"}), ElementsAre("c", "de"));
+  // While the last X-ray is still on its way, and whichever of the first two was taken again.
+  EXPECT_THAT(grouped({day[0], day[1], day[2], day[3]}), ElementsAre("ab", "c", "d"));
+  EXPECT_THAT(grouped({day[0], day[1], day[2], day[3]}, {"a", "b"}), ElementsAre("c", "d"));
+  const StudyFiles::Image again = image("c", "AP", 60), lateral = image("d", "LAT", 300);
+  EXPECT_THAT(grouped({day[0], day[1], again, lateral}), ElementsAre("ab", "c", "d"));
+  EXPECT_THAT(grouped({day[0], day[1], again, lateral}, {"a", "b"}), ElementsAre("c", "d"));
+  // The first of two that verify is nearer to the second one than to what was registered.
+  EXPECT_THAT(grouped({day[0], day[1], image("c", "LAT", 120), image("d", "AP", 130)}, {"a", "b"}), ElementsAre("cd"));
+  // An X-ray that comes late does not join those that have a result.
+  EXPECT_THAT(grouped(day, {"a", "b", "d", "e"}), ElementsAre("c"));
+}
+
+TEST(Sessions, ARetakeIsSaid) {
+  StudyFiles files;
+  files.images = {image("a", "AP", 0), image("b", "LAT", 10), image("c", "LAT", 60), image("d", "AP", 300),
+                  image("e", "LAT", 310)};
+  const std::vector<SessionFiles> sessions = sessions_of(files, false);
+  ASSERT_EQ(sessions.size(), 3u);
+  EXPECT_THAT(sessions[0].remarks, testing::IsEmpty());
+  EXPECT_THAT(sessions[1].remarks, testing::ElementsAre("LAT was taken again 50 s after /x/b"));
+  EXPECT_THAT(sessions[2].remarks,
+              testing::ElementsAre("AP was taken again 300 s after /x/a", "LAT was taken again 250 s after /x/c"));
+}
+
+TEST(Sessions, AMovedTableSeparatesThem) {
+  using testing::ElementsAre;
+  const StudyFiles::Image a = image("a", "AP", 0), b = image("b", "LAT", 10);
+  EXPECT_THAT(grouped({at_table(a, 5.0), at_table(b, 5.4)}), ElementsAre("ab"));
+  EXPECT_THAT(grouped({at_table(a, 5.0), at_table(b, 8.1)}), ElementsAre("a", "b"));
+  // The AP that verifies was taken 40 s after the couch moved, its LAT much later: the table says what belongs
+  // together.
+  EXPECT_THAT(grouped({at_table(a, 5.0), at_table(b, 5.0), at_table(image("c", "AP", 50), 2.0),
+                       at_table(image("d", "LAT", 300), 2.0)}),
+              ElementsAre("ab", "cd"));
+  // One side without read-outs: the times decide.
+  EXPECT_THAT(grouped({a, at_table(b, 5.0)}), ElementsAre("ab"));
+}
+
+TEST(Sessions, ThreeViewsInARowStayTogether) {
+  EXPECT_THAT(grouped({image("a", "AP", 0), image("b", "LAT", 10), image("c", "OBL", 60), image("d", "AP", 100),
+                       image("e", "LAT", 115), image("f", "OBL", 180)}),
+              testing::ElementsAre("abc", "def"));
+}
+
+TEST(Sessions, WithoutTimesALabelThatIsThereTwiceTellsNothing) {
+  using testing::ElementsAre;
+  const auto untimed = [](const char* uid, const char* label) { return image(uid, label, std::nullopt); };
+  EXPECT_THAT(grouped({untimed("a", "AP"), untimed("b", "LAT")}), ElementsAre("ab"));
+  EXPECT_THAT(grouped({untimed("a", "AP"), untimed("b", "LAT"), untimed("c", "LAT")}), ElementsAre("a", "b", "c"));
+}
+
+TEST(Sessions, NamesFollowFromTheXraysAlone) {
+  StudyFiles one, other;
+  one.images = {image("1", "A", 0), image("2", "B", 5)};
+  other.images = {image("2", "B", 5), image("1", "A", 0)};
+  EXPECT_EQ(sessions_of(one, false)[0].name, sessions_of(other, false)[0].name);
+  other.images[0].sop_instance_uid = "3";
+  EXPECT_NE(sessions_of(one, false)[0].name, sessions_of(other, false)[0].name);
+}
+
+TEST(Sessions, AnAbsentIssuerIsTheOnlyOneThereIs) {
+  StudyFiles files;
+  files.images = {image("1", "A", 0)};
+  files.images[0].patient = "7\\";
+  const auto ct_of = [](const std::string& patient) {
+    return StudyFiles::Ct{
+        .patient = patient, .series_instance_uid = patient, .frame_of_reference_uid = "f", .files = {"a"}};
+  };
+  files.cts = {ct_of("7\\HOSPITAL"), ct_of("70\\HOSPITAL")};
+  const auto own = [&] {
+    std::vector<std::string> patients;
+    for (const StudyFiles::Ct& ct : files_for(sessions_of(files, false)[0], files).cts) patients.push_back(ct.patient);
+    return patients;
+  };
+  EXPECT_THAT(own(), testing::ElementsAre("7\\HOSPITAL"));
+  files.cts.push_back(ct_of("7\\OTHER"));
+  EXPECT_THAT(own(), testing::IsEmpty());
+  files.cts.push_back(ct_of("7\\"));
+  EXPECT_THAT(own(), testing::ElementsAre("7\\"));
+  files.images[0].patient = "7\\OTHER";
+  EXPECT_THAT(own(), testing::ElementsAre("7\\OTHER"));
+}
+
+TEST(Sessions, WhatIsReferredToAndNotThereIsMissing) {
+  StudyFiles files;
+  files.images = {image("1", "A", 0)};
+  EXPECT_THAT(missing_parts(files), testing::ElementsAre("the CT", "the RT Plan 1"));
+  files.plans = {
+      {.file = "p", .patient = "P", .sop_instance_uid = "1", .frame_of_reference_uid = "f", .structure_set_uid = "s"}};
+  files.cts = {{.patient = "P",
+                .series_instance_uid = "c",
+                .frame_of_reference_uid = "f",
+                .files = {"a"},
+                .sop_instance_uids = {"a"}}};
+  EXPECT_THAT(missing_parts(files), testing::ElementsAre("the RT Structure Set s"));
+  files.structures = {{.file = "r",
+                       .patient = "P",
+                       .sop_instance_uid = "s",
+                       .ct_series_uids = {"c"},
+                       .ct_sop_instance_uids = {"a", "b"},
+                       .frame_of_reference_uids = {"f"}}};
+  EXPECT_THAT(missing_parts(files), testing::ElementsAre("1 of the 2 CT images of the RT Structure Set"));
+  files.cts[0].sop_instance_uids.insert("b");
+  EXPECT_THAT(missing_parts(files), testing::IsEmpty());
+}
+
+}  // namespace
+}  // namespace isoshift

@@ -1,0 +1,191 @@
+#include "io/study/study_files.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "base/error.h"
+#include "tests/support/small_study.h"
+
+namespace isoshift {
+namespace {
+
+using testing::Contains;
+using testing::ElementsAre;
+using testing::HasSubstr;
+
+// A folder into which an exporter has put more than one study.
+class StudyFilesTest : public testing::Test {
+ protected:
+  // The files of another phantom, copied beside the first one's.
+  void add(const std::filesystem::path& name, std::uint64_t seed) {
+    PhantomOptions options = small_phantom();
+    options.seed = seed;
+    const SmallStudy other(options);
+    std::filesystem::copy(other.path(), study_.path() / name, std::filesystem::copy_options::recursive);
+  }
+
+  StudyParts find(NamedParts named = {}) {
+    named.study = study_.path();
+    return find_parts(named);
+  }
+
+  std::string error_of_finding(NamedParts named = {}) {
+    try {
+      find(std::move(named));
+    } catch (const Error& error) {
+      return error.what();
+    }
+    return "no error";
+  }
+
+  SmallStudy study_;
+};
+
+TEST_F(StudyFilesTest, FindsThePartsOfOneStudy) {
+  const StudyParts parts = find();
+  EXPECT_EQ(parts.ct.size(), 36U);
+  EXPECT_EQ(parts.plan, study_.plan());
+  EXPECT_THAT(parts.images, ElementsAre(study_.image(0), study_.image(1)));
+  EXPECT_THAT(parts.left_aside, ElementsAre(HasSubstr("truth.json: not a DICOM file")));
+}
+
+TEST_F(StudyFilesTest, TakesTheCtInThePlansFrameOfReferenceAndSaysWhatItLeft) {
+  add("other", 2);
+  std::filesystem::remove(study_.path() / "other" / "RTPLAN.dcm");
+  std::filesystem::remove_all(study_.path() / "other" / "RTIMAGE");
+  const StudyParts parts = find();
+  EXPECT_EQ(parts.ct.front(), study_.ct_slice(0));
+  EXPECT_THAT(parts.left_aside, Contains(HasSubstr("CT0000.dcm and 35 more: CT series")));
+}
+
+TEST_F(StudyFilesTest, TakesThePlanThatTheXraysReferTo) {
+  add("other", 2);
+  std::filesystem::remove_all(study_.path() / "other" / "RTIMAGE");
+  const StudyParts parts = find();
+  EXPECT_EQ(parts.plan, study_.plan());
+  EXPECT_THAT(parts.left_aside, Contains(HasSubstr("other/RTPLAN.dcm: an RT Plan that no X-ray refers to")));
+}
+
+TEST_F(StudyFilesTest, TwoWholeStudiesNeedAName) {
+  add("other", 2);
+  EXPECT_THAT(error_of_finding(), HasSubstr("2 RT Plans found, and the X-rays do not tell which one is meant"));
+  EXPECT_THAT(error_of_finding(), HasSubstr("Name the plan: --plan FILE"));
+}
+
+TEST_F(StudyFilesTest, ANamedPlanLeavesTheOtherStudyAside) {
+  add("other", 2);
+  const StudyParts parts = find({.study = {}, .ct = {}, .images = {}, .plan = study_.path() / "other" / "RTPLAN.dcm"});
+  EXPECT_EQ(parts.ct.front(), study_.path() / "other" / "CT" / "CT0000.dcm");
+  EXPECT_EQ(parts.images.size(), 2U);
+  EXPECT_THAT(parts.images.front().string(), HasSubstr("/other/"));
+  EXPECT_THAT(parts.left_aside, Contains(study_.image(0).string() + ": an X-ray of another plan"));
+  EXPECT_THAT(parts.left_aside, Contains(study_.plan().string() + ": an RT Plan that was not named"));
+}
+
+TEST_F(StudyFilesTest, OfSeveralCtsInOneFrameTheStructureSetDecides) {
+  std::string frame_of_reference;
+  edit(study_.plan(), [&](DicomItem d) {
+    frame_of_reference = d.required_text(DCM_FrameOfReferenceUID);
+    DicomItem reference = d.append_item(DCM_ReferencedStructureSetSequence);
+    reference.put(DCM_ReferencedSOPClassUID, "1.2.840.10008.5.1.4.1.1.481.3");
+    reference.put(DCM_ReferencedSOPInstanceUID, "1.2.3.4");
+  });
+  add("other", 2);
+  std::filesystem::remove(study_.path() / "other" / "RTPLAN.dcm");
+  std::filesystem::remove_all(study_.path() / "other" / "RTIMAGE");
+  std::string other_series;
+  for (const auto& entry : std::filesystem::directory_iterator(study_.path() / "other" / "CT"))
+    edit(entry.path(), [&](DicomItem d) {
+      d.put(DCM_FrameOfReferenceUID, frame_of_reference);
+      other_series = d.required_text(DCM_SeriesInstanceUID);
+    });
+  EXPECT_THAT(error_of_finding(), HasSubstr("2 CT series found, and the plan does not tell which one it was made on"));
+
+  DicomFile structures;
+  DicomItem d = structures.dataset();
+  d.put(DCM_SOPClassUID, "1.2.840.10008.5.1.4.1.1.481.3");
+  d.put(DCM_SOPInstanceUID, "1.2.3.4");
+  d.append_item(DCM_ReferencedFrameOfReferenceSequence)
+      .append_item(DCM_RTReferencedStudySequence)
+      .append_item(DCM_RTReferencedSeriesSequence)
+      .put(DCM_SeriesInstanceUID, other_series);
+  structures.write(study_.path() / "RTSTRUCT.dcm");
+  EXPECT_THAT(find().ct.front().string(), HasSubstr("/other/CT/"));
+}
+
+TEST_F(StudyFilesTest, TakesTheOnlyStructureSetDrawnOnTheCt) {
+  EXPECT_EQ(find().structures, std::nullopt);
+  draw(study_, {{"Spine", {}}});
+  EXPECT_EQ(find().structures, study_.structures());
+  // Drawn on other images, although in the same frame of reference.
+  edit(study_.structures(), [](DicomItem d) {
+    d.append_item(DCM_ReferencedFrameOfReferenceSequence)
+        .append_item(DCM_RTReferencedStudySequence)
+        .append_item(DCM_RTReferencedSeriesSequence)
+        .put(DCM_SeriesInstanceUID, "1.2.3");
+  });
+  const StudyParts parts = find();
+  EXPECT_EQ(parts.structures, std::nullopt);
+  EXPECT_THAT(parts.left_aside,
+              Contains(study_.structures().string() + ": an RT Structure Set that was not drawn on the CT"));
+}
+
+TEST_F(StudyFilesTest, OfSeveralStructureSetsThePlanOrAPersonDecides) {
+  draw(study_, {{"Spine", {}}});
+  const std::filesystem::path second = study_.path() / "RTSTRUCT2.dcm", copy = study_.path() / "copy.dcm";
+  std::filesystem::copy(study_.structures(), second);
+  edit(second, [](DicomItem d) { d.put(DCM_SOPInstanceUID, "1.2.3.5"); });
+  StudyParts parts = find();
+  EXPECT_EQ(parts.structures, std::nullopt);
+  for (const std::filesystem::path& file : {study_.structures(), second})
+    EXPECT_THAT(parts.left_aside, Contains(file.string() + ": one of 2 RT Structure Sets drawn on the CT; name the one "
+                                                           "meant: --structures FILE"));
+
+  NamedParts named;
+  named.structures = study_.structures();
+  parts = find(named);
+  EXPECT_EQ(parts.structures, study_.structures());
+  EXPECT_THAT(parts.left_aside, Contains(second.string() + ": an RT Structure Set that was not named"));
+
+  edit(study_.plan(), [](DicomItem d) {
+    d.append_item(DCM_ReferencedStructureSetSequence).put(DCM_ReferencedSOPInstanceUID, "1.2.3.5");
+  });
+  std::filesystem::copy(second, copy);
+  parts = find();
+  EXPECT_EQ(parts.structures, second);
+  EXPECT_THAT(parts.left_aside,
+              Contains(study_.structures().string() + ": an RT Structure Set that the plan does not refer to"));
+  EXPECT_THAT(parts.left_aside, Contains(copy.string() + ": the same RT Structure Set as " + second.string()));
+}
+
+TEST_F(StudyFilesTest, ACtInNoPlansFrameIsRefused) {
+  add("other", 2);
+  std::filesystem::remove(study_.path() / "other" / "RTPLAN.dcm");
+  std::filesystem::remove_all(study_.path() / "other" / "RTIMAGE");
+  edit(study_.plan(), [](DicomItem d) { d.put(DCM_FrameOfReferenceUID, "1.2.3"); });
+  EXPECT_THAT(error_of_finding(), HasSubstr("2 CT series found, and none is in the plan's frame of reference"));
+}
+
+TEST_F(StudyFilesTest, LocalizersAndOtherObjectsAreLeftAside) {
+  edit(study_.ct_slice(0), [](DicomItem d) { d.put(DCM_ImageType, "ORIGINAL\\PRIMARY\\LOCALIZER"); });
+  edit(study_.ct_slice(35), [](DicomItem d) { d.put(DCM_SOPClassUID, "1.2.840.10008.5.1.4.1.1.4"); });
+  const StudyParts parts = find();
+  EXPECT_EQ(parts.ct.size(), 34U);
+  EXPECT_THAT(parts.left_aside, Contains(HasSubstr("CT0000.dcm: a CT localizer")));
+  EXPECT_THAT(parts.left_aside, Contains(HasSubstr("CT0035.dcm: MRImageStorage")));
+}
+
+TEST_F(StudyFilesTest, WhatWasNamedIsWhatTheMessageNames) {
+  EXPECT_EQ(error_of_finding({.study = {}, .ct = {}, .images = {study_.truth()}, .plan = {}}),
+            "no RT Image found (searched " + study_.truth().string() + ").\n       Name the X-rays: --image FILE");
+  EXPECT_EQ(error_of_finding({.study = {}, .ct = {}, .images = {}, .plan = study_.truth()}),
+            study_.truth().string() + ": holds no RT Plan");
+  NamedParts named;
+  named.structures = study_.plan();
+  EXPECT_EQ(error_of_finding(named), study_.plan().string() +
+                                         ": holds no RT Structure Sets, expected one.\n       Name the file: "
+                                         "--structures FILE");
+}
+
+}  // namespace
+}  // namespace isoshift

@@ -1,0 +1,113 @@
+#include "workflow/batch/batch.h"
+
+#include <fmt/format.h>
+#include <tbb/global_control.h>
+
+#include <algorithm>
+#include <thread>
+
+#include "base/error.h"
+#include "base/graceful_end.h"
+#include "base/output_folder.h"
+#include "workflow/batch/batch_workers.h"
+
+namespace isoshift {
+namespace {
+
+// Cases of one CT stay together.
+std::vector<BatchCase> cases_of_shard(const Shard& shard, std::vector<BatchCase> cases) {
+  std::ranges::stable_sort(cases, {}, &BatchCase::ct_key);
+  const auto begin = [&](int number) {
+    return static_cast<std::ptrdiff_t>(cases.size() * static_cast<std::size_t>(number) /
+                                       static_cast<std::size_t>(shard.count));
+  };
+  return {cases.begin() + begin(shard.number - 1), cases.begin() + begin(shard.number)};
+}
+
+}  // namespace
+
+std::vector<BatchCase> cases_of(const BatchOptions& options, Observer& observer) {
+  if (!std::filesystem::is_directory(options.cases)) return read_manifest(options.cases);
+  if (const auto scanned = options.output / "manifest.csv";
+      options.takes_earlier_scan && std::filesystem::exists(scanned))
+    return read_manifest(scanned);
+  Notes notes;
+  std::vector<BatchCase> cases = scan_cases(options.cases, !options.each.study.machine.empty(), notes);
+  for (const std::string& warning : notes.warnings) observer.say("warning: " + warning);
+  return cases;
+}
+
+Batch::Batch(const BatchOptions& options, Observer& observer)
+    : options_(options),
+      observer_(observer),
+      cases_(cases_of(options, observer)),
+      folder_(options.output, options.kept) {
+  const auto manifest = folder_.path() / "manifest.csv";
+  if (std::filesystem::is_directory(options.cases) &&
+      !(options.takes_earlier_scan && std::filesystem::exists(manifest)))
+    replace_text(manifest, manifest_csv(cases_));
+}
+
+bool Batch::run() {
+  const Shard shard = options_.shard.value_or(Shard());
+  if (shard.count > 1) cases_ = cases_of_shard(shard, std::move(cases_));
+  const ShardLock lock = folder_.work_on(shard, cases_);
+  return register_all();
+}
+
+bool Batch::register_all() {
+  std::vector<BatchJob> jobs;
+  for (const BatchCase& one : cases_)
+    if (!folder_.has_ended(one.name)) jobs.push_back({.name = one.name, .ct_key = one.ct_key()});
+  if (jobs.size() < cases_.size())
+    observer_.say(
+        fmt::format("{} of {} cases have been registered before", cases_.size() - jobs.size(), cases_.size()));
+  std::vector<std::string> of_worker = arguments();
+  of_worker.emplace_back("--worker");
+  const GracefulEnd end;
+  const std::string step = fmt::format("Registering {}", jobs.size());
+  const std::size_t total = jobs.size();
+  std::size_t ended = 0;
+  run_in_workers(
+      std::move(jobs), options_.jobs, of_worker,
+      [&](const std::string& name, const std::optional<std::string>& death) {
+        if (death) folder_.fail(name, *death);
+        if (!folder_.has_ended(name)) folder_.fail(name, "the worker said that it ended, and left no result");
+        observer_.progress(step, ++ended, total);
+      },
+      [&] { return end.is_asked_for(); });
+  return ended == total;
+}
+
+void Batch::serve() {
+  const unsigned cores = std::max(1U, std::thread::hardware_concurrency());
+  const tbb::global_control threads(tbb::global_control::max_allowed_parallelism,
+                                    std::max(1U, cores / static_cast<unsigned>(options_.jobs)));
+  SharedWork shared;
+  Observer nobody;  // all is in the result
+  serve_cases([&](const std::string& name) {
+    const auto one = std::ranges::find(cases_, name, &BatchCase::name);
+    if (one == cases_.end() || folder_.has_ended(name)) return;
+    try {
+      RegisterOptions registered = options_.each;
+      registered.study = one->options(options_.each.study);
+      if (!one->anatomy.empty()) registered.anatomy = one->anatomy;
+      registered.output = folder_.folder_of(name);
+      register_study(registered, shared, nobody);
+    } catch (const WriteError&) {
+      throw;  // the case is as good as before
+    } catch (const std::exception& error) {
+      folder_.fail(name, error.what());
+    }
+  });
+}
+
+std::vector<std::string> Batch::arguments() const {
+  std::vector<std::string> words = {"batch",    std::filesystem::absolute(options_.cases).string(),
+                                    "--output", std::filesystem::absolute(options_.output).string(),
+                                    "--jobs",   fmt::format("{}", options_.jobs)};
+  words.insert(words.end(), options_.kept.begin(), options_.kept.end());
+  return words;
+}
+
+}  // namespace isoshift

@@ -1,0 +1,248 @@
+#include "workflow/batch/batch_manifest.h"
+
+#include <csv.h>
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <array>
+#include <fstream>
+#include <iterator>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <set>
+
+#include "base/csv.h"
+#include "base/error.h"
+#include "io/study/session_files.h"
+
+namespace isoshift {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::array kColumns = {"case", "study", "ct", "plan", "structures", "images", "anatomy"};
+constexpr char kBetweenPaths = ';';  // of one cell
+
+using Row = std::map<std::string, std::vector<std::string>, std::less<>>;  // by column
+struct NumberedRow {
+  int line = 0;
+  Row cells;
+};
+
+std::vector<std::string> parts_of(const std::string& cell) {
+  std::vector<std::string> parts;
+  std::size_t begin = 0;
+  while (begin <= cell.size()) {
+    const std::size_t end = std::min(cell.find(kBetweenPaths, begin), cell.size());
+    if (end > begin) parts.push_back(cell.substr(begin, end - begin));
+    begin = end + 1;
+  }
+  return parts;
+}
+
+void check_column(const std::string& name, const std::string& where) {
+  if (std::ranges::find(kColumns, name) == kColumns.end())
+    throw Error(fmt::format("{}: \"{}\" is no column; expected {}", where, name, fmt::join(kColumns, ", ")));
+}
+
+// libcsv calls back for every cell and every end of a line.
+struct CsvTable {
+  std::vector<std::vector<std::string>> rows = {{}};
+};
+
+std::vector<NumberedRow> csv_rows(const std::string& text, const std::string& where) {
+  CsvTable table;
+  csv_parser parser{};
+  csv_init(&parser, CSV_STRICT | CSV_STRICT_FINI | CSV_APPEND_NULL | CSV_REPALL_NL);
+  const auto on_cell = [](void* cell, std::size_t size, void* to) {
+    static_cast<CsvTable*>(to)->rows.back().emplace_back(static_cast<const char*>(cell), size);
+  };
+  const auto on_line = [](int, void* to) { static_cast<CsvTable*>(to)->rows.emplace_back(); };
+  const bool whole = csv_parse(&parser, text.data(), text.size(), on_cell, on_line, &table) == text.size() &&
+                     csv_fini(&parser, on_cell, on_line, &table) == 0;
+  const int problem = csv_error(&parser);
+  csv_free(&parser);
+  if (!whole) throw Error(fmt::format("{}, line {}: {}", where, table.rows.size(), csv_strerror(problem)));
+  const std::vector<std::string>& names = table.rows.front();
+  for (const std::string& name : names) check_column(name, where);
+  std::vector<NumberedRow> rows;
+  for (std::size_t n = 1; n < table.rows.size(); ++n) {
+    const std::vector<std::string>& cells = table.rows[n];
+    if (cells.empty() || (cells.size() == 1 && cells.front().empty())) continue;
+    if (cells.size() != names.size())
+      throw Error(fmt::format("{}, line {}: {} cells, expected {} as in the first line", where, n + 1, cells.size(),
+                              names.size()));
+    NumberedRow row{.line = static_cast<int>(n + 1), .cells = {}};
+    for (std::size_t column = 0; column < names.size(); ++column)
+      row.cells[names[column]] =
+          names[column] == "ct" || names[column] == "images"
+              ? parts_of(cells[column])
+              : (cells[column].empty() ? std::vector<std::string>() : std::vector{cells[column]});
+    rows.push_back(std::move(row));
+  }
+  return rows;
+}
+
+std::vector<NumberedRow> json_rows(const std::string& text, const std::string& where) {
+  std::vector<NumberedRow> rows;
+  std::size_t begin = 0;
+  for (int line = 1; begin < text.size(); ++line) {
+    const std::size_t end = std::min(text.find('\n', begin), text.size());
+    const std::string one = text.substr(begin, end - begin);
+    begin = end + 1;
+    if (one.find_first_not_of(" \t\r") == std::string::npos) continue;
+    NumberedRow row{.line = line, .cells = {}};
+    try {
+      for (const auto& [name, value] : nlohmann::json::parse(one).get<std::map<std::string, nlohmann::json>>()) {
+        check_column(name, fmt::format("{}, line {}", where, line));
+        row.cells[name] =
+            value.is_array() ? value.get<std::vector<std::string>>() : std::vector{value.get<std::string>()};
+      }
+    } catch (const nlohmann::json::exception&) {
+      throw Error(fmt::format("{}, line {}: expected a JSON object of texts and lists of texts", where, line));
+    }
+    rows.push_back(std::move(row));
+  }
+  return rows;
+}
+
+BatchCase case_of(const NumberedRow& row, const fs::path& folder, const std::string& where) {
+  const auto many = [&](std::string_view column) {
+    const auto found = row.cells.find(column);
+    return found == row.cells.end() ? std::vector<std::string>() : found->second;
+  };
+  const auto one = [&](std::string_view column) {
+    const std::vector<std::string> texts = many(column);
+    if (texts.size() > 1)
+      throw Error(fmt::format("{}, line {}: {} entries in {}, expected one", where, row.line, texts.size(), column));
+    return texts.empty() ? std::string() : texts.front();
+  };
+  const auto path = [&](const std::string& text) { return text.empty() ? fs::path() : folder / text; };
+  const auto paths = [&](std::string_view column) {
+    std::vector<fs::path> all;
+    for (const std::string& text : many(column)) all.push_back(folder / text);
+    return all;
+  };
+  BatchCase one_case{.name = one("case"),
+                     .study = path(one("study")),
+                     .plan = path(one("plan")),
+                     .structures = path(one("structures")),
+                     .ct = paths("ct"),
+                     .images = paths("images"),
+                     .anatomy = one("anatomy")};
+  const auto is_allowed = [](unsigned char c) { return std::isalnum(c) != 0 || c == '.' || c == '_' || c == '-'; };
+  if (one_case.name.empty() || one_case.name.starts_with('.') || !std::ranges::all_of(one_case.name, is_allowed))
+    throw Error(fmt::format("{}, line {}: case \"{}\": expected a name of letters, digits, \".\", \"_\" and \"-\"",
+                            where, row.line, one_case.name));
+  if (one_case.study.empty() && (one_case.ct.empty() || one_case.images.empty()))
+    throw Error(
+        fmt::format("{}, line {}: case {}: expected a study, or ct and images", where, row.line, one_case.name));
+  return one_case;
+}
+
+// The folder of a CT where nothing else of CTs lies below it, else its files.
+std::vector<fs::path> ct_paths(const fs::path& top, const std::vector<fs::path>& files, const StudyFiles& all) {
+  fs::path folder = files.front().parent_path();
+  for (const fs::path& file : files)
+    if (file.parent_path() != folder) return files;
+  if (folder == top) return files;
+  for (const StudyFiles::Ct& ct : all.cts)
+    if (ct.files.front() != files.front())
+      for (const fs::path& other : ct.files)
+        if (other.string().starts_with(folder.string() + "/")) return files;
+  return {folder};
+}
+
+// Why a file in a folder of these parts cannot be read: it may be one of them, and without it they are another study.
+std::string unreadable_beside(const StudyParts& parts, const StudyFiles& all) {
+  std::set<std::string> folders;
+  for (const auto& files : {parts.ct, parts.images})
+    for (const fs::path& file : files) folders.insert(file.parent_path().string() + "/");
+  for (const std::string& reason : all.unreadable)  // each begins with the file's name
+    for (const std::string& folder : folders)
+      if (reason.starts_with(folder) &&
+          reason.substr(0, reason.find(": ")).find('/', folder.size()) == std::string::npos)
+        return reason;
+  return "";
+}
+
+std::string joined(const std::vector<fs::path>& paths) {
+  std::string text;
+  for (const fs::path& path : paths) text += (text.empty() ? "" : std::string(1, kBetweenPaths)) + path.string();
+  return text;
+}
+
+}  // namespace
+
+StudyOptions BatchCase::options(StudyOptions switches) const {
+  switches.study = study;
+  switches.ct = ct;
+  switches.images = images;
+  switches.plan = plan;
+  switches.structures = structures;
+  return switches;
+}
+
+std::string BatchCase::ct_key() const { return ct.empty() ? study.string() : joined(ct); }
+
+std::vector<BatchCase> read_manifest(const fs::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  std::string text{std::istreambuf_iterator<char>(file), {}};
+  if (!file) throw Error(fmt::format("{}: cannot be read", path.string()));
+  if (text.starts_with("\xEF\xBB\xBF")) text.erase(0, 3);
+  const std::string where = path.string();
+  const std::size_t first = text.find_first_not_of(" \t\r\n");
+  const bool is_json = first != std::string::npos && text[first] == '{';
+  std::vector<BatchCase> cases;
+  std::set<std::string> names;
+  for (const NumberedRow& row : is_json ? json_rows(text, where) : csv_rows(text, where)) {
+    cases.push_back(case_of(row, fs::absolute(path).parent_path(), where));
+    if (!names.insert(cases.back().name).second)
+      throw Error(fmt::format("{}, line {}: case {} is there twice", where, row.line, cases.back().name));
+  }
+  if (cases.empty()) throw Error(fmt::format("{}: holds no case", where));
+  return cases;
+}
+
+std::string manifest_csv(const std::vector<BatchCase>& cases) {
+  std::string csv = fmt::format("{}\n", fmt::join(kColumns, ","));
+  for (const BatchCase& c : cases)
+    csv += fmt::format("{},{},{},{},{},{},{}\n", c.name, csv_quoted(c.study.string()), csv_quoted(joined(c.ct)),
+                       csv_quoted(c.plan.string()), csv_quoted(c.structures.string()), csv_quoted(joined(c.images)),
+                       c.anatomy);
+  return csv;
+}
+
+std::vector<BatchCase> scan_cases(const fs::path& folder, bool other_xrays, Notes& notes) {
+  const fs::path top = fs::absolute(folder).lexically_normal();
+  const StudyFiles files = scan_study({top});
+  for (const std::string& reason : files.unreadable) notes.warnings.push_back(reason);
+  std::vector<BatchCase> cases;
+  for (const SessionFiles& session : sessions_of(files, other_xrays)) {
+    for (const std::string& remark : session.remarks)
+      notes.warnings.push_back(fmt::format("case {}: {}", session.name, remark));
+    try {
+      const StudyFiles own = files_for(session, files);
+      const StudyParts parts = choose_parts(own);
+      if (const std::string absent = missing_ct_images(own); !absent.empty()) throw Error(absent + " are not there");
+      if (const std::string reason = unreadable_beside(parts, files); !reason.empty())
+        throw Error("a file beside them may be theirs: " + reason);
+      cases.push_back({.name = session.name,
+                       .study = {},
+                       .plan = parts.plan.value_or(fs::path()),
+                       .structures = parts.structures.value_or(fs::path()),
+                       .ct = ct_paths(top, parts.ct, files),
+                       .images = parts.images,
+                       .anatomy = ""});
+    } catch (const Error& error) {
+      notes.warnings.push_back(fmt::format(
+          "{} and {} more X-rays make no case: {}\n       Or a manifest says what the files do not: --scan writes one",
+          session.images.front().file.string(), session.images.size() - 1, error.what()));
+    }
+  }
+  if (cases.empty()) throw Error(fmt::format("{}: holds no case: X-rays with a CT and a plan", folder.string()));
+  return cases;
+}
+
+}  // namespace isoshift

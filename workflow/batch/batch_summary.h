@@ -1,0 +1,34 @@
+#pragma once
+// What became of a batch: summary.csv, summary.json, index.html, patients.html, and the same in words.
+
+#include <string>
+#include <vector>
+
+#include "io/report/setup_report.h"
+#include "setup/setup_errors.h"
+#include "workflow/batch/batch_folder.h"
+
+namespace isoshift {
+
+struct CaseEnd {
+  std::string name;
+  std::optional<SetupReport> report;  // without pictures; unset: it failed, or has not ended
+  std::string error;                  // why it failed; empty without a report: it has not ended
+};
+
+struct BatchSummary {
+  std::vector<CaseEnd> cases;           // in the manifest's order
+  std::vector<PatientErrors> patients;  // from accepted results with all components
+  std::optional<PopulationErrors> population;
+
+  std::size_t accepted() const;
+  std::size_t open() const;  // have not ended
+};
+BatchSummary summary_of(const BatchFolder& folder, const std::vector<BatchCase>& cases);
+
+// Replaces an earlier summary.
+void write_summary(const BatchFolder& folder, const BatchSummary& summary);
+std::string summary_json(const BatchSummary& summary);
+std::string summary_text(const BatchSummary& summary);
+
+}  // namespace isoshift

@@ -1,0 +1,189 @@
+#include "workflow/evaluate/evaluate_study.h"
+
+#include <fmt/format.h>
+#include <tbb/task_arena.h>
+
+#include <atomic>
+#include <exception>
+#include <limits>
+#include <mutex>
+#include <thread>
+
+#include "base/error.h"
+#include "base/version.h"
+#include "geometry/rotation.h"
+#include "geometry/target_error.h"
+#include "registration/quality/judge.h"
+#include "setup/couch_shift.h"
+
+namespace isoshift {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+// The upper three rows.
+Json rows_of(const Eigen::Isometry3d& transform) {
+  Json rows = Json::array();
+  for (int row = 0; row < 3; ++row)
+    for (int column = 0; column < 4; ++column) rows.push_back(transform.matrix()(row, column));
+  return rows;
+}
+
+// All that the runs depend on: an evaluation is continued only where it is the same.
+Json configuration_of(const RegistrationRequest& request, const std::string& intensity, const Study& study,
+                      const Renderer& renderer, const Eigen::Isometry3d& truth, const StartProtocol& protocol) {
+  Json images = Json::array(), settings = Json::object();
+  for (const RtImage& image : study.rt_images) images.push_back(image.sop_instance_uid);
+  for (const auto& [name, value] : request.rendering.settings()) settings[name] = value;
+  std::vector<XrayView> views;
+  Json cameras = Json::array();
+  for (const XrayImage& xray : study.xrays) {
+    views.push_back(xray.view);
+    const auto& matrix = xray.view.pixel_from_room;
+    cameras.push_back({{"pixel_from_room", std::vector<double>(matrix.data(), matrix.data() + matrix.size())},
+                       {"megavoltage", xray.view.beam == Beam::kMegavoltage}});
+  }
+  const AttenuationModel model = request.rendering.model();
+  return {{"program", fmt::format("isoshift {} ({})", kVersion, kCommit)},
+          {"ct_series", study.ct->series_instance_uid},
+          {"images", images},
+          {"truth", rows_of(truth)},
+          {"planned_room_from_patient", rows_of(study.planned_room_from_patient)},
+          {"cameras", cameras},  // columns of each matrix
+          {"intensity", intensity},
+          {"structure_set", study.structures ? study.structures->sop_instance_uid : ""},
+          {"renderer", to_string(renderer.kind())},
+          {"device", renderer.device()},
+          {"renderer_settings", settings},
+          {"attenuation", request.rendering.attenuation_name()},
+          {"threshold_hu", request.rendering.threshold_hu},
+          {"window_hu", {model.window_low_hu, model.window_high_hu}},
+          {"preset", request.search.preset},
+          {"similarity", request.search.similarity.value_or("")},
+          {"optimizer", request.search.optimizer.value_or("")},
+          {"pixel_fraction", request.search.pixel_fraction.value_or(0.0)},
+          {"dof", request.search.dof},
+          {"check_vertebrae", request.search.check_vertebrae},
+          {"structures", request.region.structures},
+          {"excluded", request.region.excluded},
+          {"around_isocenter_mm", request.region.around_isocenter_mm.value_or(0.0)},
+          {"margin_mm", request.region.margin_mm},
+          {"rectangles", request.region.rectangles},
+          {"seed", request.search.seed},
+          {"series", protocol.series == StartProtocol::Series::kPaper ? "paper" : "bins"},
+          {"start_seed", protocol.seed},
+          {"starts", protocol.count},
+          {"distance_mm", protocol.distance_mm},
+          {"success_by", unobservable_directions(views).empty() ? "mTRE" : "mRPD"}};
+}
+
+std::string joined(const std::vector<std::string>& reasons) {
+  std::string text;
+  for (const std::string& reason : reasons) text += (text.empty() ? "" : "; ") + reason;
+  return text;
+}
+
+void add_errors(const RegistrationResult& result, const Eigen::Isometry3d& truth, const Study& study,
+                EvaluatedRun& run) {
+  const std::vector<Eigen::Vector3d> targets_mm = standard_targets_mm();
+  const Eigen::Isometry3d found =
+      setup_error_from_poses(study.planned_room_from_patient, result.actual_room_from_patient);
+  run.mtre_mm = mean_target_registration_error_mm(found, truth, targets_mm);
+  run.mpd_mm = run.mrpd_mm = 0.0;
+  for (const XrayImage& xray : study.xrays) {
+    const auto views = static_cast<double>(study.xrays.size());
+    run.mpd_mm += mean_projection_distance_mm(found, truth, targets_mm, xray.view) / views;
+    run.mrpd_mm += mean_reprojection_distance_mm(found, truth, targets_mm, xray.view) / views;
+  }
+  run.rotation_share = rotation_share(found, truth, targets_mm);
+  const Eigen::Isometry3d error = found * truth.inverse();
+  const Eigen::AngleAxisd turn(error.linear());
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const auto n = static_cast<Eigen::Index>(axis);
+    run.error[axis] = error.translation()[n];
+    run.error[axis + 3] = deg_from_rad(turn.angle()) * turn.axis()[n];
+  }
+  if (!result.uncertainty) return;
+  run.sigma.emplace();
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const auto n = static_cast<Eigen::Index>(axis);
+    (*run.sigma)[axis] = result.uncertainty->translation_mm[n];
+    (*run.sigma)[axis + 3] = deg_from_rad(result.uncertainty->rotation_rad[n]);
+  }
+}
+
+// A registration that ends with an error counts as one that found nothing.
+EvaluatedRun evaluated(int number, const StartPose& start, const Eigen::Isometry3d& truth, const Study& study,
+                       const RegistrationSetup& setup) {
+  constexpr double kNothing = std::numeric_limits<double>::infinity();
+  EvaluatedRun run{
+      .number = number, .start_mtre_mm = start.mtre_mm, .mtre_mm = kNothing, .mpd_mm = kNothing, .mrpd_mm = kNothing};
+  try {
+    const RegistrationResult result = register_views(
+        setup.renderers(), study.xrays, start.setup_error * study.planned_room_from_patient, setup.options());
+    add_errors(result, truth, study, run);
+    run.verdict = result.verdict;
+    run.reasons = joined(result.reasons);
+    run.evaluations = result.evaluations();
+    run.seconds = result.seconds;
+    run.seconds_rendering = result.seconds_rendering;
+    run.seconds_similarity = result.seconds_similarity;
+  } catch (const Error& error) {
+    run.reasons = error.what();
+  }
+  return run;
+}
+
+// Runs what is missing, several at a time, each on one thread; alone, one uses all. What it finds does not depend on
+// that.
+void run_missing(EvaluationFolder& folder, const Study& study, const RegistrationSetup& setup,
+                 const Eigen::Isometry3d& truth, const std::vector<StartPose>& starts, int jobs, Observer& observer) {
+  std::vector<int> missing;
+  for (int number = 0; number < static_cast<int>(starts.size()); ++number)
+    if (!folder.has(number)) missing.push_back(number);
+  std::atomic<std::size_t> next = 0;
+  std::mutex mutex;
+  std::exception_ptr failure;
+  const auto work = [&] {
+    for (std::size_t n = next++; n < missing.size(); n = next++) try {
+        const int number = missing[n];
+        const EvaluatedRun run = evaluated(number, starts[number], truth, study, setup);
+        const std::lock_guard lock(mutex);
+        folder.append(run);
+        observer.progress("Evaluating", folder.runs().size(), starts.size());
+      } catch (...) {
+        const std::lock_guard lock(mutex);
+        failure = std::current_exception();
+        next = missing.size();
+      }
+  };
+  if (jobs == 1) {
+    work();
+  } else {
+    std::vector<std::jthread> threads;
+    for (int job = 0; job < jobs; ++job) threads.emplace_back([&] { tbb::task_arena(1).execute(work); });
+  }
+  if (failure) std::rethrow_exception(failure);
+}
+
+}  // namespace
+
+EvaluationFolder evaluate_study(const EvaluateOptions& options, Notes& notes, Observer& observer) {
+  const RendererKind kind = options.registration.rendering.kind();
+  if (uses_gl(kind) && options.jobs > 1)
+    throw UsageError(
+        fmt::format("--jobs {}: {} renders for one registration at a time", options.jobs, to_string(kind)));
+  const int cores = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+  const int jobs = uses_gl(kind) ? 1 : options.jobs > 0 ? options.jobs : cores;
+  const Study study = load(options.study, notes, observer);
+  RendererStore renderers;
+  const RegistrationSetup setup(options.registration, study, beams_of(study), renderers);
+  EvaluationFolder folder(
+      options.output, configuration_of(options.registration, options.study.intensity, study, setup.renderers().finest(),
+                                       options.truth, options.protocol));
+  run_missing(folder, study, setup, options.truth, start_poses(options.truth, options.protocol), jobs, observer);
+  folder.write_summary();
+  return folder;
+}
+
+}  // namespace isoshift

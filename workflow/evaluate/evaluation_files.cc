@@ -1,0 +1,218 @@
+#include "workflow/evaluate/evaluation_files.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <sstream>
+
+#include "base/error.h"
+#include "base/output_folder.h"
+#include "io/report/bar_chart.h"
+
+namespace isoshift {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr const char* kConfigurationFile = "evaluation.json";
+constexpr const char* kRunsFile = "runs.csv";
+constexpr const char* kHeader =
+    "run,start_mtre_mm,mtre_mm,mpd_mm,mrpd_mm,rotation_share,dx_mm,dy_mm,dz_mm,drx_deg,dry_deg,drz_deg,"
+    "sigma_x_mm,sigma_y_mm,sigma_z_mm,sigma_rx_deg,sigma_ry_deg,sigma_rz_deg,evaluations,seconds,seconds_rendering,"
+    "seconds_similarity,verdict,reasons";
+
+std::string line_of(const EvaluatedRun& run) {
+  std::string line = fmt::format("{},{},{},{},{},{},{},", run.number, run.start_mtre_mm, run.mtre_mm, run.mpd_mm,
+                                 run.mrpd_mm, run.rotation_share, fmt::join(run.error, ","));
+  line += run.sigma ? fmt::format("{},", fmt::join(*run.sigma, ",")) : std::string(",,,,,,");
+  std::string reasons = run.reasons;
+  std::ranges::replace(reasons, '"', '\'');
+  std::ranges::replace_if(
+      reasons, [](unsigned char c) { return c < 0x20; }, ' ');
+  line += fmt::format("{},{},{},{},{},\"{}\"\n", run.evaluations, run.seconds, run.seconds_rendering,
+                      run.seconds_similarity, to_string(run.verdict), reasons);
+  return line;
+}
+
+// Fields up to the reasons, which alone hold commas.
+EvaluatedRun run_of(const std::string& line) {
+  std::istringstream text(line);
+  std::string field;
+  const auto number = [&] {
+    std::getline(text, field, ',');
+    return std::stod(field);
+  };
+  EvaluatedRun run;
+  run.number = static_cast<int>(number());
+  for (double* value : {&run.start_mtre_mm, &run.mtre_mm, &run.mpd_mm, &run.mrpd_mm, &run.rotation_share})
+    *value = number();
+  for (double& value : run.error) value = number();
+  std::array<double, 6> sigma = {};
+  bool has_sigma = true;
+  for (double& value : sigma) {
+    std::getline(text, field, ',');
+    has_sigma = has_sigma && !field.empty();
+    if (has_sigma) value = std::stod(field);
+  }
+  if (has_sigma) run.sigma = sigma;
+  run.evaluations = static_cast<int>(number());
+  for (double* value : {&run.seconds, &run.seconds_rendering, &run.seconds_similarity}) *value = number();
+  std::getline(text, field, ',');
+  for (const Verdict verdict : {Verdict::kAccepted, Verdict::kReview, Verdict::kRejected})
+    if (to_string(verdict) == field) run.verdict = verdict;
+  std::getline(text, run.reasons);
+  run.reasons = run.reasons.substr(1, run.reasons.size() - 2);
+  return run;
+}
+
+Json json_of(const EvaluationSummary& summary) {
+  Json json = {{"runs", summary.runs},
+               {"successes", summary.successes},
+               {"success_share", summary.success_share()},
+               {"mtre_mm", {{"mean", summary.mean_mm}, {"sd", summary.sd_mm}, {"median", summary.median_mm}}},
+               {"mpd_mm", summary.mean_mpd_mm},
+               {"mrpd_mm", summary.mean_mrpd_mm},
+               {"capture_range_mm", summary.capture_range_mm},
+               {"rotation_share_of_failures", summary.rotation_share_of_failures},
+               {"median_seconds", summary.median_seconds},
+               {"mean_evaluations", summary.mean_evaluations},
+               {"rendering_share", summary.rendering_share},
+               {"similarity_share", summary.similarity_share},
+               {"within_1_mm", {{"runs", summary.within_1_mm}, {"accepted", summary.within_1_mm_accepted}}},
+               {"beyond_2_mm", {{"runs", summary.beyond_2_mm}, {"accepted", summary.beyond_2_mm_accepted}}}};
+  if (summary.within_one_sigma) json["share_within_one_sigma"] = *summary.within_one_sigma;
+  if (summary.within_two_sigma) json["share_within_two_sigma"] = *summary.within_two_sigma;
+  return json;
+}
+
+// What was left after registration, in 40 bins up to the worst success; failures are counted in the title.
+BarChart error_histogram(const std::vector<EvaluatedRun>& runs, bool by_mrpd, const EvaluationSummary& summary) {
+  constexpr int kBins = 40;
+  const auto left_mm = [by_mrpd](const EvaluatedRun& run) { return by_mrpd ? run.mrpd_mm : run.mtre_mm; };
+  double largest_mm = 0.05;
+  for (const EvaluatedRun& run : runs)
+    if (left_mm(run) < kSuccessMm) largest_mm = std::max(largest_mm, left_mm(run));
+  const double width_mm = largest_mm / kBins;
+  BarChart chart{.title = fmt::format("{} after registration: {} of {} below {} mm", by_mrpd ? "mRPD" : "mTRE",
+                                      summary.successes, summary.runs, kSuccessMm),
+                 .x_label = by_mrpd ? "mRPD [mm]" : "mTRE [mm]",
+                 .y_label = "registrations"};
+  for (int bin = 0; bin < kBins; ++bin) chart.bars.push_back({.from = bin * width_mm, .to = (bin + 1) * width_mm});
+  for (const EvaluatedRun& run : runs)
+    if (left_mm(run) < kSuccessMm)
+      chart.bars[std::min<std::size_t>(kBins - 1, static_cast<std::size_t>(left_mm(run) / width_mm))].height += 1.0;
+  return chart;
+}
+
+BarChart success_chart(const std::vector<EvaluatedRun>& runs, bool by_mrpd, const EvaluationSummary& summary) {
+  BarChart chart{.title = fmt::format("Success: {:.1f} % of {} starts, capture range {} mm",
+                                      100.0 * summary.success_share(), summary.runs, summary.capture_range_mm),
+                 .x_label = "mTRE at the start [mm]",
+                 .y_label = "success [%]; dashed: 95 %",
+                 .y_max = 100.0,
+                 .reference_line = 95.0};
+  for (const SuccessBin& bin : success_bins(runs, by_mrpd))
+    chart.bars.push_back({.from = static_cast<double>(bin.start_mm),
+                          .to = bin.start_mm + 1.0,
+                          .height = 100.0 * bin.successes / bin.runs});
+  return chart;
+}
+
+Json parsed(const std::filesystem::path& file) {
+  std::ifstream stream(file);
+  if (!stream) throw Error(fmt::format("{}: cannot be opened; is this the folder of an evaluation?", file.string()));
+  try {
+    return Json::parse(stream);
+  } catch (const nlohmann::json::exception& error) {
+    throw Error(fmt::format("{}: cannot be read: {}", file.string(), error.what()));
+  }
+}
+
+}  // namespace
+
+EvaluationFolder::EvaluationFolder(std::filesystem::path path, Json configuration)
+    : path_(std::move(path)), configuration_(std::move(configuration)) {
+  if (std::filesystem::exists(path_ / kConfigurationFile)) {
+    if (parsed(path_ / kConfigurationFile) != configuration_)
+      throw Error(
+          fmt::format("{}: holds another evaluation (evaluation.json says which).\n       Choose another folder with "
+                      "-o, or remove this one",
+                      path_.string()));
+    read_runs();
+    return;
+  }
+  if (std::filesystem::exists(path_) && !std::filesystem::is_empty(path_))
+    throw Error(
+        fmt::format("{}: exists and holds no evaluation.\n       Choose another folder with -o", path_.string()));
+  std::filesystem::create_directories(path_);
+  write_text(path_ / kConfigurationFile, configuration_.dump(2) + "\n");
+  write_text(path_ / kRunsFile, std::string(kHeader) + "\n");
+}
+
+EvaluationFolder::EvaluationFolder(std::filesystem::path path)
+    : path_(std::move(path)), configuration_(parsed(path_ / kConfigurationFile)) {
+  read_runs();
+}
+
+// A last line without its end is of a run that was stopped: it is made again.
+void EvaluationFolder::read_runs() {
+  std::ifstream stream(path_ / kRunsFile);
+  std::string whole, line;
+  std::getline(stream, line);
+  if (line != kHeader) throw Error(fmt::format("{}: is of another version", (path_ / kRunsFile).string()));
+  whole = line + "\n";
+  bool cut = false;
+  while (std::getline(stream, line)) {
+    cut = stream.eof();
+    if (cut) break;
+    try {
+      runs_.push_back(run_of(line));
+    } catch (const std::exception&) {
+      throw Error(fmt::format("{}: line {} cannot be read: {}", (path_ / kRunsFile).string(), runs_.size() + 2, line));
+    }
+    whole += line + "\n";
+  }
+  if (cut) replace_text(path_ / kRunsFile, whole);
+}
+
+bool EvaluationFolder::has(int number) const {
+  return std::ranges::find(runs_, number, &EvaluatedRun::number) != runs_.end();
+}
+
+void EvaluationFolder::append(const EvaluatedRun& run) {
+  std::ofstream stream(path_ / kRunsFile, std::ios::app);
+  stream << line_of(run) << std::flush;
+  if (!stream) throw Error(fmt::format("{}: cannot be written", (path_ / kRunsFile).string()));
+  runs_.push_back(run);
+}
+
+void EvaluationFolder::write_summary() const {
+  const EvaluationSummary summary = summarized(runs_, judged_by_mrpd());
+  replace_text(path_ / "summary.json", json_of(summary).dump(2) + "\n");
+  replace_text(path_ / "success.svg", bar_chart_svg(success_chart(runs_, judged_by_mrpd(), summary)));
+  replace_text(path_ / "errors.svg", bar_chart_svg(error_histogram(runs_, judged_by_mrpd(), summary)));
+}
+
+std::string evaluation_table(const std::vector<std::pair<std::string, EvaluationSummary>>& rows) {
+  std::size_t width = 10;
+  for (const auto& [name, summary] : rows) width = std::max(width, name.size());
+  std::string table = fmt::format(
+      "| {:<{}} | success | mTRE mean +/- SD | median | mPD | mRPD | capture | rotation | accepted <1 mm | accepted >2 "
+      "mm | evaluations | time | rendering |\n|{:-<{}}|---|---|---|---|---|---|---|---|---|---|---|---|\n",
+      "", width, "", width + 2);
+  for (const auto& [name, s] : rows)
+    table += fmt::format(
+        "| {:<{}} | {}/{} ({:.1f} %) | {:.2f} +/- {:.2f} mm | {:.2f} mm | {:.2f} mm | {:.2f} mm | {} mm | {} | {}/{} | "
+        "{}/{} | {:.0f} | {:.2f} s | {:.0f} % |\n",
+        name, width, s.successes, s.runs, 100.0 * s.success_share(), s.mean_mm, s.sd_mm, s.median_mm, s.mean_mpd_mm,
+        s.mean_mrpd_mm, s.capture_range_mm,
+        s.successes < s.runs ? fmt::format("{:.0f} %", 100.0 * s.rotation_share_of_failures) : "-",
+        s.within_1_mm_accepted, s.within_1_mm, s.beyond_2_mm_accepted, s.beyond_2_mm, s.mean_evaluations,
+        s.median_seconds, 100.0 * s.rendering_share);
+  return table;
+}
+
+}  // namespace isoshift

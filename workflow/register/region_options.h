@@ -1,0 +1,36 @@
+#pragma once
+// Which part of the patient is registered.
+
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "io/study/study.h"
+#include "registration/preprocess/preprocess.h"
+#include "registration/region.h"
+
+namespace isoshift {
+
+struct RegionOptions {
+  std::vector<std::string> structures, excluded, rectangles;
+  std::optional<double> around_isocenter_mm;
+  double margin_mm = 5.0;
+
+  // The rectangles by label. Throws UsageError for one that cannot be read or whose label no X-ray has.
+  std::map<std::string, PixelRectangle> rectangles_of(const Study& study) const;
+
+  // What was chosen, in words; empty where everything is compared.
+  std::vector<std::string> in_words() const;
+};
+
+// The CT as it is rendered, and what of the views is compared.
+struct RegionOfStudy {
+  // Without what lies outside the volume of interest and without excluded structures; unset: the whole CT.
+  std::optional<Volume<float>> rendered_ct;
+  ProjectedRegion projected;
+};
+// Throws UsageError for a radius that is not positive, and Error for a structure the study lacks.
+RegionOfStudy region_of(const RegionOptions& options, const Study& study, double threshold_hu);
+
+}  // namespace isoshift

@@ -1,0 +1,38 @@
+#pragma once
+// From an exported study to the folder of its result: what isoshift register, batch and watch do with each study.
+
+#include <filesystem>
+#include <optional>
+#include <string>
+
+#include "io/objects/spatial_registration.h"
+#include "io/report/setup_report.h"
+#include "workflow/observer.h"
+#include "workflow/register/registration_setup.h"
+#include "workflow/register/study_options.h"
+
+namespace isoshift {
+
+struct RegisterOptions {
+  StudyOptions study;
+  RegistrationRequest registration;
+  std::filesystem::path output;
+  std::filesystem::path site;  // empty: no site file
+  std::string anatomy;
+  bool overwrite = false;
+  bool write_reg_for_review = false;
+  bool accept_unobservable = false;
+  RegistrationSource source = RegistrationSource::kTreatment;
+};
+
+// What registrations of one process share where they can.
+struct SharedWork {
+  CtStore cts;
+  RendererStore renderers;
+};
+
+// Registers a study and writes the folder of its result, whole or not at all. `options.registration` must have been
+// settled.
+SetupReport register_study(const RegisterOptions& options, SharedWork& shared, Observer& observer);
+
+}  // namespace isoshift

@@ -1,0 +1,38 @@
+#include "workflow/register/registration_setup.h"
+
+namespace isoshift {
+
+void RegistrationRequest::settle() {
+  search.registration().check();
+  if (search.is_paper()) rendering.default_to_paper();
+  rendering.check();
+}
+
+std::shared_ptr<const RendererPyramid> RendererStore::get(const RenderingOptions& rendering,
+                                                          const std::shared_ptr<const CtSeries>& ct,
+                                                          const std::vector<Beam>& beams) {
+  if (!last_ || ct != ct_ || beams != beams_) {
+    last_.reset();  // never two in memory
+    last_ = std::make_shared<const RendererPyramid>(rendering.kind(), ct->hu, rendering.model(), beams,
+                                                    rendering.options());
+    ct_ = ct;
+    beams_ = beams;
+  }
+  return last_;
+}
+
+RegistrationSetup::RegistrationSetup(const RegistrationRequest& request, const Study& study,
+                                     const std::vector<Beam>& beams, RendererStore& store)
+    : options_(request.search.registration()) {
+  RegionOfStudy region = region_of(request.region, study, request.rendering.threshold_hu);
+  if (region.rendered_ct)
+    renderers_ = std::make_shared<const RendererPyramid>(request.rendering.kind(), *region.rendered_ct,
+                                                         request.rendering.model(), beams, request.rendering.options());
+  else
+    renderers_ = store.get(request.rendering, study.ct, beams);
+  region_ = std::move(region.projected);
+  options_.region = &region_;
+  options_.rectangles = request.region.rectangles_of(study);
+}
+
+}  // namespace isoshift

@@ -1,0 +1,54 @@
+#pragma once
+// From what a person asks for and a study to what register_views() takes: the same for every command that registers.
+
+#include <memory>
+#include <vector>
+
+#include "drr/renderer_pyramid.h"
+#include "workflow/register/region_options.h"
+#include "workflow/register/rendering_options.h"
+#include "workflow/register/search_request.h"
+#include "workflow/register/study_options.h"
+
+namespace isoshift {
+
+struct RegistrationRequest {
+  SearchRequest search;
+  RegionOptions region;
+  RenderingOptions rendering;
+
+  // Settles what the preset says of rendering. Throws UsageError for choices that make no sense together, before
+  // anything is read.
+  void settle();
+};
+
+// The renderers of the last whole CT, for registrations that share it.
+class RendererStore {
+ public:
+  std::shared_ptr<const RendererPyramid> get(const RenderingOptions& rendering,
+                                             const std::shared_ptr<const CtSeries>& ct, const std::vector<Beam>& beams);
+
+ private:
+  std::shared_ptr<const CtSeries> ct_;
+  std::vector<Beam> beams_;
+  std::shared_ptr<const RendererPyramid> last_;
+};
+
+// The options refer to the region: neither can be moved.
+class RegistrationSetup {
+ public:
+  RegistrationSetup(const RegistrationRequest& request, const Study& study, const std::vector<Beam>& beams,
+                    RendererStore& store);
+  RegistrationSetup(const RegistrationSetup&) = delete;
+  RegistrationSetup& operator=(const RegistrationSetup&) = delete;
+
+  const RendererPyramid& renderers() const { return *renderers_; }
+  const RegistrationOptions& options() const { return options_; }
+
+ private:
+  ProjectedRegion region_;
+  std::shared_ptr<const RendererPyramid> renderers_;
+  RegistrationOptions options_;
+};
+
+}  // namespace isoshift

@@ -1,0 +1,91 @@
+#include "workflow/register/study_options.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+
+#include "base/error.h"
+
+namespace isoshift {
+namespace {
+
+// "KEY=VALUE" at its first "=".
+std::pair<std::string, std::string> key_and_value(const std::string& text, std::string_view flag) {
+  const auto equals = text.find('=');
+  if (equals == std::string::npos || equals == 0 || equals + 1 == text.size())
+    throw UsageError(fmt::format("{} {}: expected two parts joined by =", flag, text));
+  return {text.substr(0, equals), text.substr(equals + 1)};
+}
+
+double number_from(const std::string& text, std::string_view flag) {
+  double value = 0.0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc() || end != text.data() + text.size() || !std::isfinite(value))
+    throw UsageError(fmt::format("{}: \"{}\" is no finite number", flag, text));
+  return value;
+}
+
+}  // namespace
+
+void StudyOptions::check_finite() const {
+  const auto check = [](const char* flag, const auto& values) {
+    for (const double value : values)
+      if (!std::isfinite(value)) throw UsageError(fmt::format("{}: {} is no finite number", flag, value));
+  };
+  check("--isocenter", isocenter);
+  check("--rt-image-position", rt_image_position);
+  check("--couch-angle", std::array{couch_angle_deg.value_or(0.0)});
+  check("--sad", std::array{sad_mm.value_or(0.0)});
+  check("--sid", std::array{sid_mm.value_or(0.0)});
+}
+
+StudyRequest StudyOptions::request() const {
+  check_finite();
+  StudyRequest request;
+  if (study.empty() && (ct.empty() || images.empty()))
+    throw UsageError("which study? Name its folder, or its parts with --ct and --image");
+  request.parts = {.study = study, .ct = ct, .images = images, .plan = std::nullopt};
+  if (!plan.empty()) request.parts.plan = plan;
+  if (!structures.empty()) request.parts.structures = structures;
+  if (!isocenter.empty()) request.isocenter_patient_mm = Eigen::Vector3d(isocenter.data());
+  for (const std::string& text : gantry_angles) {
+    const auto [label, angle] = key_and_value(text, "--gantry-angle");
+    request.switches.gantry_angle_deg[label] = number_from(angle, "--gantry-angle");
+  }
+  request.max_span_s = max_span_s;
+  request.switches.couch_angle_deg = couch_angle_deg;
+  request.switches.sad_mm = sad_mm;
+  request.switches.sid_mm = sid_mm;
+  if (!rt_image_position.empty()) request.switches.position_mm = Eigen::Vector2d(rt_image_position.data());
+  request.switches.assume_centered = assume_centered;
+  if (!intensity.empty()) request.switches.intensity = pixel_intensity_from(intensity);
+  if (!beam.empty()) request.switches.beam = beam == "kv" ? Beam::kKilovoltage : Beam::kMegavoltage;
+  if (!patient_position.empty()) request.switches.patient_position = patient_position_from(patient_position);
+  if (!machine.empty()) request.machine = read_machine_profile(machine);
+  for (const std::string& text : allow) {
+    const auto [key, reason] = key_and_value(text, "--allow");
+    if (std::ranges::find(kAllowKeys, key, &AllowKey::key) == std::end(kAllowKeys))
+      throw UsageError(fmt::format("--allow {}: no check has this key", key));
+    request.allowed[key] = reason;
+  }
+  return request;
+}
+
+Study load(const StudyOptions& options, Notes& notes, Observer& observer, CtStore& cts) {
+  const auto progress = [&](std::size_t done, std::size_t total) { observer.progress("Reading CT", done, total); };
+  Study study = load_study(options.request(), notes, progress, cts);
+  for (const std::string& file : notes.left_aside) observer.say("left aside: " + file);
+  return study;
+}
+
+std::vector<Beam> beams_of(const Study& study) {
+  std::vector<Beam> beams;
+  for (const XrayImage& xray : study.xrays)
+    if (std::ranges::find(beams, xray.view.beam) == beams.end()) beams.push_back(xray.view.beam);
+  return beams;
+}
+
+}  // namespace isoshift

@@ -1,0 +1,39 @@
+#pragma once
+// Which study a person means, and what a person supplies for it: the same for every command that reads one.
+
+#include <string>
+#include <vector>
+
+#include "io/study/study.h"
+#include "workflow/observer.h"
+
+namespace isoshift {
+
+struct StudyOptions {
+  std::filesystem::path study, plan, structures, machine;
+  std::vector<std::filesystem::path> ct, images;
+  std::vector<double> isocenter, rt_image_position;
+  std::vector<std::string> gantry_angles, allow;
+  std::string patient_position, intensity, beam;
+  std::optional<double> couch_angle_deg, sad_mm, sid_mm;
+  bool assume_centered = false;
+  double max_span_s = kDefaultUntoldSpanS;  // of the site, no flag
+
+  // Throws UsageError for a word that is none of those allowed, a number that is not finite, or no study at all.
+  StudyRequest request() const;
+
+ private:
+  void check_finite() const;
+};
+
+// Loads the study and tells the observer what was left aside.
+Study load(const StudyOptions& options, Notes& notes, Observer& observer, CtStore& cts);
+inline Study load(const StudyOptions& options, Notes& notes, Observer& observer) {
+  CtStore none;
+  return load(options, notes, observer, none);
+}
+
+// The beam qualities of its X-rays.
+std::vector<Beam> beams_of(const Study& study);
+
+}  // namespace isoshift

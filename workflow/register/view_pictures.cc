@@ -1,0 +1,65 @@
+#include "workflow/register/view_pictures.h"
+
+#include <algorithm>
+#include <array>
+
+#include "registration/preprocess/image_operations.h"
+#include "registration/preprocess/preprocess.h"
+#include "registration/region.h"
+
+namespace isoshift {
+namespace {
+
+constexpr int kMaxEdge = 640;
+
+// The directions of the patient at the four edges of the image, by where a step from the isocenter is projected.
+std::array<std::string, 4> directions_at_edges(const XrayView& view, const Eigen::Isometry3d& room_from_patient) {
+  constexpr double kStepMm = 10.0;
+  const Eigen::Vector2d isocenter = view.project(Eigen::Vector3d::Zero()).value();
+  Eigen::Matrix<double, 2, 3> pixels_from_patient;
+  for (int axis = 0; axis < 3; ++axis)
+    pixels_from_patient.col(axis) = view.project(kStepMm * room_from_patient.linear().col(axis)).value() - isocenter;
+  const Eigen::Vector3d right = pixels_from_patient.row(0), down = pixels_from_patient.row(1);
+  return {orientation_letters(-right), orientation_letters(right), orientation_letters(-down),
+          orientation_letters(down)};
+}
+
+std::vector<Polygon> silhouette(const ProjectedRegion& structure, const XrayView& view, const Eigen::Isometry3d& pose) {
+  FixedImage shadow{.view = view,
+                    .line_integral = Image<float>(view.columns, view.rows),
+                    .field = Image<std::uint8_t>(view.columns, view.rows, 1)};
+  structure.restrict(shadow, pose, 0.0);
+  return outlines(shadow.field);
+}
+
+}  // namespace
+
+std::vector<ViewPicture> view_pictures(const Study& study, Renderer& renderer,
+                                       const std::vector<MarkedStructure>& structures,
+                                       const Eigen::Isometry3d& actual_room_from_patient) {
+  std::vector<ProjectedRegion> regions;
+  regions.reserve(structures.size());
+  for (const MarkedStructure& structure : structures)
+    regions.emplace_back(RegionOfInterest{.volume = structure.mask, .left_out = {}, .cut_ends = {}});
+  const std::array poses = {study.planned_room_from_patient, actual_room_from_patient};
+  std::vector<ViewPicture> pictures;
+  for (const XrayImage& xray : study.xrays) {
+    const int factor = (std::max(xray.view.columns, xray.view.rows) + kMaxEdge - 1) / kMaxEdge;
+    const FixedImage image = reduced(prepare(xray), factor);
+    const RenderResult drrs = renderer.render(std::span(&image.view, 1), poses, PixelSet::all());
+    ViewPicture& picture = pictures.emplace_back();
+    put_grays(picture, image.line_integral, image_of(image.view, drrs.line_integrals(0, 0)),
+              image_of(image.view, drrs.line_integrals(1, 0)), image.field);
+    picture.field = outlines(image.field);
+    picture.isocenter_px = image.view.project(Eigen::Vector3d::Zero()).value();
+    picture.pixels_per_mm = pixels_per_mm(image.view);
+    picture.directions = directions_at_edges(image.view, study.planned_room_from_patient);
+    for (std::size_t n = 0; n < structures.size(); ++n)
+      picture.structures.push_back({.name = structures[n].name,
+                                    .planned = silhouette(regions[n], image.view, poses[0]),
+                                    .found = silhouette(regions[n], image.view, poses[1])});
+  }
+  return pictures;
+}
+
+}  // namespace isoshift

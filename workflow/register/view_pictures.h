@@ -1,0 +1,22 @@
+#pragma once
+// The pictures of a result's views: X-ray, DRR as planned and as found, and what is marked in them.
+
+#include <vector>
+
+#include "drr/renderer.h"
+#include "io/report/view_picture.h"
+#include "io/study/study.h"
+
+namespace isoshift {
+
+struct MarkedStructure {
+  std::string name;
+  Volume<std::uint8_t> mask;  // in the CT's voxels
+};
+
+// One per view, reduced to at most 640 pixels along an edge.
+std::vector<ViewPicture> view_pictures(const Study& study, Renderer& renderer,
+                                       const std::vector<MarkedStructure>& structures,
+                                       const Eigen::Isometry3d& actual_room_from_patient);
+
+}  // namespace isoshift
