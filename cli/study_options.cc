@@ -44,6 +44,8 @@ void StudyOptions::check_finite() const {
   check("--isocenter", isocenter);
   check("--rt-image-position", rt_image_position);
   check("--couch-angle", std::array{couch_angle_deg.value_or(0.0)});
+  check("--couch-pitch", std::array{couch_pitch_deg.value_or(0.0)});
+  check("--couch-roll", std::array{couch_roll_deg.value_or(0.0)});
   check("--sad", std::array{sad_mm.value_or(0.0)});
   check("--sid", std::array{sid_mm.value_or(0.0)});
 }
@@ -62,6 +64,8 @@ StudyRequest StudyOptions::request() const {
     request.switches.gantry_angle_deg[label] = number_from(angle, "--gantry-angle");
   }
   request.switches.couch_angle_deg = couch_angle_deg;
+  request.switches.couch_pitch_deg = couch_pitch_deg;
+  request.switches.couch_roll_deg = couch_roll_deg;
   request.switches.sad_mm = sad_mm;
   request.switches.sid_mm = sid_mm;
   if (!rt_image_position.empty()) request.switches.position_mm = Eigen::Vector2d(rt_image_position.data());
@@ -109,6 +113,17 @@ void add_study_switches(CLI::App& command, StudyOptions& options) {
       ->check(CLI::IsMember({"HFS", "HFP", "FFS", "FFP", "HFDR", "HFDL", "FFDR", "FFDL"}))
       ->group(lacking);
   command.add_option("--couch-angle", options.couch_angle_deg, "Patient support angle at imaging, IEC 61217")
+      ->type_name("DEG")
+      ->group(lacking);
+  command
+      .add_option("--couch-pitch", options.couch_pitch_deg,
+                  "Table top pitch angle at imaging, IEC 61217: positive with the gantry end up")
+      ->type_name("DEG")
+      ->group(lacking);
+  command
+      .add_option(
+          "--couch-roll", options.couch_roll_deg,
+          "Table top roll angle at imaging, IEC 61217: positive with the right side down, seen facing the gantry")
       ->type_name("DEG")
       ->group(lacking);
   command.add_option("--gantry-angle", options.gantry_angles, "Gantry angle of the image with this label, IEC 61217")
