@@ -1,15 +1,38 @@
-#!/bin/sh
-# Installs a package of isoshift in a fresh Debian 12 and uses it there: try.sh PACKAGE.deb. Needs root, debootstrap and a mirror.
-set -eu
-package=$(readlink -f "$1")
-root=$(mktemp -d /var/tmp/isoshift-root-XXXXXX)
-trap 'rm -rf "$root"' EXIT
+#!/bin/bash
+# Installs a package of isoshift in a fresh Debian and uses it there: try.sh 12|13 [PACKAGE.deb]. Without a package, what is
+# committed goes through ./dev demo in a fresh Debian of that release, and the package is made there; it is kept in
+# build/debian-RELEASE. Needs root, debootstrap and a mirror.
+set -euo pipefail
+cd "$(dirname "$(readlink -f "$0")")/.."
+release=$1 package=${2:-}
+case $release in
+  12) codename=bookworm ;;
+  13) codename=trixie ;;
+  *) echo "error: try.sh $release: expected 12 or 13, a release of Debian" >&2; exit 2 ;;
+esac
 
-debootstrap --variant=minbase bookworm "$root" >"$root.log" 2>&1 || { tail -n 20 "$root.log" >&2; exit 1; }
-rm -f "$root.log"
-cp "$package" "$root/isoshift.deb"
-cp /etc/resolv.conf "$root/etc/resolv.conf"
+root=
+trap 'rm -rf "$root"' EXIT
+fresh_debian() {
+  rm -rf "$root"
+  root=$(mktemp -d /var/tmp/isoshift-root-XXXXXX)
+  debootstrap --variant=minbase "$codename" "$root" >"$root.log" 2>&1 || { tail -n 20 "$root.log" >&2; rm "$root.log"; exit 1; }
+  rm -f "$root.log"
+  cp /etc/resolv.conf "$root/etc/resolv.conf"
+}
 inside() { chroot "$root" env DEBIAN_FRONTEND=noninteractive LC_ALL=C.UTF-8 "$@"; }
+
+if [ -z "$package" ]; then
+  fresh_debian
+  git clone -q . "$root/src"
+  inside sh -c 'cd /src && ./dev demo && apt-get install -y -qq --no-install-recommends dpkg-dev && cd build/demo && cpack'
+  mkdir -p "build/debian-$release"
+  cp "$root"/src/build/demo/isoshift_*.deb "build/debian-$release"
+  package=$(ls -t "build/debian-$release"/isoshift_*.deb | head -n 1)
+fi
+
+fresh_debian
+cp "$package" "$root/isoshift.deb"
 inside apt-get update -qq
 inside apt-get install -y -qq --no-install-recommends man-db /isoshift.deb >/dev/null 2>&1
 inside isoshift --version

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <array>
 #include <cmath>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -11,6 +12,7 @@
 #include "cli/commands/commands.h"
 #include "io/dicom/rt_plan.h"
 #include "io/objects/registration_check.h"
+#include "io/objects/registration_meaning.h"
 #include "io/objects/spatial_registration.h"
 #include "setup/couch_shift.h"
 
@@ -24,65 +26,58 @@ struct CheckOptions {
   std::filesystem::path plan;
   std::vector<double> isocenter, source_isocenter;
   std::string patient_position;
-  std::optional<double> couch_angle_deg;
+  std::optional<double> couch_angle_deg, couch_pitch_deg, couch_roll_deg;
   bool as_json = false;
+
+  void check() const;
 };
 
-// Where the patient was planned to lie.
-struct PlannedSetup {
-  std::optional<double> couch_angle_deg;
-  TableAngles table;
-  Eigen::Vector3d isocenter_patient_mm = Eigen::Vector3d::Zero();
-  Eigen::Isometry3d room_from_patient = Eigen::Isometry3d::Identity();
-};
+void CheckOptions::check() const {
+  const auto check_finite = [](const char* flag, const auto& values) {
+    for (const double value : values)
+      if (!std::isfinite(value)) throw UsageError(fmt::format("{}: {} is no finite number", flag, value));
+  };
+  check_finite("--isocenter", isocenter);
+  check_finite("--source-isocenter", source_isocenter);
+  const bool asks_for_shift = !plan.empty() || !isocenter.empty() || !patient_position.empty();
+  for (const auto& [flag, angle_deg] :
+       {std::pair("--couch-angle", couch_angle_deg), std::pair("--couch-pitch", couch_pitch_deg),
+        std::pair("--couch-roll", couch_roll_deg)}) {
+    if (!angle_deg) continue;
+    check_finite(flag, std::array{*angle_deg});
+    if (!asks_for_shift)
+      throw UsageError(
+          fmt::format("{} belongs to a couch shift: add --plan FILE, or --isocenter X,Y,Z and "
+                      "--patient-position HFS",
+                      flag));
+  }
+}
 
 // What the switches say, else the plan; nothing where neither says anything.
 std::optional<PlannedSetup> planned_setup(const CheckOptions& options) {
+  PlannedSetup setup = {.couch_angle_deg = options.couch_angle_deg,
+                        .couch_pitch_deg = options.couch_pitch_deg,
+                        .couch_roll_deg = options.couch_roll_deg};
   std::optional<Eigen::Vector3d> isocenter;
   std::optional<std::string> position;
-  std::optional<double> couch_angle_deg = options.couch_angle_deg;
   if (!options.isocenter.empty()) isocenter = Eigen::Vector3d(options.isocenter.data());
   if (!options.patient_position.empty()) position = options.patient_position;
   if (!options.plan.empty()) {
-    const RtPlan plan = read_rt_plan(options.plan);
-    if (!isocenter) isocenter = common_isocenter(plan, plan.beams);
-    if (!position) position = common_patient_position(plan, plan.beams);
+    setup.plan = read_rt_plan(options.plan);
+    if (!isocenter) isocenter = common_isocenter(*setup.plan, setup.plan->beams);
+    if (!position) position = common_patient_position(*setup.plan, setup.plan->beams);
   }
   if (!isocenter && !position) return std::nullopt;
-  if ((isocenter && !isocenter->allFinite()) || !std::isfinite(couch_angle_deg.value_or(0.0)))
-    throw UsageError("--isocenter and --couch-angle take finite numbers");
   if (!isocenter) throw UsageError("the shift needs the planned isocenter: --plan FILE or --isocenter X,Y,Z");
   if (!position) throw UsageError("the shift needs the patient position: --plan FILE or --patient-position HFS");
   const auto known = patient_position_from(*position);
   if (!known) throw UsageError(fmt::format("the patient position is {}, expected HFS, HFP, FFS, FFP, ...", *position));
-  const TableAngles table = {.support_rad = rad_from_deg(couch_angle_deg.value_or(0.0))};
-  return PlannedSetup{.couch_angle_deg = couch_angle_deg,
-                      .table = table,
-                      .isocenter_patient_mm = *isocenter,
-                      .room_from_patient = planned_room_from_patient(*known, table, *isocenter)};
+  setup.isocenter_patient_mm = *isocenter;
+  setup.patient_position = *known;
+  return setup;
 }
 
-std::optional<Eigen::Isometry3d> rigid_of(const CheckedRegistration& checked) {
-  return checked.registered_from_source ? as_rigid(*checked.registered_from_source) : std::nullopt;
-}
-
-bool is_from_room(const CheckedRegistration& checked) { return checked.source_frame_uid == kIecFixedFrameUid; }
-
-// The matrix from a frame that begins at the machine's isocenter; nothing, and a finding, where that is not known.
-std::optional<Eigen::Isometry3d> from_isocenter(CheckedRegistration& checked, const CheckOptions& options) {
-  std::optional<Eigen::Isometry3d> matrix = rigid_of(checked);
-  if (!matrix || !checked.source_is_that_of_images) return matrix;
-  if (options.source_isocenter.empty()) {
-    checked.findings.push_back(
-        {.is_error = false,
-         .text =
-             "its source frame is that of images, whose origin may lie anywhere: what it means for the couch is known "
-             "with --source-isocenter X,Y,Z only, their IsocenterPosition (300A,012C)"});
-    return std::nullopt;
-  }
-  matrix->translate(Eigen::Vector3d(options.source_isocenter.data()));
-  return matrix;
-}
+Json json_of(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
 
 Json json_of(const CouchShift& shift) {
   return {{"lateral_mm", shift.translation_mm.x()},        {"longitudinal_mm", shift.translation_mm.y()},
@@ -90,112 +85,94 @@ Json json_of(const CouchShift& shift) {
           {"pitch_deg", deg_from_rad(shift.change.x_rad)}, {"roll_deg", deg_from_rad(shift.change.y_rad)}};
 }
 
-// The shift that a matrix from the isocenter means; nothing, and a finding, where its origin lies nowhere near the
-// planned one.
-std::optional<CouchShift> shift_of(CheckedRegistration& checked, const Eigen::Isometry3d& matrix,
-                                   const PlannedSetup& setup) {
-  constexpr double kMaxSetupErrorMm = 200.0;
-  const auto off_isocenter_mm = [&](const Eigen::Isometry3d& pose) {
-    return (pose.translation() - setup.isocenter_patient_mm).norm();
-  };
-  const auto note = [&](bool is_error, std::string text) {
-    checked.findings.push_back({.is_error = is_error, .text = std::move(text)});
-    return std::nullopt;
-  };
-  if (off_isocenter_mm(matrix) >= kMaxSetupErrorMm) {
-    const bool is_inverted = off_isocenter_mm(matrix.inverse()) < kMaxSetupErrorMm;
-    return note(is_inverted,
-                fmt::format("its origin lies {:.0f} mm from the planned isocenter: {}", off_isocenter_mm(matrix),
-                            is_inverted ? "the matrix looks inverted, as its inverse begins near it"
-                                        : "it is not the machine's isocenter, and the shift is not known"));
-  }
-  if (is_from_room(checked) && !setup.couch_angle_deg)
-    return note(false, "it begins in the room's axes: the shift is known with --couch-angle DEG only, as at imaging");
-  const Eigen::Isometry3d actual =
-      is_from_room(checked) ? matrix.inverse() : actual_room_from_patient(setup.room_from_patient, matrix);
-  return couch_shift_for(setup_error_from_poses(setup.room_from_patient, actual), setup.table);
+// How the couch stood at imaging, as far as anybody said: an angle of null does not enter or was taken as 0.
+Json json_of_couch(const PlannedSetup& setup) {
+  const auto angle = [](const std::optional<double>& deg) { return deg ? Json(*deg) : Json(); };
+  return {{"angle_deg", angle(setup.couch_angle_deg)},
+          {"pitch_deg", setup.couch_pitch_deg.value_or(0.0)},
+          {"pitch_taken_as_0", !setup.couch_pitch_deg},
+          {"roll_deg", setup.couch_roll_deg.value_or(0.0)},
+          {"roll_taken_as_0", !setup.couch_roll_deg}};
 }
 
 // For machines; the same for people is added to `text`.
-Json describe(const std::filesystem::path& path, const CheckedRegistration& checked,
-              const std::optional<CouchShift>& shift, std::string& text) {
+Json describe(const CheckedRegistration& checked, const RegistrationMeaning& meaning,
+              const std::optional<PlannedSetup>& setup, std::string& text) {
   const char* outcome = checked.has_errors() ? "ERRORS" : "passes";
-  text += fmt::format("{}: {}\n", path.string(), outcome);
-  Json json = {{"file", path.string()}, {"passes", !checked.has_errors()}, {"findings", Json::array()}};
+  text += fmt::format("{}: {}\n", checked.path.string(), outcome);
+  Json json = {{"file", checked.path.string()}, {"passes", !checked.has_errors()}, {"findings", Json::array()}};
   for (const RegistrationFinding& finding : checked.findings) {
     const char* kind = finding.is_error ? "error" : "note";
     text += fmt::format("  {:<6} {}\n", kind, finding.text);
     json["findings"].push_back({{"kind", kind}, {"text", finding.text}});
   }
   if (const auto matrix = rigid_of(checked)) {
-    const Eigen::Vector3d origin = matrix->translation();
     const double angle_deg = deg_from_rad(Eigen::AngleAxisd(matrix->linear()).angle());
     text += fmt::format("  takes  {}\n  to     {}\n  with   the origin at ({:.3f}) mm, turned by {:.3f} deg\n",
-                        checked.source_frame_uid, checked.registered_frame_uid, fmt::join(origin, ", "), angle_deg);
-    json["origin_mm"] = {origin.x(), origin.y(), origin.z()};
+                        checked.source_frame_uid, checked.registered_frame_uid, fmt::join(matrix->translation(), ", "),
+                        angle_deg);
+    json["origin_mm"] = json_of(matrix->translation());
     json["rotation_deg"] = angle_deg;
+    json["source_isocenter_mm"] = meaning.source_isocenter_mm ? json_of(*meaning.source_isocenter_mm) : Json();
   }
-  if (shift) {
+  if (meaning.registered_from_isocenter) {
+    const Eigen::Vector3d isocenter_mm = meaning.registered_from_isocenter->translation();
+    text += fmt::format("  has    the machine's isocenter at ({:.3f}) mm of the registered frame\n",
+                        fmt::join(isocenter_mm, ", "));
+    json["machine_isocenter_mm"] = json_of(isocenter_mm);
+  }
+  if (setup) json["couch_shift"] = meaning.couch_shift ? json_of(*meaning.couch_shift) : Json();
+  if (const auto& shift = meaning.couch_shift) {
     text += fmt::format(
         "  means  a couch shift of lateral {:+.2f}, longitudinal {:+.2f}, vertical {:+.2f} mm, yaw {:+.2f}, pitch "
         "{:+.2f}, roll {:+.2f} deg\n",
         shift->translation_mm.x(), shift->translation_mm.y(), shift->translation_mm.z(),
         deg_from_rad(shift->change.z_rad), deg_from_rad(shift->change.x_rad), deg_from_rad(shift->change.y_rad));
-    json["couch_shift"] = json_of(*shift);
+    json["couch_at_imaging"] = json_of_couch(*setup);
   }
   return json;
 }
 
-struct Checked {
-  std::filesystem::path path;
-  CheckedRegistration registration;
-  std::optional<Eigen::Isometry3d> from_isocenter;
-};
-
-// The same for their difference, or why there is none.
-Json compare(const Checked& one, const Checked& two, bool& is_inverted, std::string& text) {
-  const auto cannot = [&](const char* why) {
-    text += fmt::format("difference: none, {}\n", why);
-    return Json{{"reason", why}};
-  };
-  const CheckedRegistration &first = one.registration, &other = two.registration;
-  if (!rigid_of(first) || !rigid_of(other)) return cannot("as not both hold one rigid matrix");
-  if (first.registered_frame_uid != other.registered_frame_uid)
-    return cannot("as they register different frames (CTs)");
-  if (is_from_room(first) != is_from_room(other))
-    return cannot("as one begins in the room's axes (IEC 61217 Fixed) and the other does not: compare their shifts");
-  const auto &a = one.from_isocenter, &b = two.from_isocenter;
-  if (!a || !b) return cannot("as the isocenter is not known in the source frame of both (--source-isocenter X,Y,Z)");
-  const RegistrationDifference difference = difference_between(*a, *b);
-  is_inverted = difference.other_is_inverted;
+// For machines; the same for people is added to `text`.
+Json describe(const RegistrationComparison& comparison, bool same_source_frame, std::string& text) {
+  if (!comparison.difference) {
+    text += fmt::format("difference: not known\n  error  {}\n", comparison.why_not);
+    return {{"translation_mm", nullptr}, {"rotation_deg", nullptr}, {"reason", comparison.why_not}};
+  }
+  const RegistrationDifference& difference = *comparison.difference;
   text += fmt::format("difference: {:.3f} mm at the isocenter, {:.3f} deg\n", difference.translation_mm,
                       deg_from_rad(difference.angle_rad));
-  if (first.source_frame_uid != other.source_frame_uid)
-    text += "  their treatment frames differ; both are taken to begin at the machine's isocenter\n";
-  if (is_inverted) text += "  error  the second one looks inverted: its inverse lies near the first\n";
+  if (!same_source_frame)
+    text += "  note   their source frames differ: each was moved to begin at the machine's isocenter\n";
+  if (difference.other_is_inverted) text += "  error  the second one looks inverted: its inverse lies near the first\n";
   return {{"translation_mm", difference.translation_mm},
           {"rotation_deg", deg_from_rad(difference.angle_rad)},
-          {"looks_inverted", is_inverted}};
+          {"looks_inverted", difference.other_is_inverted}};
 }
 
 int run_check(const CheckOptions& options, Console& console) {
+  options.check();
   const std::optional<PlannedSetup> setup = planned_setup(options);
-  std::vector<Checked> all;
+  std::vector<CheckedRegistration> all;
+  for (const std::filesystem::path& path : options.registrations) all.push_back(check_registration(path));
+  std::optional<Eigen::Vector3d> source_isocenter_mm;
+  if (!options.source_isocenter.empty()) {
+    source_isocenter_mm = Eigen::Vector3d(options.source_isocenter.data());
+    refuse_contradicting_isocenter(all, *source_isocenter_mm);
+  }
+  std::vector<RegistrationMeaning> meanings;
   Json json = {{"registrations", Json::array()}};
   std::string text;
   bool has_errors = false;
-  for (const std::filesystem::path& path : options.registrations) {
-    Checked& checked = all.emplace_back(Checked{.path = path, .registration = check_registration(path)});
-    checked.from_isocenter = from_isocenter(checked.registration, options);
-    std::optional<CouchShift> shift;
-    if (setup && checked.from_isocenter) shift = shift_of(checked.registration, *checked.from_isocenter, *setup);
-    json["registrations"].push_back(describe(path, checked.registration, shift, text));
-    has_errors = has_errors || checked.registration.has_errors();
+  for (CheckedRegistration& checked : all) {
+    meanings.push_back(meaning_of(checked, setup, source_isocenter_mm));
+    json["registrations"].push_back(describe(checked, meanings.back(), setup, text));
+    has_errors = has_errors || checked.has_errors();
   }
   if (all.size() == 2) {
-    bool is_inverted = false;
-    json["difference"] = compare(all[0], all[1], is_inverted, text);
-    has_errors = has_errors || is_inverted;
+    const RegistrationComparison comparison = compare(all[0], meanings[0], all[1], meanings[1]);
+    json["difference"] = describe(comparison, all[0].source_frame_uid == all[1].source_frame_uid, text);
+    has_errors = has_errors || !comparison.difference || comparison.difference->other_is_inverted;
   }
   console.out << (options.as_json ? json.dump(2) + "\n" : text);
   return has_errors ? kExitFailed : kExitAccepted;
@@ -208,8 +185,10 @@ void add_check_command(CLI::App& app, Console& console, int& exit_status) {
   CLI::App* command = app.add_subcommand("check", "Check a Spatial Registration object, or compare two");
   command->footer(
       "\nExample:\n  isoshift check result/spatial_registration.dcm --plan exported/RTPLAN.dcm\n"
-      "  isoshift check result/spatial_registration.dcm clinic.dcm\n\n"
-      "Works with objects of any program. The exit status is 0 if all is right and 1 if anything is wrong.");
+      "  isoshift check result/spatial_registration.dcm clinic.dcm --source-isocenter 0,0,0\n"
+      "  isoshift check from_room.dcm --plan RTPLAN.dcm --couch-angle 10 --couch-pitch 1.5 --couch-roll -0.5\n\n"
+      "Works with objects of any program. The exit status is 0 if all is right, and 1 if anything is wrong, or if the\n"
+      "couch shift or the difference that was asked for cannot be told.");
   command->add_option("REGISTRATION", options->registrations, "One or two Spatial Registration objects")
       ->required()
       ->expected(1, 2)
@@ -226,8 +205,16 @@ void add_check_command(CLI::App& app, Console& console, int& exit_status) {
                    "Patient support angle at imaging, IEC 61217; needed for objects from the room's axes")
       ->type_name("DEG");
   command
+      ->add_option("--couch-pitch", options->couch_pitch_deg,
+                   "Table top pitch angle at imaging, IEC 61217; without it taken as 0, with a note")
+      ->type_name("DEG");
+  command
+      ->add_option("--couch-roll", options->couch_roll_deg,
+                   "Table top roll angle at imaging, IEC 61217; without it taken as 0, with a note")
+      ->type_name("DEG");
+  command
       ->add_option("--source-isocenter", options->source_isocenter,
-                   "Machine's isocenter in the frame of the images that a registration lists, mm")
+                   "Machine's isocenter in the frame that an object of another program starts from, mm")
       ->expected(3)
       ->delimiter(',')
       ->type_name("X,Y,Z");

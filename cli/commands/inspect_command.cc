@@ -22,6 +22,11 @@ std::string or_missing(const std::optional<Vector>& value, std::string_view unit
 
 std::string or_missing(const std::optional<std::string>& value) { return value ? *value : "missing"; }
 
+// An angle that registration takes as 0 where no X-ray of the session has it.
+std::string or_taken_as_0(const std::optional<double>& angle_deg, std::string_view flag) {
+  return angle_deg ? or_missing(angle_deg, "deg") : fmt::format("missing, taken as 0 without {} DEG", flag);
+}
+
 std::string line(std::string_view name, std::string_view value) { return fmt::format("  {:<24} {}\n", name, value); }
 
 // The source and the panel's center in the room: what the angles and distances mean once put together.
@@ -50,6 +55,8 @@ std::string describe_rt_image(RtImage image, const std::optional<std::string>& p
           line("SAD, SID", or_missing(image.sad_mm, "mm") + ", " + or_missing(image.sid_mm, "mm")) +
           line("gantry angle", or_missing(image.gantry_angle_deg, "deg")) +
           line("couch angle", or_missing(image.table.support_angle_deg, "deg")) +
+          line("couch pitch", or_taken_as_0(image.table.pitch_deg, "--couch-pitch")) +
+          line("couch roll", or_taken_as_0(image.table.roll_deg, "--couch-roll")) +
           line("receptor translation", or_missing(image.receptor_translation_mm, "mm")) +
           line("receptor angle", or_missing(image.receptor_angle_deg, "deg")) +
           line("pixel spacing", or_missing(image.pixel_spacing_mm, "mm, rows then columns")) +

@@ -45,6 +45,17 @@ void add_study_switches(CLI::App& command, StudyOptions& options) {
   command.add_option("--couch-angle", options.couch_angle_deg, "Patient support angle at imaging, IEC 61217")
       ->type_name("DEG")
       ->group(lacking);
+  command
+      .add_option("--couch-pitch", options.couch_pitch_deg,
+                  "Table top pitch angle at imaging, IEC 61217: positive with the gantry end up")
+      ->type_name("DEG")
+      ->group(lacking);
+  command
+      .add_option(
+          "--couch-roll", options.couch_roll_deg,
+          "Table top roll angle at imaging, IEC 61217: positive with the right side down, seen facing the gantry")
+      ->type_name("DEG")
+      ->group(lacking);
   command.add_option("--gantry-angle", options.gantry_angles, "Gantry angle of the image with this label, IEC 61217")
       ->type_name("LABEL=DEG")
       ->group(lacking);

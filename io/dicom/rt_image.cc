@@ -257,6 +257,12 @@ RtImage with_switches(RtImage image, const RtImageSwitches& switches, Notes& not
   if (switches.couch_angle_deg)
     replace(image.table.support_angle_deg, *switches.couch_angle_deg, named(DCM_PatientSupportAngle),
             by(fmt::format("--couch-angle {}", *switches.couch_angle_deg)), notes);
+  if (switches.couch_pitch_deg)
+    replace(image.table.pitch_deg, *switches.couch_pitch_deg, named(DCM_TableTopPitchAngle),
+            by(fmt::format("--couch-pitch {}", *switches.couch_pitch_deg)), notes);
+  if (switches.couch_roll_deg)
+    replace(image.table.roll_deg, *switches.couch_roll_deg, named(DCM_TableTopRollAngle),
+            by(fmt::format("--couch-roll {}", *switches.couch_roll_deg)), notes);
   if (switches.sad_mm && !by_matrix)
     replace(image.sad_mm, *switches.sad_mm, named(DCM_RadiationMachineSAD),
             by(fmt::format("--sad {}", *switches.sad_mm)), notes);
@@ -355,16 +361,18 @@ TableAngles table_angles(std::span<const RtImage> images, Notes& notes) {
         std::ranges::find_if(images, [&](const RtImage& image) { return (image.table.*angle_deg).has_value(); });
     return says == images.end() ? std::nullopt : says->table.*angle_deg;
   };
-  const auto angle_rad = [&](const std::optional<double>& value_deg, const DcmTagKey& tag) {
-    if (!value_deg) notes.warnings.push_back(fmt::format("{} is missing in all X-rays, taken as 0", described(tag)));
+  const auto angle_rad = [&](const std::optional<double>& value_deg, const DcmTagKey& tag, const char* flag) {
+    if (!value_deg)
+      notes.warnings.push_back(
+          fmt::format("{} is missing in all X-rays, taken as 0; {} DEG supplies it", described(tag), flag));
     return wrapped_rad(rad_from_deg(value_deg.value_or(0.0)));
   };
   const double eccentric_deg = first_deg(&TableReadOuts::eccentric_angle_deg).value_or(0.0);
   const TableAngles table{
-      .support_rad = angle_rad(first_deg(&TableReadOuts::support_angle_deg), DCM_PatientSupportAngle),
+      .support_rad = angle_rad(first_deg(&TableReadOuts::support_angle_deg), DCM_PatientSupportAngle, "--couch-angle"),
       .eccentric_rad = wrapped_rad(rad_from_deg(eccentric_deg)),
-      .pitch_rad = angle_rad(first_deg(&TableReadOuts::pitch_deg), DCM_TableTopPitchAngle),
-      .roll_rad = angle_rad(first_deg(&TableReadOuts::roll_deg), DCM_TableTopRollAngle),
+      .pitch_rad = angle_rad(first_deg(&TableReadOuts::pitch_deg), DCM_TableTopPitchAngle, "--couch-pitch"),
+      .roll_rad = angle_rad(first_deg(&TableReadOuts::roll_deg), DCM_TableTopRollAngle, "--couch-roll"),
   };
   if (std::abs(table.eccentric_rad) > rad_from_deg(kMaxAngleNoiseDeg))
     notes.warnings.push_back(fmt::format("{} is {} degrees and was added to the couch angle",

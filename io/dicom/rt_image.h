@@ -88,7 +88,7 @@ void read_acquisition_time(const DicomItem& dataset, RtImage& image);
 // What a person supplies for what the files lack; a value given here replaces a file's too, and that is noted.
 struct RtImageSwitches {
   std::map<std::string, double> gantry_angle_deg;  // by label
-  std::optional<double> couch_angle_deg, sad_mm, sid_mm;
+  std::optional<double> couch_angle_deg, couch_pitch_deg, couch_roll_deg, sad_mm, sid_mm;
   std::optional<Eigen::Vector2d> position_mm;
   bool assume_centered = false;
   std::optional<PixelIntensity> intensity;
@@ -126,7 +126,8 @@ std::string acquired(const RtImage& image);
 // The label without the number of its frame.
 std::string imager_label(const RtImage& image);
 
-// Table read-outs at imaging, each from the first image that has it. Warns of angles that none has, taken as 0.
+// Table read-outs at imaging, each from the first image that has it. Warns of angles that none has, taken as 0, and of
+// the switch that supplies them.
 TableAngles table_angles(std::span<const RtImage> images, Notes& notes);
 
 // The imager's geometry in IEC terms. Precondition: nothing missing. Throws Error where values contradict each other.

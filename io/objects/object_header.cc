@@ -18,7 +18,7 @@ void put_header(DicomItem& dataset, const ObjectHeader& header) {
   dataset.put(DCM_SeriesInstanceUID, header.series_instance_uid);
   dataset.put(DCM_SeriesNumber, fmt::format("{}", header.series_number));
   dataset.put(DCM_SeriesDescription, header.series_description);
-  dataset.put(DCM_Manufacturer, "isoshift");
+  dataset.put(DCM_Manufacturer, kManufacturer);
   dataset.put(DCM_ManufacturerModelName, "isoshift");
   dataset.put(DCM_SoftwareVersions, kVersion);
   dataset.put(DCM_InstanceNumber, fmt::format("{}", header.instance_number));

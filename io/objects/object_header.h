@@ -7,6 +7,8 @@
 
 namespace isoshift {
 
+inline constexpr const char* kManufacturer = "isoshift";  // in every object that isoshift writes
+
 struct ObjectHeader {
   Identity identity;
   std::string sop_class_uid;

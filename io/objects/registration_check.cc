@@ -7,6 +7,7 @@
 #include <set>
 
 #include "base/error.h"
+#include "io/objects/object_header.h"
 #include "io/objects/spatial_registration.h"
 
 namespace isoshift {
@@ -37,6 +38,8 @@ class Checker {
   explicit Checker(const DicomItem& dataset) : dataset_(dataset) {}
 
   CheckedRegistration check() {
+    result_.identity = read_identity(dataset_);
+    result_.is_by_isoshift = dataset_.text(DCM_Manufacturer) == kManufacturer;
     check_attributes();
     check_items();
     check_references();
@@ -44,8 +47,8 @@ class Checker {
   }
 
  private:
-  void error(std::string text) { result_.findings.push_back({.is_error = true, .text = std::move(text)}); }
-  void note(std::string text) { result_.findings.push_back({.is_error = false, .text = std::move(text)}); }
+  void error(std::string text) { result_.error(std::move(text)); }
+  void note(std::string text) { result_.note(std::move(text)); }
 
   // The value of a UI attribute; a finding where it is missing or malformed.
   std::string uid_of(const DicomItem& item, const DcmTagKey& tag, const std::string& name) {
@@ -239,21 +242,9 @@ bool CheckedRegistration::has_errors() const { return std::ranges::any_of(findin
 
 CheckedRegistration check_registration(const std::filesystem::path& path) {
   const DicomFile file = open_spatial_registration(path);
-  return Checker(file.dataset()).check();
-}
-
-RegistrationDifference difference_between(const Eigen::Isometry3d& registered_from_source,
-                                          const Eigen::Isometry3d& other) {
-  const auto between = [&](const Eigen::Isometry3d& pose) {
-    const Eigen::Isometry3d difference = pose.inverse() * registered_from_source;
-    return std::pair(difference.translation().norm(), Eigen::AngleAxisd(difference.linear()).angle());
-  };
-  const auto [translation_mm, angle_rad] = between(other);
-  constexpr double kMuchNearer = 0.1, kFarMm = 1.0;
-  return {
-      .translation_mm = translation_mm,
-      .angle_rad = angle_rad,
-      .other_is_inverted = translation_mm > kFarMm && between(other.inverse()).first < kMuchNearer * translation_mm};
+  CheckedRegistration checked = Checker(file.dataset()).check();
+  checked.path = path;
+  return checked;
 }
 
 }  // namespace isoshift

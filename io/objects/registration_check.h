@@ -8,6 +8,8 @@
 #include <string>
 #include <vector>
 
+#include "io/dicom/identity.h"
+
 namespace isoshift {
 
 struct RegistrationFinding {
@@ -16,6 +18,9 @@ struct RegistrationFinding {
 };
 
 struct CheckedRegistration {
+  std::filesystem::path path;
+  Identity identity;
+  bool is_by_isoshift = false;            // its Manufacturer says so
   std::string registered_frame_uid;       // dataset-level Frame of Reference UID: usually the planning CT's
   std::string source_frame_uid;           // of the item that is not the identity
   bool source_is_that_of_images = false;  // that item lists images: their frame's origin may lie anywhere
@@ -24,19 +29,12 @@ struct CheckedRegistration {
   std::optional<Eigen::Affine3d> registered_from_source;
   std::vector<RegistrationFinding> findings;
 
+  void error(std::string text) { findings.push_back({.is_error = true, .text = std::move(text)}); }
+  void note(std::string text) { findings.push_back({.is_error = false, .text = std::move(text)}); }
   bool has_errors() const;
 };
 
 // Throws Error for a file that is no Spatial Registration.
 CheckedRegistration check_registration(const std::filesystem::path& path);
-
-// How far two registrations of the same frames lie apart.
-struct RegistrationDifference {
-  double translation_mm = 0.0;  // between where the two have the machine's isocenter (the source's origin) in the CT
-  double angle_rad = 0.0;
-  bool other_is_inverted = false;  // the inverse of the other one lies much nearer
-};
-RegistrationDifference difference_between(const Eigen::Isometry3d& registered_from_source,
-                                          const Eigen::Isometry3d& other);
 
 }  // namespace isoshift

@@ -37,18 +37,20 @@ bool is_retake(const RtImage& image, const RtImage& earlier) {
 
 }  // namespace
 
-std::vector<Finding> patient_findings(const Identity& ct, const Identity& other, const std::string& where) {
+std::vector<Finding> patient_findings(const Identity& reference, const Identity& other, const std::string& where,
+                                      const std::string& reference_name) {
   std::vector<Finding> findings;
   const auto differ = [&](const std::string Identity::*member, const DcmTagKey& tag, bool may_be_empty) {
-    const bool is_empty = (other.*member).empty() || (ct.*member).empty();
-    if (without_trailing_carets(other.*member) == without_trailing_carets(ct.*member) && (may_be_empty || !is_empty))
+    const bool is_empty = (other.*member).empty() || (reference.*member).empty();
+    if (without_trailing_carets(other.*member) == without_trailing_carets(reference.*member) &&
+        (may_be_empty || !is_empty))
       return;
     if (may_be_empty && is_empty) return;
     findings.push_back({"patient-mismatch",
-                        is_empty ? fmt::format("{}: {} is empty in this file or in the CT: whose they are is unknown",
-                                               where, described(tag))
-                                 : fmt::format("{}: {} differs from the CT's: the inputs are of different patients",
-                                               where, described(tag))});
+                        is_empty ? fmt::format("{}: {} is empty in this file or in {}: whose they are is unknown",
+                                               where, described(tag), reference_name)
+                                 : fmt::format("{}: {} differs from that of {}: the inputs are of different patients",
+                                               where, described(tag), reference_name)});
   };
   differ(&Identity::patient_id, DCM_PatientID, false);
   differ(&Identity::patient_id_issuer, DCM_IssuerOfPatientID, true);

@@ -12,8 +12,10 @@
 
 namespace isoshift {
 
-// One patient: an ID is there and the same, and so are issuer, name and birth date where both files have them.
-std::vector<Finding> patient_findings(const Identity& ct, const Identity& other, const std::string& where);
+// One patient: an ID is there and the same, and so are issuer, name and birth date where both files have them. Messages
+// call the two files `where` and `reference_name`.
+std::vector<Finding> patient_findings(const Identity& reference, const Identity& other, const std::string& where,
+                                      const std::string& reference_name = "the CT");
 
 // The views must be of one moment and one table position. Each is compared with the first view that says; one that does
 // not say is warned of where others do.

@@ -1,15 +1,46 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <Eigen/Geometry>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <numbers>
 
+#include "io/dicom/rt_plan.h"
 #include "tests/support/small_study.h"
 
 namespace isoshift {
 namespace {
 
 using testing::HasSubstr;
+using testing::Not;
+
+const char* const kAxes[] = {"lateral_mm", "longitudinal_mm", "vertical_mm", "yaw_deg", "pitch_deg", "roll_deg"};
+
+// IEC 61217 fixed axes at couch 0 from DICOM patient axes, of a patient in HFS (docs/dicom.md 2.2).
+Eigen::Matrix3d fixed_from_patient() { return Eigen::Matrix3d{{1, 0, 0}, {0, 0, 1}, {0, -1, 0}}; }
+
+Eigen::Matrix3d turned_deg(double yaw, double pitch, double roll) {
+  const double rad = std::numbers::pi / 180.0;
+  return (Eigen::AngleAxisd(yaw * rad, Eigen::Vector3d::UnitZ()) *
+          Eigen::AngleAxisd(pitch * rad, Eigen::Vector3d::UnitX()) *
+          Eigen::AngleAxisd(roll * rad, Eigen::Vector3d::UnitY()))
+      .toRotationMatrix();
+}
+
+// The shift of docs/dicom.md 5.1, written anew: anatomy planned at x is found at R x + t.
+std::array<double, 6> shift_by_hand(const Eigen::Matrix3d& r, const Eigen::Vector3d& t, double yaw, double pitch,
+                                    double roll) {
+  const double deg = 180.0 / std::numbers::pi;
+  const Eigen::Vector3d moved = turned_deg(-yaw, 0, 0) * -t;
+  const Eigen::Matrix3d target = r.transpose() * turned_deg(yaw, pitch, roll);
+  return {moved.x(),
+          moved.y(),
+          moved.z(),
+          std::atan2(-target(0, 1), target(1, 1)) * deg - yaw,
+          std::asin(target(2, 1)) * deg - pitch,
+          std::atan2(-target(2, 0), target(2, 2)) * deg - roll};
+}
 
 class CheckCommandTest : public testing::Test {
  protected:
@@ -20,20 +51,64 @@ class CheckCommandTest : public testing::Test {
   static void TearDownTestSuite() { delete study_; }
 
   std::string ours() const { return (study_->output() / "spatial_registration.dcm").string(); }
+  std::string plan() const { return study_->plan().string(); }
+  const Eigen::Vector3d isocenter_ = small_phantom().placement.isocenter_patient_mm;
 
-  // A copy of ours with the inverse of its matrix.
-  std::string inverted() const {
-    const std::filesystem::path copy = folder_ / "inverted.dcm";
-    std::filesystem::copy_file(ours(), copy, std::filesystem::copy_options::overwrite_existing);
-    edit(copy, [](DicomItem d) {
-      DicomItem item =
-          d.items(DCM_RegistrationSequence)[1].items(DCM_MatrixRegistrationSequence)[0].items(DCM_MatrixSequence)[0];
-      const std::vector<double> values = item.required_numbers(DCM_FrameOfReferenceTransformationMatrix, 16);
-      const Eigen::Matrix<double, 4, 4, Eigen::RowMajor> inverse =
-          Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(values.data()).inverse();
-      item.put(DCM_FrameOfReferenceTransformationMatrix, std::span(inverse.data(), 16));
-    });
+  static DicomItem matrix_item(const DicomItem& d) {
+    return d.items(DCM_RegistrationSequence)[1].items(DCM_MatrixRegistrationSequence)[0].items(DCM_MatrixSequence)[0];
+  }
+  Eigen::Matrix4d our_matrix() const {
+    const DicomFile file = DicomFile::read(ours(), DicomFile::Extent::kWhole);
+    return Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(
+        matrix_item(file.dataset()).required_numbers(DCM_FrameOfReferenceTransformationMatrix, 16).data());
+  }
+
+  // A changed copy.
+  std::string copy_of(const std::string& path, const std::string& name, const std::function<void(DicomItem)>& change) {
+    const std::filesystem::path copy = folder_ / name;
+    std::filesystem::copy_file(path, copy, std::filesystem::copy_options::overwrite_existing);
+    edit(copy, change);
     return copy.string();
+  }
+  // A copy of ours that takes another frame to the CT.
+  std::string ours_from(const std::string& frame, const Eigen::Matrix4d& matrix, const std::string& name,
+                        const std::string& manufacturer) {
+    return copy_of(ours(), name, [&](DicomItem d) {
+      const Eigen::Matrix<double, 4, 4, Eigen::RowMajor> rows = matrix;
+      d.put(DCM_Manufacturer, manufacturer);
+      d.items(DCM_RegistrationSequence)[1].put(DCM_FrameOfReferenceUID, frame);
+      matrix_item(d).put(DCM_FrameOfReferenceTransformationMatrix, std::span(rows.data(), 16));
+    });
+  }
+  std::string inverted() { return ours_from("1.2.3.4", our_matrix().inverse(), "inverted.dcm", "isoshift"); }
+
+  // As plastimatch and SlicerRT write it: no images listed, a source frame that begins 12.4 mm from the isocenter.
+  std::string foreign() {
+    Eigen::Matrix4d back = Eigen::Matrix4d::Identity();
+    back.topRightCorner<3, 1>() = -Eigen::Vector3d(9.0, -5.0, 6.9);
+    return ours_from("1.2.3.4", our_matrix() * back, "foreign.dcm", "Plastimatch");
+  }
+
+  // An object from the room's axes, of a patient found at R x + t from the couch's angles.
+  std::string from_room(const Eigen::Matrix3d& r, const Eigen::Vector3d& t, const Eigen::Matrix3d& couch,
+                        const std::string& name = "from_room.dcm") {
+    Eigen::Isometry3d room_from_patient = Eigen::Isometry3d::Identity();
+    room_from_patient.linear() = r * couch * fixed_from_patient();
+    room_from_patient.translation() = t - room_from_patient.linear() * isocenter_;
+    return ours_from("1.2.840.10008.1.4.3.1", room_from_patient.inverse().matrix(), name, "Somebody");
+  }
+
+  static nlohmann::json checked(const CommandOutcome& outcome, std::size_t n = 0) {
+    return nlohmann::json::parse(outcome.out)["registrations"][n];
+  }
+  static void expect_shift(const nlohmann::json& registration, const std::array<double, 6>& expected,
+                           double tolerance) {
+    for (std::size_t n = 0; n < 6; ++n)
+      EXPECT_NEAR(registration["couch_shift"][kAxes[n]].get<double>(), expected[n], tolerance) << kAxes[n];
+  }
+  static void expect_same_shift(const nlohmann::json& one, const nlohmann::json& other) {
+    for (const char* axis : kAxes)
+      EXPECT_NEAR(one["couch_shift"][axis].get<double>(), other["couch_shift"][axis].get<double>(), 1e-6) << axis;
   }
 
   static SmallStudy* study_;
@@ -42,19 +117,16 @@ class CheckCommandTest : public testing::Test {
 SmallStudy* CheckCommandTest::study_ = nullptr;
 
 TEST_F(CheckCommandTest, OursPassesAndMeansTheShiftOfTheReport) {
-  const CommandOutcome outcome = run_command({"check", ours(), "--plan", study_->plan().string(), "--json"});
+  const CommandOutcome outcome = run_command({"check", ours(), "--plan", plan(), "--json"});
   ASSERT_EQ(outcome.exit_status, 0) << outcome.err;
-  const auto checked = nlohmann::json::parse(outcome.out)["registrations"][0];
-  EXPECT_TRUE(checked["passes"].get<bool>());
+  EXPECT_TRUE(checked(outcome)["passes"].get<bool>());
   std::ifstream file(study_->output() / "result.json");
-  const auto reported = nlohmann::json::parse(file)["couch_shift"];
-  for (const char* axis : {"lateral_mm", "longitudinal_mm", "vertical_mm", "yaw_deg", "pitch_deg", "roll_deg"})
-    EXPECT_NEAR(checked["couch_shift"][axis].get<double>(), reported[axis].get<double>(), 1e-6) << axis;
+  expect_same_shift(checked(outcome), nlohmann::json::parse(file));
   EXPECT_THAT(run_command({"check", ours()}).out, HasSubstr("spatial_registration.dcm: passes"));
 }
 
 TEST_F(CheckCommandTest, AnInvertedOneIsFoundByThePlanAndByItsPair) {
-  const CommandOutcome by_plan = run_command({"check", inverted(), "--plan", study_->plan().string()});
+  const CommandOutcome by_plan = run_command({"check", inverted(), "--plan", plan()});
   EXPECT_EQ(by_plan.exit_status, 1);
   EXPECT_THAT(by_plan.out, HasSubstr("the matrix looks inverted"));
   const CommandOutcome by_pair = run_command({"check", ours(), inverted()});
@@ -66,15 +138,76 @@ TEST_F(CheckCommandTest, OneFromTheRoomMeansTheSameShift) {
   const std::string from_room = (folder_ / "from_room").string();
   ASSERT_EQ(
       run_command({"register", study_->path().string(), "-o", from_room, "--source-for", "iec-fixed"}).exit_status, 0);
-  const std::string theirs = from_room + "/spatial_registration.dcm", plan = study_->plan().string();
-  const CommandOutcome outcome = run_command({"check", ours(), theirs, "--plan", plan, "--couch-angle", "0", "--json"});
-  ASSERT_EQ(outcome.exit_status, 0) << outcome.err;
-  const auto checked = nlohmann::json::parse(outcome.out);
-  for (const char* axis : {"lateral_mm", "longitudinal_mm", "vertical_mm", "yaw_deg", "pitch_deg", "roll_deg"})
-    EXPECT_NEAR(checked["registrations"][0]["couch_shift"][axis].get<double>(),
-                checked["registrations"][1]["couch_shift"][axis].get<double>(), 1e-6)
-        << axis;
-  EXPECT_THAT(checked["difference"]["reason"].get<std::string>(), HasSubstr("compare their shifts"));
+  const std::string theirs = from_room + "/spatial_registration.dcm";
+  const CommandOutcome outcome =
+      run_command({"check", ours(), theirs, "--plan", plan(), "--couch-angle", "0", "--json"});
+  ASSERT_EQ(outcome.exit_status, 0) << outcome.out << outcome.err;
+  expect_same_shift(checked(outcome, 0), checked(outcome, 1));
+  const auto difference = nlohmann::json::parse(outcome.out)["difference"];
+  EXPECT_NEAR(difference["translation_mm"].get<double>(), 0.0, 1e-6);
+  EXPECT_NEAR(difference["rotation_deg"].get<double>(), 0.0, 1e-5);
+}
+
+TEST_F(CheckCommandTest, OneFromTheRoomIsNotTurnedByAGuess) {
+  const std::string theirs = from_room(Eigen::Matrix3d::Identity(), {1, 2, 3}, Eigen::Matrix3d::Identity());
+  const CommandOutcome shift = run_command({"check", theirs, "--plan", plan()});
+  EXPECT_EQ(shift.exit_status, 1);
+  EXPECT_THAT(shift.out, HasSubstr("Supply it: --couch-angle DEG"));
+  EXPECT_THAT(shift.out, Not(HasSubstr("a couch shift of")));
+  const CommandOutcome pair = run_command({"check", ours(), theirs});
+  EXPECT_EQ(pair.exit_status, 1);
+  EXPECT_THAT(pair.out, HasSubstr("difference: not known\n  error  " + theirs + " starts from the axes of the room"));
+  EXPECT_THAT(pair.out,
+              HasSubstr("--plan FILE, or --isocenter X,Y,Z and --patient-position HFS, and --couch-angle DEG"));
+}
+
+// docs/dicom.md 5.1, with the couch at 10 degrees.
+TEST_F(CheckCommandTest, TheShiftFromTheRoomIsThatOfDicomMd51) {
+  const std::string theirs = from_room(turned_deg(1, -0.5, 0.8), {3, -2, 1.5}, turned_deg(10, 0, 0));
+  const CommandOutcome outcome = run_command(
+      {"check", theirs, "--plan", plan(), "--couch-angle", "10", "--couch-pitch", "0", "--couch-roll", "0", "--json"});
+  ASSERT_EQ(outcome.exit_status, 0) << outcome.out << outcome.err;
+  expect_shift(checked(outcome), {-2.607127, 2.490560, -1.5, 9.006284 - 10.0, 0.368649, -0.868385}, 2e-6);
+}
+
+TEST_F(CheckCommandTest, CouchPitchAndRollAtImagingEnterTheShift) {
+  // A patient exactly as planned on a couch that is pitched and rolled.
+  const std::string on_plan = from_room(Eigen::Matrix3d::Identity(), {0, 0, 0}, turned_deg(10, 2, -1.5));
+  const std::vector<std::string> pitched = {"--plan", plan(),         "--couch-angle", "10",    "--couch-pitch",
+                                            "2",      "--couch-roll", "-1.5",          "--json"};
+  const auto check = [&](const std::string& file) {
+    std::vector<std::string> arguments = {"check", file};
+    arguments.insert(arguments.end(), pitched.begin(), pitched.end());
+    const CommandOutcome outcome = run_command(arguments);
+    EXPECT_EQ(outcome.exit_status, 0) << outcome.out << outcome.err;
+    return checked(outcome);
+  };
+  expect_shift(check(on_plan), {0, 0, 0, 0, 0, 0}, 1e-6);
+  EXPECT_THAT(check(on_plan)["findings"].dump(), Not(HasSubstr("taken as 0")));
+
+  const Eigen::Matrix3d r = turned_deg(1.4, -2.1, 1.8);
+  const Eigen::Vector3d t(4.3, -6.1, 3.2);
+  expect_shift(check(from_room(r, t, turned_deg(10, 2, -1.5))), shift_by_hand(r, t, 10, 2, -1.5), 1e-6);
+
+  // Ours starts from the axes of the patient as set up, which turn with the couch.
+  const Eigen::Matrix3d set_up = turned_deg(10, 2, -1.5) * fixed_from_patient();
+  const Eigen::Isometry3d treatment_from_ct = Eigen::Isometry3d(our_matrix()).inverse();
+  expect_shift(check(ours()),
+               shift_by_hand(set_up * treatment_from_ct.linear() * set_up.transpose(),
+                             set_up * (treatment_from_ct * isocenter_), 10, 2, -1.5),
+               1e-6);
+}
+
+TEST_F(CheckCommandTest, AnglesThatNobodySaidAreToldToBe0) {
+  const CommandOutcome neither = run_command({"check", ours(), "--plan", plan()});
+  EXPECT_THAT(neither.out, HasSubstr("note   couch pitch and roll at imaging taken as 0: --couch-pitch DEG and "
+                                     "--couch-roll DEG if the couch stood otherwise"));
+  const CommandOutcome one = run_command({"check", ours(), "--plan", plan(), "--couch-pitch", "1", "--json"});
+  const nlohmann::json registration = checked(one);
+  EXPECT_THAT(registration["findings"].dump(), HasSubstr("couch roll at imaging taken as 0: --couch-roll DEG"));
+  EXPECT_EQ(registration["couch_at_imaging"]["pitch_deg"], 1.0);
+  EXPECT_FALSE(registration["couch_at_imaging"]["pitch_taken_as_0"].get<bool>());
+  EXPECT_TRUE(registration["couch_at_imaging"]["roll_taken_as_0"].get<bool>());
 }
 
 // The frame of images may begin anywhere: without the isocenter in it nothing is told, with it the same shift.
@@ -87,19 +220,89 @@ TEST_F(CheckCommandTest, OneFromTheImagesFrameNeedsTheirIsocenter) {
     });
   ASSERT_EQ(register_study(with_frame).exit_status, 0);
   const std::string theirs = (with_frame.output() / "spatial_registration.dcm").string();
-  const std::string plan = study_->plan().string();
-  const CommandOutcome without = run_command({"check", theirs, "--plan", plan});
-  EXPECT_THAT(without.out, HasSubstr("its source frame is that of images"));
-  EXPECT_THAT(without.out, testing::Not(HasSubstr("couch shift")));
-  EXPECT_THAT(run_command({"check", ours(), theirs}).out, HasSubstr("difference: none"));
+  const CommandOutcome without = run_command({"check", theirs, "--plan", with_frame.plan().string()});
+  EXPECT_EQ(without.exit_status, 1);
+  EXPECT_THAT(without.out, HasSubstr("its source frame 1.2.3.4 is that of the images it lists"));
+  EXPECT_THAT(without.out, Not(HasSubstr("a couch shift of")));
 
   const CommandOutcome with =
-      run_command({"check", ours(), theirs, "--plan", plan, "--source-isocenter", "20,-50,60", "--json"});
-  const auto checked = nlohmann::json::parse(with.out);
-  for (const char* axis : {"lateral_mm", "longitudinal_mm", "vertical_mm", "yaw_deg"})
-    EXPECT_NEAR(checked["registrations"][0]["couch_shift"][axis].get<double>(),
-                checked["registrations"][1]["couch_shift"][axis].get<double>(), 1e-6)
-        << axis;
+      run_command({"check", theirs, "--plan", with_frame.plan().string(), "--source-isocenter", "20,-50,60", "--json"});
+  EXPECT_EQ(with.exit_status, 0) << with.out << with.err;
+  std::ifstream file(with_frame.output() / "result.json");
+  expect_same_shift(checked(with), nlohmann::json::parse(file));
+}
+
+TEST_F(CheckCommandTest, OneOfAnotherProgramNeedsItsIsocenterWithoutImagesToo) {
+  const CommandOutcome without = run_command({"check", foreign(), "--plan", plan(), "--json"});
+  EXPECT_EQ(without.exit_status, 1);
+  EXPECT_FALSE(checked(without)["passes"].get<bool>());
+  EXPECT_TRUE(checked(without)["couch_shift"].is_null());
+  EXPECT_TRUE(checked(without)["source_isocenter_mm"].is_null());
+  EXPECT_THAT(checked(without)["findings"].dump(),
+              HasSubstr("the couch shift is not known: its source frame 1.2.3.4 is one of another program, which may "
+                        "begin anywhere. Say where the machine's isocenter lies in that frame: --source-isocenter"));
+
+  const CommandOutcome with =
+      run_command({"check", ours(), foreign(), "--plan", plan(), "--source-isocenter", "9,-5,6.9", "--json"});
+  EXPECT_EQ(with.exit_status, 0) << with.out << with.err;
+  expect_same_shift(checked(with, 0), checked(with, 1));
+  EXPECT_EQ(checked(with, 0)["source_isocenter_mm"], (nlohmann::json{0.0, 0.0, 0.0}));
+  EXPECT_EQ(checked(with, 1)["source_isocenter_mm"], (nlohmann::json{9.0, -5.0, 6.9}));
+  EXPECT_THAT(checked(with, 1)["findings"].dump(), HasSubstr("lies at (9.000, -5.000, 6.900) mm of its source frame"));
+  EXPECT_NEAR(nlohmann::json::parse(with.out)["difference"]["translation_mm"].get<double>(), 0.0, 1e-6);
+}
+
+// The object itself is right: only what was asked about it cannot be told.
+TEST_F(CheckCommandTest, OneOfAnotherProgramPassesOnItsOwn) {
+  const CommandOutcome outcome = run_command({"check", foreign()});
+  EXPECT_EQ(outcome.exit_status, 0) << outcome.out;
+  EXPECT_THAT(outcome.out, HasSubstr("note   its source frame 1.2.3.4 is one of another program"));
+  EXPECT_THAT(outcome.out, Not(HasSubstr("the machine's isocenter at (")));
+  EXPECT_THAT(run_command({"check", foreign(), "--source-isocenter", "9,-5,6.9"}).out,
+              HasSubstr("has    the machine's isocenter at ("));
+}
+
+TEST_F(CheckCommandTest, AnIsocenterThatContradictsWhatIsKnownIsRefused) {
+  const CommandOutcome of_ours = run_command({"check", ours(), "--source-isocenter", "1,2,3"});
+  EXPECT_EQ(of_ours.exit_status, 2);
+  EXPECT_THAT(of_ours.err, HasSubstr("--source-isocenter 1,2,3: " + ours() + ": isoshift wrote it"));
+  const std::string theirs = from_room(Eigen::Matrix3d::Identity(), {1, 2, 3}, Eigen::Matrix3d::Identity());
+  const CommandOutcome of_theirs = run_command({"check", theirs, "--source-isocenter", "1,2,3"});
+  EXPECT_EQ(of_theirs.exit_status, 2);
+  EXPECT_THAT(of_theirs.err, HasSubstr("IEC 61217 Fixed"));
+  EXPECT_EQ(run_command({"check", ours(), "--source-isocenter", "0,0,0"}).exit_status, 0);  // as is known
+}
+
+TEST_F(CheckCommandTest, ThePlanOfAnotherPatientIsRefused) {
+  const std::string other = copy_of(plan(), "other.dcm", [](DicomItem d) {
+    d.put(DCM_PatientID, "SOMEONE ELSE");
+    d.put(DCM_PatientName, "Other^Person");
+  });
+  const CommandOutcome outcome = run_command({"check", ours(), "--plan", other});
+  EXPECT_EQ(outcome.exit_status, 1);
+  EXPECT_THAT(outcome.out, HasSubstr("error  the couch shift is not known: " + other +
+                                     ": PatientID (0010,0020) differs from that of " + ours() +
+                                     ": the inputs are of different patients"));
+  EXPECT_THAT(outcome.out, HasSubstr("PatientName (0010,0010) differs"));
+  EXPECT_THAT(outcome.out, Not(HasSubstr("Other^Person")));
+  EXPECT_THAT(outcome.out, Not(HasSubstr("a couch shift of")));
+}
+
+TEST_F(CheckCommandTest, ThePlanOfAnotherFrameIsRefusedAndOneWithoutIsNoted) {
+  const std::string registered = read_rt_plan(study_->plan()).frame_of_reference_uid.value();
+  const std::string elsewhere =
+      copy_of(plan(), "elsewhere.dcm", [](DicomItem d) { d.put(DCM_FrameOfReferenceUID, "1.2.3"); });
+  const CommandOutcome outcome = run_command({"check", ours(), "--plan", elsewhere});
+  EXPECT_EQ(outcome.exit_status, 1);
+  EXPECT_THAT(outcome.out, HasSubstr(elsewhere + ": FrameOfReferenceUID (0020,0052) is 1.2.3, that of " + ours() +
+                                     ", the registered frame, is " + registered));
+  EXPECT_THAT(outcome.out, Not(HasSubstr("a couch shift of")));
+
+  const std::string silent = copy_of(plan(), "silent.dcm", [](DicomItem d) { d.erase(DCM_FrameOfReferenceUID); });
+  const CommandOutcome noted = run_command({"check", ours(), "--plan", silent});
+  EXPECT_EQ(noted.exit_status, 0) << noted.out;
+  EXPECT_THAT(noted.out, HasSubstr("note   " + silent + ": FrameOfReferenceUID (0020,0052) is missing"));
+  EXPECT_THAT(noted.out, HasSubstr("a couch shift of"));
 }
 
 TEST_F(CheckCommandTest, TheSameTwiceDoesNotDiffer) {
@@ -108,14 +311,54 @@ TEST_F(CheckCommandTest, TheSameTwiceDoesNotDiffer) {
   EXPECT_THAT(outcome.out, HasSubstr("difference: 0.000 mm at the isocenter, 0.000 deg"));
 }
 
+TEST_F(CheckCommandTest, TwoThatCannotBeComparedAreAnError) {
+  const std::string of_other_ct = copy_of(ours(), "other_ct.dcm", [](DicomItem d) {
+    d.put(DCM_FrameOfReferenceUID, "1.2.3");
+    d.items(DCM_RegistrationSequence)[0].put(DCM_FrameOfReferenceUID, "1.2.3");
+  });
+  const CommandOutcome cts = run_command({"check", ours(), of_other_ct});
+  EXPECT_EQ(cts.exit_status, 1);
+  EXPECT_THAT(cts.out, HasSubstr("they register different frames (FrameOfReferenceUID (0020,0052)): " + ours() +
+                                 " registers " + read_rt_plan(study_->plan()).frame_of_reference_uid.value() + ", " +
+                                 of_other_ct + " registers 1.2.3. Compare registrations of one planning CT only"));
+  const CommandOutcome as_json = run_command({"check", ours(), of_other_ct, "--json"});
+  EXPECT_EQ(as_json.exit_status, 1);
+  const auto difference = nlohmann::json::parse(as_json.out)["difference"];
+  EXPECT_TRUE(difference["translation_mm"].is_null());
+  EXPECT_THAT(difference["reason"].get<std::string>(), HasSubstr("they register different frames"));
+
+  const std::string of_other_patient =
+      copy_of(ours(), "other_patient.dcm", [](DicomItem d) { d.put(DCM_PatientID, "SOMEONE ELSE"); });
+  const CommandOutcome patients = run_command({"check", ours(), of_other_patient});
+  EXPECT_EQ(patients.exit_status, 1);
+  EXPECT_THAT(patients.out, HasSubstr("Compare registrations of one patient only"));
+
+  const CommandOutcome origins = run_command({"check", ours(), foreign()});
+  EXPECT_EQ(origins.exit_status, 1);
+  EXPECT_THAT(origins.out, HasSubstr("difference: not known\n  error  " + foreign() + ": its source frame 1.2.3.4"));
+
+  const std::string without_matrix = copy_of(ours(), "identity.dcm", [](DicomItem d) {
+    const Eigen::Matrix4d identity = Eigen::Matrix4d::Identity();
+    matrix_item(d).put(DCM_FrameOfReferenceTransformationMatrix, std::span(identity.data(), 16));
+  });
+  const CommandOutcome matrices = run_command({"check", ours(), without_matrix});
+  EXPECT_EQ(matrices.exit_status, 1);
+  EXPECT_THAT(matrices.out, HasSubstr(without_matrix + ": holds no rigid matrix from one frame to another"));
+}
+
 TEST_F(CheckCommandTest, TheShiftNeedsIsocenterAndPosition) {
   const CommandOutcome outcome = run_command({"check", ours(), "--isocenter", "1,2,3"});
   EXPECT_EQ(outcome.exit_status, 2);
   EXPECT_THAT(outcome.err, HasSubstr("--patient-position"));
-  EXPECT_EQ(run_command({"check", study_->plan().string()}).exit_status, 1);
+  EXPECT_EQ(run_command({"check", plan()}).exit_status, 1);
   const CommandOutcome endless = run_command({"check", ours(), "--isocenter", "nan,2,3", "--patient-position", "HFS"});
   EXPECT_EQ(endless.exit_status, 2);
-  EXPECT_THAT(endless.err, HasSubstr("--isocenter and --couch-angle take finite numbers"));
+  EXPECT_THAT(endless.err, HasSubstr("--isocenter: nan is no finite number"));
+  EXPECT_EQ(run_command({"check", ours(), "--source-isocenter", "nan,2,3"}).exit_status, 2);
+  EXPECT_EQ(run_command({"check", ours(), "--plan", plan(), "--couch-roll", "inf"}).exit_status, 2);
+  const CommandOutcome unused = run_command({"check", ours(), "--couch-pitch", "1"});
+  EXPECT_EQ(unused.exit_status, 2);
+  EXPECT_THAT(unused.err, HasSubstr("--couch-pitch belongs to a couch shift: add --plan FILE"));
 }
 
 }  // namespace

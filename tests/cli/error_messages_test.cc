@@ -132,8 +132,9 @@ TEST_F(ErrorMessagesTest, ImageWithoutPositionGantryAngleAndCouchAngle) {
 
 TEST_F(ErrorMessagesTest, DifferentPatients) {
   edit(study_.image(0), [](DicomItem d) { d.put(DCM_PatientID, "SOMEONE ELSE"); });
-  const std::string message = fmt::format(
-      "{}: PatientID (0010,0020) differs from the CT's: the inputs are of different patients", where(study_.image(0)));
+  const std::string message =
+      fmt::format("{}: PatientID (0010,0020) differs from that of the CT: the inputs are of different patients",
+                  where(study_.image(0)));
   expect_error(message + "\n       If that is known to be right, allow it: --allow patient-mismatch=REASON");
 }
 
@@ -149,7 +150,7 @@ TEST_F(ErrorMessagesTest, PatientsOfDifferentNames) {
   edit(study_.image(1), [](DicomItem d) { d.put(DCM_PatientName, "Other^Person"); });
   const CommandOutcome outcome = register_study(study_);
   EXPECT_EQ(outcome.exit_status, 1);
-  EXPECT_THAT(outcome.err, HasSubstr(": PatientName (0010,0010) differs from the CT's"));
+  EXPECT_THAT(outcome.err, HasSubstr(": PatientName (0010,0010) differs from that of the CT"));
   EXPECT_THAT(outcome.err, testing::Not(HasSubstr("Other^Person")));
 }
 
@@ -268,6 +269,8 @@ TEST_F(ErrorMessagesTest, UsageErrorsHaveTheirOwnStatus) {
   EXPECT_EQ(register_study(study_, {"--attenuation", "windowed", "--window", "100,-100"}).exit_status, 2);
   EXPECT_EQ(register_study(study_, {"--gantry-angle", "KV_G000=nan"}).exit_status, 2);
   EXPECT_EQ(register_study(study_, {"--couch-angle", "nan"}).exit_status, 2);
+  EXPECT_EQ(register_study(study_, {"--couch-pitch", "nan"}).exit_status, 2);
+  EXPECT_EQ(register_study(study_, {"--couch-roll", "inf"}).exit_status, 2);
   EXPECT_EQ(register_study(study_, {"--isocenter", "nan,nan,nan"}).exit_status, 2);
   EXPECT_EQ(register_study(study_, {"--sid", "inf"}).exit_status, 2);
   EXPECT_EQ(register_study(study_, {"--seed", "-1"}).exit_status, 2);

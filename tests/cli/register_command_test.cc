@@ -246,6 +246,7 @@ TEST_F(RegisterCommandTest, InspectSaysWhatIsThereAndWhatIsMissing) {
   edit(study_.image(0), [](DicomItem d) {
     d.erase(DCM_RTImageSID);
     d.put(DCM_RTImagePosition, "");
+    d.erase(DCM_TableTopPitchAngle);
   });
   std::ofstream(study_.path() / "notes.txt") << "not DICOM";
   const auto square = rectangle({0, 40, -400}, 20, 20);
@@ -258,6 +259,8 @@ TEST_F(RegisterCommandTest, InspectSaysWhatIsThereAndWhatIsMissing) {
   EXPECT_THAT(outcome.out, HasSubstr("  MISSING                  RTImagePosition (3002,0012); supplied by "
                                      "--rt-image-position X,Y or --assume-centered\n"
                                      "  MISSING                  RTImageSID (3002,0026); supplied by --sid MM\n"));
+  EXPECT_THAT(outcome.out, HasSubstr("  couch pitch              missing, taken as 0 without --couch-pitch DEG\n"
+                                     "  couch roll               0 deg\n"));
   EXPECT_THAT(outcome.out, HasSubstr("  source, IEC fixed        (1000.00, 0.00, 0.00) mm\n"));
   EXPECT_THAT(outcome.out,
               HasSubstr("RT Structure Set \"DRAWN\", " + study_.structures().string() +

@@ -38,6 +38,8 @@ void StudyOptions::check_finite() const {
   check("--isocenter", isocenter);
   check("--rt-image-position", rt_image_position);
   check("--couch-angle", std::array{couch_angle_deg.value_or(0.0)});
+  check("--couch-pitch", std::array{couch_pitch_deg.value_or(0.0)});
+  check("--couch-roll", std::array{couch_roll_deg.value_or(0.0)});
   check("--sad", std::array{sad_mm.value_or(0.0)});
   check("--sid", std::array{sid_mm.value_or(0.0)});
 }
@@ -57,6 +59,8 @@ StudyRequest StudyOptions::request() const {
   }
   request.max_span_s = max_span_s;
   request.switches.couch_angle_deg = couch_angle_deg;
+  request.switches.couch_pitch_deg = couch_pitch_deg;
+  request.switches.couch_roll_deg = couch_roll_deg;
   request.switches.sad_mm = sad_mm;
   request.switches.sid_mm = sid_mm;
   if (!rt_image_position.empty()) request.switches.position_mm = Eigen::Vector2d(rt_image_position.data());

@@ -15,7 +15,7 @@ struct StudyOptions {
   std::vector<double> isocenter, rt_image_position;
   std::vector<std::string> gantry_angles, allow;
   std::string patient_position, intensity, beam;
-  std::optional<double> couch_angle_deg, sad_mm, sid_mm;
+  std::optional<double> couch_angle_deg, couch_pitch_deg, couch_roll_deg, sad_mm, sid_mm;
   bool assume_centered = false;
   double max_span_s = kDefaultUntoldSpanS;  // of the site, no flag
 

@@ -277,7 +277,34 @@ TEST_F(RtImageTest, TableAnglesAreThoseOfTheFirstViewThatSays) {
   images[1].table.roll_deg = images[0].table.roll_deg = std::nullopt;
   EXPECT_NEAR(table_angles(images, notes_).pitch_rad, rad_from_deg(3.0), 1e-12);
   EXPECT_THAT(notes_.warnings,
-              testing::Contains(HasSubstr("TableTopRollAngle (300A,0144) is missing in all X-rays, taken as 0")));
+              testing::Contains(HasSubstr("TableTopRollAngle (300A,0144) is missing in all X-rays, taken as 0; "
+                                          "--couch-roll DEG supplies it")));
+}
+
+// The last column of docs/dicom.md 2.4: gantry 30, couch 10, pitch 2, roll -1.5.
+TEST_F(RtImageTest, CouchPitchAndRollBySwitchesAreThoseOfDicomMd24) {
+  RtImage image = changed([](DicomItem d) {
+    d.put(DCM_GantryAngle, 30.0);
+    d.erase(DCM_TableTopPitchAngle);
+    d.put(DCM_RTImagePosition, std::array{-204.6, 204.6});
+    d.put(DCM_ImagePlanePixelSpacing, std::array{0.4, 0.4});
+  });
+  image.columns = image.rows = 1024;
+  RtImageSwitches switches;
+  switches.couch_angle_deg = 10;
+  switches.couch_pitch_deg = 2;
+  switches.couch_roll_deg = -1.5;
+  image = with_switches(image, switches, notes_);
+  EXPECT_THAT(notes_.overrides, ElementsAre("KV_G000: PatientSupportAngle (300A,0122): replaced by --couch-angle 10",
+                                            "KV_G000: TableTopPitchAngle (300A,0140): supplied by --couch-pitch 2",
+                                            "KV_G000: TableTopRollAngle (300A,0144): replaced by --couch-roll -1.5"));
+  const TableAngles table = table_angles(std::span(&image, 1), notes_);
+  EXPECT_TRUE(notes_.warnings.empty()) << notes_.warnings.front();
+  const Eigen::Isometry3d room_from_patient =
+      planned_room_from_patient(PatientPosition::kHfs, table, Eigen::Vector3d(10, -150, -420));
+  const XrayView view = make_xray_view(carm_geometry(image, notes_), Beam::kKilovoltage);
+  EXPECT_THAT(view.project(room_from_patient * Eigen::Vector3d(40, -180, -370)).value(),
+              VectorNear(Eigen::Vector2d(516.583896, 303.965280), 1e-5));
 }
 
 TEST_F(RtImageTest, AFrameThatNoExposureNamesIsLeftOut) {

@@ -200,7 +200,7 @@ TEST_F(RtStructuresTest, StructuresOfAnotherPatientAreRefused) {
   draw(study_, {{"Spine", {square_}}});
   edit(study_.structures(), [](DicomItem d) { d.put(DCM_PatientID, "other"); });
   EXPECT_THAT(notes_of_loading().warnings,
-              ElementsAre(HasSubstr("RTSTRUCT.dcm: PatientID (0010,0020) differs from the CT's")));
+              ElementsAre(HasSubstr("RTSTRUCT.dcm: PatientID (0010,0020) differs from that of the CT")));
 }
 
 }  // namespace

@@ -5,6 +5,7 @@
 
 #include "base/error.h"
 #include "geometry/rotation.h"
+#include "io/objects/registration_meaning.h"
 #include "io/objects/spatial_registration.h"
 #include "tests/support/small_study.h"
 
@@ -65,6 +66,8 @@ TEST_F(RegistrationCheckTest, OursPassesAndSaysItsMatrix) {
   EXPECT_TRUE(checked.findings.empty()) << checked.findings.front().text;
   EXPECT_EQ(checked.registered_frame_uid, study_->ct->frame_of_reference_uid);
   EXPECT_NE(checked.source_frame_uid, checked.registered_frame_uid);
+  EXPECT_TRUE(checked.is_by_isoshift);
+  EXPECT_EQ(checked.identity.patient_id, study_->ct->identity.patient_id);
   const SpatialRegistration read = read_spatial_registration(path_);
   EXPECT_EQ(checked.registered_from_source->matrix(), read.items[1].registered_from_source.matrix());
 }
@@ -148,6 +151,22 @@ TEST_F(RegistrationCheckTest, MissingAndMalformedAttributesAreNamed) {
 }
 
 TEST_F(RegistrationCheckTest, OtherObjectsAreRefused) { EXPECT_THROW(check_registration(study_->plan->path), Error); }
+
+// PS3.17 O.1: without a frame the matrix counts on the plane of the images, where no isocenter can lie.
+TEST_F(RegistrationCheckTest, NoIsocenterIsPlacedWhereNoFrameIsNamed) {
+  edit(path_, [](DicomItem d) {
+    d.put(DCM_Manufacturer, "Somebody");
+    item(d, 1).erase(DCM_FrameOfReferenceUID);
+    const DicomItem image = item(d, 0).items(DCM_ReferencedImageSequence)[0];
+    item(d, 1).append_reference(DCM_ReferencedImageSequence, image.required_text(DCM_ReferencedSOPClassUID),
+                                image.required_text(DCM_ReferencedSOPInstanceUID));
+  });
+  CheckedRegistration checked = check_registration(path_);
+  ASSERT_FALSE(checked.has_errors());
+  EXPECT_FALSE(meaning_of(checked, std::nullopt, Eigen::Vector3d(1, 2, 3)).registered_from_isocenter);
+  ASSERT_TRUE(checked.has_errors());
+  EXPECT_THAT(checked.findings.back().text, HasSubstr("names no FrameOfReferenceUID (0020,0052)"));
+}
 
 TEST(RegistrationDifference, IsWhereTheIsocentersLieAndHowTheyAreTurned) {
   Eigen::Isometry3d a = Eigen::Isometry3d::Identity(), b = a;

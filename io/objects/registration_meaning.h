@@ -1,0 +1,65 @@
+#pragma once
+// What a Spatial Registration object, of any program, means for the couch, and how far two of them lie apart. Both need
+// the machine's isocenter in the frame that the object starts from. Where nobody says where it lies, no number is given
+// (docs/commands/check.md).
+
+#include <Eigen/Geometry>
+#include <optional>
+#include <span>
+#include <string>
+
+#include "geometry/patient_setup.h"
+#include "io/dicom/rt_plan.h"
+#include "io/objects/registration_check.h"
+#include "setup/couch_shift.h"
+
+namespace isoshift {
+
+// How the patient was planned to lie, and how the couch stood at imaging.
+struct PlannedSetup {
+  std::optional<RtPlan> plan;  // must be of the registration's patient and in its registered frame
+  PatientPosition patient_position = PatientPosition::kHfs;
+  Eigen::Vector3d isocenter_patient_mm = Eigen::Vector3d::Zero();
+  std::optional<double> couch_angle_deg, couch_pitch_deg, couch_roll_deg;  // IEC 61217; without value not known
+
+  TableAngles table() const;  // angles that are not known are 0
+  Eigen::Isometry3d room_from_patient() const;
+};
+
+// The matrix of an object as a rigid motion; nothing where the object holds none.
+std::optional<Eigen::Isometry3d> rigid_of(const CheckedRegistration& checked);
+
+// Throws UsageError where every object is known to start at the machine's isocenter and `source_isocenter_mm` says that
+// it lies elsewhere.
+void refuse_contradicting_isocenter(std::span<const CheckedRegistration> all,
+                                    const Eigen::Vector3d& source_isocenter_mm);
+
+struct RegistrationMeaning {
+  std::optional<Eigen::Vector3d> source_isocenter_mm;  // the machine's isocenter in the source frame, where known
+  // From a frame that begins at the machine's isocenter to the registered frame: its translation is the point of the CT
+  // that lies at the machine's isocenter. Nothing where that is not known.
+  std::optional<Eigen::Isometry3d> registered_from_isocenter;
+  bool in_room_axes = false;  // that frame has the axes of the room, else those of the patient as set up on the couch
+  std::optional<CouchShift> couch_shift;  // where `setup` was given and nothing stands in the way
+};
+
+// Adds to the findings what stands in the way, an error where `setup` asks for the couch shift, and what was assumed.
+RegistrationMeaning meaning_of(CheckedRegistration& checked, const std::optional<PlannedSetup>& setup,
+                               const std::optional<Eigen::Vector3d>& source_isocenter_mm);
+
+struct RegistrationDifference {
+  double translation_mm = 0.0;  // between the points of the CT that the two have at the machine's isocenter
+  double angle_rad = 0.0;
+  bool other_is_inverted = false;  // the inverse of the other one lies much nearer
+};
+RegistrationDifference difference_between(const Eigen::Isometry3d& registered_from_isocenter,
+                                          const Eigen::Isometry3d& other);
+
+struct RegistrationComparison {
+  std::optional<RegistrationDifference> difference;
+  std::string why_not;  // where there is no difference: what stands in the way, and what to do
+};
+RegistrationComparison compare(const CheckedRegistration& first, const RegistrationMeaning& first_meaning,
+                               const CheckedRegistration& second, const RegistrationMeaning& second_meaning);
+
+}  // namespace isoshift
