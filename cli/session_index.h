@@ -22,7 +22,8 @@ class SessionIndex {
  public:
   SessionIndex(const ResultsTree& tree, std::string site) : tree_(tree), site_(std::move(site)) {}
 
-  void add(const std::string& session, const SetupReport& report);
+  // `obstacle`: why the session cannot be released; empty: it can be.
+  void add(const std::string& session, const SetupReport& report, const std::string& obstacle);
   std::size_t size() const { return sessions_.size(); }
 
   // Looks what has been released and sent, and writes the pages that are no longer true. `troubles`: what does not work
@@ -31,8 +32,8 @@ class SessionIndex {
 
  private:
   struct Session {
-    std::string name, patient, acquired, verdict, action, state;
-    bool is_over = false;  // nothing becomes of it any more
+    std::string name, patient, acquired, verdict, action, held, state;  // held: the state before it is released
+    bool is_over = false;                                               // nothing becomes of it any more
   };
   bool update_states();
   void write(const std::string& page, const std::string& html);

@@ -1,6 +1,7 @@
 #pragma once
 // Among the files of many patients: which X-rays were taken for one setup, and what else belongs to it.
 
+#include <set>
 #include <string>
 #include <vector>
 
@@ -19,6 +20,9 @@ struct SessionFiles {
 // In the order of patients and times; an instance that is there twice counts once. `other_xrays`: whether those of
 // other classes than RT Image are X-rays to be registered.
 std::vector<SessionFiles> sessions_of(const StudyFiles& files, bool other_xrays);
+
+// The name of the session that these X-rays make.
+std::string session_name(const std::set<std::string>& sop_instance_uids);
 
 // What choose_parts() chooses from for a session: all files of its patient, and of X-rays its own. Files without an
 // issuer of the PatientID are of the only one there is.

@@ -55,7 +55,7 @@ class Room:
 
     def sessions(self):
         folder = self.results / "sessions"
-        return sorted(f.parent.name for f in folder.glob("*/result.json") if ".partial" not in f.parent.name) if folder.exists() else []
+        return sorted(f.parent.name for f in folder.glob("*/result.json") if "." not in f.parent.name) if folder.exists() else []
 
     def result(self, session):
         return json.loads((self.results / "sessions" / session / "result.json").read_text())
