@@ -110,9 +110,10 @@ fs::path ResultsTree::registering(const std::string& session) const {
 void ResultsTree::check_is_new(const std::string& session) const {
   const fs::path folder = this->session(session);
   if (fs::exists(fs::symlink_status(folder)))
-    throw Error(fmt::format("{}: is there already, and holds no readable result of these X-rays. Move it away: then "
-                            "they are registered again",
-                            folder.string()));
+    throw Error(
+        fmt::format("{}: is there already, and holds no readable result of these X-rays. Move it away: then "
+                    "they are registered again",
+                    folder.string()));
 }
 
 void ResultsTree::publish(const std::string& session) {
