@@ -8,6 +8,7 @@
 #include <memory>
 
 #include "base/error.h"
+#include "base/system_user.h"
 #include "cli/commands/commands.h"
 #include "io/config/watch_file.h"
 #include "workflow/room/deliver.h"
@@ -25,8 +26,11 @@ void run_release(const std::filesystem::path& file, const std::string& session, 
   if (::stat(watch.results.c_str(), &of_results) == 0 && of_results.st_uid != ::geteuid())
     throw Error(fmt::format("{}: belongs to another user, who runs isoshift watch: release as that one (sudo -u USER)",
                             watch.results.string()));
-  const ResultsTree tree(watch.results);
-  const Release release = tree.release(session, by, watch.names_of_peers());
+  ResultsTree tree(watch.results);
+  const SystemUser user = system_user();
+  const Release release =
+      tree.release(session, {.by = by, .user = user.name, .sudo_user = user.sudo_user}, watch.names_of_peers());
+  console.out << fmt::format("released by {}\n", to_string(release.releaser));
   for (const Release::Object& object : release.objects)
     console.out << fmt::format("{} goes to {}\n", object.file,
                                release.peers.empty() ? "nobody: the watch file names no peers"

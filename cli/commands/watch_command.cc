@@ -19,6 +19,7 @@
 #include "base/child_process.h"
 #include "base/error.h"
 #include "base/graceful_end.h"
+#include "base/system_user.h"
 #include "cli/commands/commands.h"
 #include "cli/commands/register_command.h"
 #include "cli/switches/registration_switches.h"
@@ -89,6 +90,7 @@ class Watch {
       attempt(troubles_, "receiving", [&] { receive(); });
       attempt(troubles_, "registering", [&] { register_complete(); });
       attempt(troubles_, "releasing", [&] { release_automatically(); });
+      attempt(troubles_, "writing the audit log", [&] { tree_.write_kept_audit(); });
       attempt(troubles_, "writing the index", [&] { index_.update(waiting_, troubles()); });
       std::this_thread::sleep_for(kRound);
     }
@@ -180,12 +182,22 @@ class Watch {
     const SetupReport report = read_report(tree_.session(name));
     if (report.views.empty()) throw Error(fmt::format("{}: names no views", tree_.session(name).string()));
     for (const SetupReport::View& view : report.views) registered_.insert(view.sop_instance_uid);
-    index_.add(name, report);
+    index_.add(name, report, obstacle_to_release(name));
     // What was made under another site file waits for a person.
     if (watch_.site.automatic_release && report.verdict == Verdict::kAccepted && report.site &&
         report.site->sha256 == watch_.site.sha256)
       accepted_.insert(name);
     return report.verdict;
+  }
+
+  // Empty: there is a record of its registration. What the folder holds is checked when it is released.
+  std::string obstacle_to_release(const std::string& name) const {
+    try {
+      (void)tree_.registered(name);
+      return "";
+    } catch (const Error& error) {
+      return error.what();
+    }
   }
 
   // One at a time, those with the newest X-rays first: somebody waits for them.
@@ -242,6 +254,7 @@ class Watch {
     for (const std::string& remark : complete.session.remarks)
       console_.err << fmt::format("session {}: {}\n", session, remark);
     try {
+      tree_.check_is_new(session);
       const StudyParts parts = choose_parts(complete.files);
       std::vector<std::string> words = {this_program().string(), "register", "--ct"};
       for (const auto& file : parts.ct) words.push_back(file.string());
@@ -249,7 +262,7 @@ class Watch {
       for (const auto& file : parts.images) words.push_back(file.string());
       if (parts.plan) words.insert(words.end(), {"--plan", parts.plan->string()});
       if (parts.structures) words.insert(words.end(), {"--structures", parts.structures->string()});
-      words.insert(words.end(), {"--site", watch_.site.path.string(), "--output", tree_.session(session).string()});
+      words.insert(words.end(), {"--site", watch_.site.path.string(), "--output", tree_.registering(session).string()});
       words.insert(words.end(), watch_.registration.begin(), watch_.registration.end());
       running_ = Running{.session = session,
                          .news = complete.last,
@@ -265,21 +278,21 @@ class Watch {
     const std::string session = running_->session;
     const Clock::time_point news = running_->news;
     running_.reset();
-    tree_.clean();
-    if (!std::filesystem::exists(tree_.session(session) / kResultFile)) {
-      fail(session, news, reason_of(*end), !end->is_late);
-      return;
-    }
     std::string verdict;
     try {
-      verdict = to_string(take_result(session));
+      if (std::filesystem::exists(tree_.registering(session) / kResultFile)) {
+        tree_.publish(session);
+        verdict = to_string(take_result(session));
+      } else {
+        fail(session, news, reason_of(*end), !end->is_late);
+      }
     } catch (const std::exception& error) {
-      fail(session, news, error.what(), false);
-      return;
+      fail(session, news, error.what(), true);
     }
+    tree_.clean();
+    if (verdict.empty()) return;
     failures_.erase(session);
     console_.err << fmt::format("session {}: {}\n", session, verdict);
-    tree_.audit("registered", {{"session", session}, {"verdict", verdict}});
   }
 
   static std::string reason_of(const ChildEnd& end) {
@@ -311,8 +324,10 @@ class Watch {
       try {
         if (!tree_.is_released(session))
           tree_.release(session,
-                        fmt::format("automatic, allowed by {} on {}", watch_.site.automatic_release->by,
-                                    watch_.site.automatic_release->on),
+                        {.by = fmt::format("automatic, allowed by {} on {}", watch_.site.automatic_release->by,
+                                           watch_.site.automatic_release->on),
+                         .user = user_.name,
+                         .sudo_user = user_.sudo_user},
                         watch_.names_of_peers());
         accepted_.erase(session);
       } catch (const std::exception& error) {
@@ -338,6 +353,7 @@ class Watch {
   Clock::time_point seen_at_ = Clock::now();     // what had come by then has been seen
   Clock::time_point quiet_from_ = Clock::now();  // a server was down until then
   Clock::time_point next_forgetting_ = Clock::now();
+  const SystemUser user_ = system_user();
   bool takes_other_xrays_;  // a machine profile supplies their geometry
 };
 

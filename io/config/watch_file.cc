@@ -61,11 +61,16 @@ class Reader {
     peer.port = static_cast<std::uint16_t>(port);
     peer.called_aet = aet(section, "called_aet");
     peer.calling_aet = aet(section, "calling_aet");
-    constexpr const char* kTls = "{\"ca\": FILE, \"certificate\": FILE, \"key\": FILE}, or false for none";
+    constexpr const char* kTls =
+        "{\"ca\": FILE, \"certificate\": FILE, \"key\": FILE}, with \"fingerprint\" where the certificate does not "
+        "name the host, or false for none";
     const auto tls = section.required<nlohmann::json>("tls", kTls);
     if (tls.is_object()) {
       JsonSection files(tls, section.where() + ": tls");
-      peer.tls = {.ca = file(files, "ca"), .certificate = file(files, "certificate"), .key = file(files, "key")};
+      peer.tls = {.ca = file(files, "ca"),
+                  .certificate = file(files, "certificate"),
+                  .key = file(files, "key"),
+                  .fingerprint = fingerprint(files)};
       files.end();
     } else if (tls != false) {
       section.refuse("tls", kTls);
@@ -80,6 +85,21 @@ class Reader {
     std::string title = text(section, key, kExpected);
     if (title.size() > 16) section.refuse(key, kExpected);
     return title;
+  }
+
+  // Of a certificate, as OpenSSL prints it or as its digits alone.
+  static std::string fingerprint(JsonSection& section) {
+    constexpr const char* kExpected =
+        "64 hexadecimal digits, as openssl x509 -noout -fingerprint -sha256 -in CERTIFICATE prints them";
+    constexpr std::size_t kDigits = 64;
+    const auto text = section.find<std::string>("fingerprint", kExpected);
+    if (!text) return "";
+    std::string digits;
+    for (const unsigned char c : *text)
+      if (c != ':') digits += static_cast<char>(std::tolower(c));
+    if (digits.size() != kDigits || digits.find_first_not_of("0123456789abcdef") != std::string::npos)
+      section.refuse("fingerprint", kExpected);
+    return digits;
   }
 
   fs::path folder_;

@@ -16,6 +16,7 @@ namespace isoshift {
 struct DicomPeer {
   struct Tls {
     std::filesystem::path ca, certificate, key;  // PEM; the key without passphrase
+    std::string fingerprint;                     // SHA-256 of the peer's certificate, hexadecimal; empty: it names host
   };
   std::string name, host;
   std::uint16_t port = 104;

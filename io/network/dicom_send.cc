@@ -4,12 +4,12 @@
 // After osconfig.h.
 #include <dcmtk/dcmdata/dctk.h>
 #include <dcmtk/dcmnet/scu.h>
-#include <dcmtk/dcmtls/tlsscu.h>
 #include <fmt/format.h>
 
-#include <memory>
+#include <optional>
 
 #include "io/dicom/dicom_dataset.h"
+#include "io/network/peer_tls.h"
 
 namespace isoshift {
 namespace {
@@ -17,37 +17,45 @@ namespace {
 constexpr Uint32 kTimeoutS = 30;
 constexpr Uint16 kWarning = 0xB000, kWarningMask = 0xF000;
 
+class Scu : public DcmSCU {
+ public:
+  using DcmSCU::useSecureConnection;
+};
+
 // An association for one abstract syntax.
 class Association {
  public:
   // Throws Error where the peer does not accept it.
-  Association(const DicomPeer& peer, const char* abstract_syntax) : peer_(peer), scu_(scu_for(peer)) {
-    scu_->setAETitle(peer.calling_aet.c_str());
-    scu_->setPeerAETitle(peer.called_aet.c_str());
-    scu_->setPeerHostName(peer.host.c_str());
-    scu_->setPeerPort(peer.port);
-    scu_->setConnectionTimeout(static_cast<Sint32>(kTimeoutS));
-    scu_->setACSETimeout(kTimeoutS);
-    scu_->setDIMSETimeout(kTimeoutS);
-    scu_->setDIMSEBlockingMode(DIMSE_NONBLOCKING);
+  Association(const DicomPeer& peer, const char* abstract_syntax) : peer_(peer) {
+    if (peer.tls) tls_.emplace(peer);
+    scu_.setAETitle(peer.calling_aet.c_str());
+    scu_.setPeerAETitle(peer.called_aet.c_str());
+    scu_.setPeerHostName(peer.host.c_str());
+    scu_.setPeerPort(peer.port);
+    scu_.setConnectionTimeout(static_cast<Sint32>(kTimeoutS));
+    scu_.setACSETimeout(kTimeoutS);
+    scu_.setDIMSETimeout(kTimeoutS);
+    scu_.setDIMSEBlockingMode(DIMSE_NONBLOCKING);
     OFList<OFString> syntaxes;
     syntaxes.push_back(UID_LittleEndianExplicitTransferSyntax);
     syntaxes.push_back(UID_LittleEndianImplicitTransferSyntax);
-    check(scu_->addPresentationContext(abstract_syntax, syntaxes), "presentation context");
-    check(scu_->initNetwork(), "no connection can be prepared");
-    const OFCondition negotiated = scu_->negotiateAssociation();
-    context_ = negotiated.good() ? scu_->findAnyPresentationContextID(abstract_syntax, "") : 0;
+    check(scu_.addPresentationContext(abstract_syntax, syntaxes), "presentation context");
+    check(scu_.initNetwork(), "no connection can be prepared");
+    if (tls_) check(scu_.useSecureConnection(&tls_->layer()), "no TLS connection can be prepared");
+    const OFCondition negotiated = scu_.negotiateAssociation();
+    context_ = negotiated.good() ? scu_.findAnyPresentationContextID(abstract_syntax, "") : 0;
+    if (tls_ && !tls_->refusal().empty()) throw PeerError(tls_->refusal());
     if (negotiated == NET_EC_NoAcceptablePresentationContexts || (negotiated.good() && context_ == 0))
       fail(fmt::format("does not take {}", dcmFindNameOfUID(abstract_syntax, abstract_syntax)));
     check(negotiated, "no association");
   }
   ~Association() {
-    if (scu_->isConnected()) scu_->releaseAssociation();
+    if (scu_.isConnected()) scu_.releaseAssociation();
   }
   Association(const Association&) = delete;
   Association& operator=(const Association&) = delete;
 
-  DcmSCU& scu() { return *scu_; }
+  DcmSCU& scu() { return scu_; }
   T_ASC_PresentationContextID context() const { return context_; }
 
   [[noreturn]] void fail(const std::string& why) const { throw Error(fmt::format("peer {}: {}", peer_.name, why)); }
@@ -56,18 +64,9 @@ class Association {
   }
 
  private:
-  static std::unique_ptr<DcmSCU> scu_for(const DicomPeer& peer) {
-    if (!peer.tls) return std::make_unique<DcmSCU>();
-    auto scu = std::make_unique<DcmTLSSCU>();
-    scu->enableAuthentication(peer.tls->key.c_str(), peer.tls->certificate.c_str());
-    scu->addTrustedCertFile(peer.tls->ca.c_str());
-    scu->setPeerCertVerification(DCV_requireCertificate);
-    scu->setTLSProfile(TSP_Profile_BCP195_ND);
-    return scu;
-  }
-
   const DicomPeer& peer_;
-  std::unique_ptr<DcmSCU> scu_;
+  std::optional<PeerTls> tls_;
+  Scu scu_;
   T_ASC_PresentationContextID context_ = 0;
 };
 

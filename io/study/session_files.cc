@@ -21,9 +21,7 @@ constexpr std::size_t kNameLength = 12;
 std::string name_of(const std::vector<StudyFiles::Image>& images) {
   std::set<std::string> uids;
   for (const StudyFiles::Image& image : images) uids.insert(image.sop_instance_uid);
-  std::string all;
-  for (const std::string& uid : uids) all += uid + "\n";
-  return sha256_of(all).substr(0, kNameLength);
+  return session_name(uids);
 }
 
 using Images = std::span<const StudyFiles::Image>;
@@ -113,6 +111,12 @@ std::vector<SessionFiles> untimed_sessions(Images images, const std::set<std::st
 }
 
 }  // namespace
+
+std::string session_name(const std::set<std::string>& sop_instance_uids) {
+  std::string all;
+  for (const std::string& uid : sop_instance_uids) all += uid + "\n";
+  return sha256_of(all).substr(0, kNameLength);
+}
 
 std::vector<SessionFiles> sessions_of(const StudyFiles& files, bool other_xrays,
                                       const std::set<std::string>& registered) {

@@ -29,6 +29,9 @@ struct SessionFiles {
 std::vector<SessionFiles> sessions_of(const StudyFiles& files, bool other_xrays,
                                       const std::set<std::string>& registered = {});
 
+// The name of the session that these X-rays make.
+std::string session_name(const std::set<std::string>& sop_instance_uids);
+
 // What choose_parts() chooses from for a session: all files of its patient, and of X-rays its own. Files without an
 // issuer of the PatientID are of the only one there is.
 StudyFiles files_for(const SessionFiles& session, const StudyFiles& files);

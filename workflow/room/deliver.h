@@ -1,6 +1,7 @@
 #pragma once
 // Sends what was released to the peers of a watch file.
 
+#include <chrono>
 #include <map>
 #include <stop_token>
 #include <string>
@@ -21,9 +22,16 @@ class Deliverer {
   void deliver(const std::stop_token& stop, Observer& observer);
 
  private:
+  bool is_due(const std::string& what) const;
+  std::chrono::seconds put_off(const std::string& what);
+  void deliver(const Delivery& delivery, Observer& observer);
+  // Says once why nothing of a session is sent.
+  void refuse(const std::string& session, const std::string& why, Observer& observer);
+
   ResultsTree tree_;
   const WatchFile& watch_;
-  std::map<std::string, Backoff> pauses_;  // of peers, and of objects that one refuses
+  std::map<std::string, Backoff> pauses_;       // of peers, of objects that a peer refuses, of sessions
+  std::map<std::string, std::string> refused_;  // sessions of which nothing is sent, and why
 };
 
 }  // namespace isoshift

@@ -1,15 +1,14 @@
 #include "workflow/room/results_tree.h"
 
-#include <fcntl.h>
 #include <fmt/format.h>
-#include <sys/file.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <cerrno>
+#include <chrono>
 #include <cstring>
-#include <fstream>
 #include <iterator>
+#include <thread>
 
 #include "base/error.h"
 #include "base/json_file.h"
@@ -24,9 +23,9 @@ namespace {
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
-fs::path release_file(const fs::path& tree, const std::string& session) {
-  return tree / "released" / (session + ".json");
-}
+constexpr const char* kAgain =
+    "Nothing of the session is sent. To have its X-rays registered again, move the session's folder away and restart "
+    "isoshift watch";
 
 std::vector<Delivery> deliveries_of(const Release& release) {
   std::vector<Delivery> all;
@@ -36,10 +35,42 @@ std::vector<Delivery> deliveries_of(const Release& release) {
   return all;
 }
 
+// A release as its file and its line in the audit log tell it.
+Json release_json(const Release& release) {
+  Json objects = Json::array();
+  for (const Release::Object& object : release.objects)
+    objects.push_back({{"file", object.file}, {"sha256", object.sha256}});
+  Json json = {{"session", release.session}, {"by", release.releaser.by}, {"user", release.releaser.user}};
+  if (!release.releaser.sudo_user.empty()) json["sudo_user"] = release.releaser.sudo_user;
+  json.update(
+      {{"verdict", release.verdict}, {"record", release.record}, {"objects", objects}, {"peers", release.peers}});
+  return json;
+}
+
+Release release_from(const nlohmann::json& json) {
+  Release release{.session = json.at("session"),
+                  .releaser = {.by = json.at("by"), .user = json.at("user"), .sudo_user = json.value("sudo_user", "")},
+                  .on = json.at("on"),
+                  .verdict = json.at("verdict"),
+                  .record = json.at("record"),
+                  .objects = {},
+                  .peers = json.at("peers")};
+  for (const auto& object : json.at("objects")) release.objects.push_back({object.at("file"), object.at("sha256")});
+  return release;
+}
+
+// Folders of registrations under way: ".NAME.registering-PROCESS", and what isoshift register writes beside them.
+constexpr const char* kRegistering = ".registering-";
+
 }  // namespace
 
-ResultsTree::ResultsTree(fs::path path) : path_(std::move(path)) {
-  for (const char* folder : {"sessions", "released", "sent"}) {
+std::string to_string(const Releaser& releaser) {
+  return fmt::format("{} (user {}{})", releaser.by, releaser.user,
+                     releaser.sudo_user.empty() ? "" : ", sudo of " + releaser.sudo_user);
+}
+
+ResultsTree::ResultsTree(fs::path path) : path_(std::move(path)), audit_(path_ / "audit.jsonl") {
+  for (const char* folder : {"sessions", "registered", "released", "sent"}) {
     std::error_code error;
     fs::create_directories(path_ / folder, error);
     if (error) throw Error(fmt::format("{}: cannot be made: {}", (path_ / folder).string(), error.message()));
@@ -48,7 +79,15 @@ ResultsTree::ResultsTree(fs::path path) : path_(std::move(path)) {
 
 std::optional<FileLock> ResultsTree::try_lock() const { return FileLock::try_take(path_ / ".watch.lock"); }
 
-bool ResultsTree::is_released(const std::string& session) const { return fs::exists(release_file(path_, session)); }
+fs::path ResultsTree::record_file(const std::string& session) const {
+  return path_ / "registered" / (session + ".json");
+}
+
+fs::path ResultsTree::release_file(const std::string& session) const {
+  return path_ / "released" / (session + ".json");
+}
+
+bool ResultsTree::is_released(const std::string& session) const { return fs::exists(release_file(session)); }
 
 std::vector<std::string> ResultsTree::sessions() const {
   std::vector<std::string> names;
@@ -59,58 +98,154 @@ std::vector<std::string> ResultsTree::sessions() const {
   return names;
 }
 
-void ResultsTree::clean() const {
+void ResultsTree::clean() {
   for (const auto& entry : fs::directory_iterator(path_ / "sessions"))
-    if (entry.path().filename().string().find(".partial-") != std::string::npos) fs::remove_all(entry.path());
+    if (entry.path().filename().string().find(kRegistering) != std::string::npos) fs::remove_all(entry.path());
+}
+
+fs::path ResultsTree::registering(const std::string& session) const {
+  return path_ / "sessions" / fmt::format(".{}{}{}", session, kRegistering, ::getpid());
+}
+
+void ResultsTree::check_is_new(const std::string& session) const {
+  const fs::path folder = this->session(session);
+  if (fs::exists(fs::symlink_status(folder)))
+    throw Error(
+        fmt::format("{}: is there already, and holds no readable result of these X-rays. Move it away: then "
+                    "they are registered again",
+                    folder.string()));
+}
+
+void ResultsTree::publish(const std::string& session) {
+  check_is_new(session);
+  const fs::path folder = registering(session);
+  const SessionRecord record = record_of(session, folder);
+  const std::string text = json_of(record);
+  replace_text(record_file(session), text);
+  audit_.append("registered", {{"session", session}, {"verdict", record.verdict}, {"record", sha256_of(text)}});
+  if (::rename(folder.c_str(), this->session(session).c_str()) != 0)
+    throw WriteError(fmt::format("{}: cannot be written: {}", this->session(session).string(), std::strerror(errno)));
+  flush(path_ / "sessions");
+}
+
+SessionRecord ResultsTree::registered(const std::string& session) const {
+  const fs::path file = record_file(session);
+  if (!fs::exists(file))
+    throw Error(
+        fmt::format("session {}: there is no record of its registration ({}). {}", session, file.string(), kAgain));
+  SessionRecord record = read_session_record(file);
+  if (record.session != session || !audit_.has_registration(session, record.sha256))
+    throw Error(fmt::format("{}: is not the record of the newest registration of session {} in audit.jsonl. {}",
+                            file.string(), session, kAgain));
+  return record;
+}
+
+SessionRecord ResultsTree::checked(const std::string& session) const {
+  SessionRecord record = registered(session);
+  try {
+    check_unchanged(record, this->session(session));
+  } catch (const Error& error) {
+    throw Error(fmt::format("{}. {}", error.what(), kAgain));
+  }
+  return record;
 }
 
 std::optional<Release> ResultsTree::release_of(const std::string& session) const {
   if (!is_released(session)) return std::nullopt;
-  const nlohmann::json json = read_json_file(release_file(path_, session)).json;
-  Release release{
-      .session = session, .by = json.at("by"), .on = json.at("on"), .objects = {}, .peers = json.at("peers")};
-  for (const auto& object : json.at("objects")) release.objects.push_back({object.at("file"), object.at("sha256")});
+  const fs::path path = release_file(session);
+  const JsonFile file = read_json_file(path);
+  if (!audit_.has_release(session, file.sha256))
+    throw Error(
+        fmt::format("{}: audit.jsonl has no line of this release: isoshift release did not write this file, or "
+                    "it was changed since. Nothing of the session is sent. Remove the file, and release the "
+                    "session with isoshift release",
+                    path.string()));
+  Release release;
+  try {
+    release = release_from(file.json);
+  } catch (const nlohmann::json::exception& error) {
+    throw Error(fmt::format("{}: is no release: {}", path.string(), error.what()));
+  }
+  if (release.record != registered(session).sha256)
+    throw Error(
+        fmt::format("{}: releases an earlier registration of the session. Nothing of the session is sent. "
+                    "Remove the file, and release the session with isoshift release",
+                    path.string()));
   return release;
 }
 
-Release ResultsTree::release(const std::string& session, const std::string& by,
-                             const std::vector<std::string>& peers) const {
-  const fs::path folder = this->session(session);
-  if (session.find('/') != std::string::npos || !fs::exists(folder / kResultFile))
+// Only one process releases at a time.
+FileLock ResultsTree::lock_releases() const {
+  constexpr std::chrono::seconds kPatience(5);
+  const auto end = std::chrono::steady_clock::now() + kPatience;
+  for (;;) {
+    if (auto lock = FileLock::try_take(path_ / ".release.lock")) return *std::move(lock);
+    if (std::chrono::steady_clock::now() > end)
+      throw Error(fmt::format("{}: another release is under way. Try again", path_.string()));
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  }
+}
+
+void ResultsTree::check_objects_are_new(const Release& release) const {
+  for (const Release::Object& object : release.objects)
+    if (const auto other = audit_.session_releasing(object.sha256); other && *other != release.session)
+      throw Error(fmt::format("session {}: its {} has been released as that of session {}", release.session,
+                              object.file, *other));
+}
+
+Release ResultsTree::release(const std::string& session, const Releaser& releaser,
+                             const std::vector<std::string>& peers) {
+  const std::vector<std::string> known = sessions();
+  if (!std::ranges::binary_search(known, session))
     throw Error(fmt::format("{}: holds no session {}", path_.string(), session));
-  const std::string verdict = read_json_file(folder / kResultFile).json.at("verdict");
-  if (verdict == "rejected") throw Error(fmt::format("session {}: was rejected: there is nothing to release", session));
-  Release release{.session = session, .by = by, .on = local_time(), .objects = {}, .peers = peers};
-  Json objects = Json::array();
-  for (const char* file : {kRegistrationFile, "report.dcm"}) {
-    if (!fs::exists(folder / file)) continue;
-    release.objects.push_back({file, sha256_of_file(folder / file)});
-    objects.push_back({{"file", file}, {"sha256", release.objects.back().sha256}});
-  }
-  // Of two who release at the same time one is told that the other has: a hard link does not replace.
-  const fs::path file = release_file(path_, session),
-                 aside = path_ / "released" / fmt::format(".{}.{}", session, ::getpid());
-  replace_text(aside, Json{{"schema", 1},
-                           {"session", session},
-                           {"by", by},
-                           {"on", release.on},
-                           {"verdict", verdict},
-                           {"objects", objects},
-                           {"peers", peers}}
-                              .dump(2) +
-                          "\n");
-  const int failed = ::link(aside.c_str(), file.c_str());
-  const int reason = errno;
-  std::error_code ignored;
-  fs::remove(aside, ignored);
-  if (failed != 0 && reason == EEXIST) {
-    const Release before = release_of(session).value();
-    throw Error(fmt::format("session {}: has been released by {} on {}", session, before.by, before.on));
-  }
-  if (failed != 0) throw Error(fmt::format("{}: cannot be written: {}", file.string(), std::strerror(reason)));
-  flush(file.parent_path());
-  audit("released", {{"session", session}, {"by", by}, {"verdict", verdict}, {"objects", objects}, {"peers", peers}});
+  const FileLock lock = lock_releases();
+  if (const auto before = release_of(session))
+    throw Error(
+        fmt::format("session {}: has been released by {} on {}", session, to_string(before->releaser), before->on));
+  const SessionRecord record = checked(session);
+  if (record.verdict == "rejected")
+    throw Error(fmt::format("session {}: was rejected: there is nothing to release", session));
+  Release release{.session = session,
+                  .releaser = releaser,
+                  .on = local_time(),
+                  .verdict = record.verdict,
+                  .record = record.sha256,
+                  .objects = {},
+                  .peers = peers};
+  for (const char* file : {kRegistrationFile, "report.dcm"})
+    if (const auto found = record.files.find(file); found != record.files.end())
+      release.objects.push_back({file, found->second});
+  check_objects_are_new(release);
+  put_release(release);
   return release;
+}
+
+// First the line in the audit log, then the file. Between the two there is a line and no release: the file of the next
+// attempt has a line of its own.
+void ResultsTree::put_release(const Release& release) {
+  const fs::path file = release_file(release.session),
+                 aside = path_ / "released" / fmt::format(".{}.json", release.session);
+  Json json = {{"schema", 1}, {"on", release.on}};
+  json.update(release_json(release));
+  const std::string text = json.dump(2) + "\n";
+  replace_text(aside, text);
+  std::error_code ignored;
+  Json line = release_json(release);
+  line["release"] = sha256_of(text);
+  try {
+    audit_.append("released", line);
+  } catch (const Error& error) {
+    fs::remove(aside, ignored);
+    throw Error(fmt::format("session {}: is not released: {}", release.session, error.what()));
+  }
+  const int failed = ::link(aside.c_str(), file.c_str());  // does not replace
+  const int reason = errno;
+  fs::remove(aside, ignored);
+  if (failed != 0) {
+    audit_.note("not released", {{"session", release.session}, {"release", line["release"]}});
+    throw Error(fmt::format("{}: cannot be written: {}", file.string(), std::strerror(reason)));
+  }
+  flush(file.parent_path());
 }
 
 fs::path ResultsTree::sent_file(const Delivery& delivery) const {
@@ -126,30 +261,43 @@ std::vector<std::string> ResultsTree::released() const {
   return sessions;
 }
 
+// A mark counts for the object that it names.
+bool ResultsTree::is_sent(const Delivery& delivery) const {
+  const fs::path mark = sent_file(delivery);
+  if (!fs::exists(mark)) return false;
+  const nlohmann::json json = read_json_file(mark).json;
+  return json.is_object() && json.value("object", nlohmann::json()) == delivery.object.sha256;
+}
+
 std::vector<Delivery> ResultsTree::pending_of(const Release& release) const {
   std::vector<Delivery> pending = deliveries_of(release);
-  std::erase_if(pending, [&](const Delivery& delivery) { return fs::exists(sent_file(delivery)); });
+  std::erase_if(pending, [&](const Delivery& delivery) { return is_sent(delivery); });
   return pending;
 }
 
-std::vector<Delivery> ResultsTree::pending() const {
-  std::vector<Delivery> pending;
+ResultsTree::Pending ResultsTree::pending() {
+  Pending pending;
   for (const std::string& session : released()) {
     if (delivered_.contains(session)) continue;
     try {
-      std::vector<Delivery> left = pending_of(release_of(session).value());
+      const auto release = release_of(session);
+      if (!release) continue;  // removed since
+      std::vector<Delivery> left = pending_of(*release);
       if (left.empty()) delivered_.insert(session);
-      std::ranges::move(left, std::back_inserter(pending));
-    } catch (const std::exception&) {
-      continue;  // whoever shows its state says that it cannot be read
+      std::ranges::move(left, std::back_inserter(pending.deliveries));
+    } catch (const std::exception& error) {
+      pending.refused[session] = error.what();
     }
   }
   return pending;
 }
 
 fs::path ResultsTree::checked_file(const Delivery& delivery) const {
+  if (!release_of(delivery.session)) throw Error(fmt::format("session {}: is not released any more", delivery.session));
+  const SessionRecord record = checked(delivery.session);
+  const auto registered = record.files.find(delivery.object.file);
   fs::path file = session(delivery.session) / delivery.object.file;
-  if (sha256_of_file(file) != delivery.object.sha256)
+  if (registered == record.files.end() || registered->second != delivery.object.sha256)
     throw Error(fmt::format("{}: is not what was released: its SHA-256 differs", file.string()));
   return file;
 }
@@ -158,13 +306,13 @@ fs::path ResultsTree::prepared_file(const Delivery& delivery) const {
   return path_ / "sent" / ("." + sent_file(delivery).filename().string());
 }
 
-void ResultsTree::prepare_to_send(const Delivery& delivery) const {
+void ResultsTree::prepare_to_send(const Delivery& delivery) {
   replace_text(prepared_file(delivery), Json{{"on", local_time()}, {"object", delivery.object.sha256}}.dump() + "\n");
 }
 
 bool ResultsTree::is_in_doubt(const Delivery& delivery) const { return fs::exists(prepared_file(delivery)); }
 
-void ResultsTree::mark_sent(const Delivery& delivery, const std::string& answer) const {
+void ResultsTree::mark_sent(const Delivery& delivery, const std::string& answer) {
   fs::rename(prepared_file(delivery), sent_file(delivery));
   flush(path_ / "sent");
   audit("sent", {{"session", delivery.session},
@@ -173,48 +321,25 @@ void ResultsTree::mark_sent(const Delivery& delivery, const std::string& answer)
                  {"answer", answer.empty() ? "success" : answer}});
 }
 
-void ResultsTree::complete_audit() const {
-  std::set<std::string> written;  // events, with what tells one from another
-  const auto key = [](const Json& line) {
-    return line.value("event", "") + " " + line.value("session", "") + " " + line.value("peer", "") + " " +
-           line.value("object", "");
-  };
-  std::ifstream file(path_ / "audit.jsonl");
-  for (std::string text; std::getline(file, text);)
-    if (const Json line = Json::parse(text, nullptr, false); line.is_object()) written.insert(key(line));
-  const auto complete = [&](const char* event, Json details) {
-    Json line = {{"event", event}};
-    line.update(details);
-    if (written.contains(key(line))) return;
-    details["noted"] = "at the next start";
-    audit(event, details);
-  };
-  for (const std::string& session : sessions()) complete("registered", {{"session", session}});
+void ResultsTree::complete_audit() {
   for (const std::string& session : released()) {
-    const Release release = release_of(session).value();
-    complete("released", {{"session", session}, {"by", release.by}, {"released_on", release.on}});
-    for (const Delivery& delivery : deliveries_of(release))
-      if (fs::exists(sent_file(delivery)))
-        complete("sent", {{"session", session}, {"peer", delivery.peer}, {"object", delivery.object.sha256}});
+    std::optional<Release> release;
+    try {
+      release = release_of(session);
+    } catch (const Error&) {
+      continue;  // nothing of it was sent; pending() says why
+    }
+    if (!release) continue;
+    for (const auto& delivery : deliveries_of(*release)) {
+      const auto& [name, peer, object] = delivery;
+      if (is_sent(delivery) && !audit_.has_sending(name, peer, object.sha256))
+        audit("sent", {{"session", name}, {"peer", peer}, {"object", object.sha256}, {"noted", "at the next start"}});
+    }
   }
 }
 
-void ResultsTree::audit(const std::string& event, const Json& details) const {
-  Json line = {{"on", local_time()}, {"event", event}};
-  line.update(details);
-  unwritten_ += line.dump() + "\n";
-  const int descriptor = ::open((path_ / "audit.jsonl").c_str(), O_RDWR | O_APPEND | O_CREAT | O_CLOEXEC, 0640);
-  if (descriptor < 0) return;
-  ::flock(descriptor, LOCK_EX);
-  const off_t before = ::lseek(descriptor, 0, SEEK_END);
-  char last = '\n';
-  if (before > 0 && ::pread(descriptor, &last, 1, before - 1) == 1 && last != '\n') unwritten_.insert(0, "\n");
-  const ssize_t written = ::write(descriptor, unwritten_.data(), unwritten_.size());
-  if (written == static_cast<ssize_t>(unwritten_.size()) && ::fsync(descriptor) == 0)
-    unwritten_.clear();
-  else if (written > 0 && ::ftruncate(descriptor, before) != 0)
-    unwritten_.erase(0, static_cast<std::size_t>(written));
-  ::close(descriptor);
-}
+void ResultsTree::audit(const std::string& event, const Json& details) { audit_.note(event, details); }
+
+void ResultsTree::write_kept_audit() { audit_.write_kept(); }
 
 }  // namespace isoshift

@@ -50,11 +50,12 @@ ResultsPage::Row row_of(const WaitingSession& waiting) {
 
 std::string times_of(const std::vector<StudyFiles::Image>& images) { return times_in_words(images); }
 
-void SessionIndex::add(const std::string& session, const SetupReport& report) {
+void SessionIndex::add(const std::string& session, const SetupReport& report, const std::string& obstacle) {
   Session added{.name = session,
                 .patient = fmt::format("{} ({})", report.identity.patient_name, report.identity.patient_id),
                 .verdict = std::string(to_string(report.verdict)),
                 .action = std::string(to_string(shown_shift(report).action)),
+                .held = obstacle.empty() ? "held" : "held, cannot be released: " + obstacle,
                 .state = "",
                 .first = report.views.front().acquired,
                 .times = times_in_words(report.views)};
@@ -68,7 +69,7 @@ bool SessionIndex::update_states() {
   bool has_changed = false;
   for (Session& session : sessions_) {
     if (session.is_over) continue;
-    std::string state = "held";
+    std::string state = session.held;
     session.is_over = session.verdict == to_string(Verdict::kRejected);
     if (session.is_over) {
       state = "rejected";
@@ -77,7 +78,7 @@ bool SessionIndex::update_states() {
         const Release release = tree_.release_of(session.name).value();
         const auto left = tree_.pending_of(release).size();
         session.is_over = left == 0;
-        state = fmt::format("released by {} on {}", release.by, release.on);
+        state = fmt::format("released by {} on {}", to_string(release.releaser), release.on);
         if (left > 0) state += fmt::format("; {} to be sent", left);
         if (left == 0 && !release.peers.empty()) state += "; sent";
       } catch (const std::exception& error) {

@@ -26,7 +26,8 @@ class SessionIndex {
  public:
   SessionIndex(const ResultsTree& tree, std::string site) : tree_(tree), site_(std::move(site)) {}
 
-  void add(const std::string& session, const SetupReport& report);
+  // `obstacle`: why the session cannot be released; empty: it can be.
+  void add(const std::string& session, const SetupReport& report, const std::string& obstacle);
   std::size_t size() const { return sessions_.size(); }
 
   // Looks what has been released and sent, and writes the pages that are no longer true. `troubles`: what does not work
@@ -35,7 +36,9 @@ class SessionIndex {
 
  private:
   struct Session {
-    std::string name, patient, verdict, action, state;
+    std::string name, patient, verdict, action;
+    std::string held;  // the state before it is released
+    std::string state;
     std::string first;     // when the first X-ray was acquired, "2026-03-01 10:15:00"
     std::string times;     // of all X-rays
     bool is_over = false;  // nothing becomes of it any more

@@ -69,8 +69,8 @@ TEST_F(MachineProfileTest, SuppliesWhatFilesLack) {
                                                   {"beam", "kv"}}}),
                                         {}, notes_);
   EXPECT_TRUE(missing_attributes(supplied).empty());
-  EXPECT_EQ(supplied.table_pitch_deg, 1.5);
-  EXPECT_EQ(supplied.table_roll_deg, -0.5);
+  EXPECT_EQ(supplied.table.pitch_deg, 1.5);
+  EXPECT_EQ(supplied.table.roll_deg, -0.5);
   const SmallStudy whole;
   const RtImage expected = read_rt_images(whole.image(0), notes_).front();
   EXPECT_TRUE(xray_view(supplied, Beam::kKilovoltage, notes_)

@@ -54,7 +54,25 @@ TEST_F(WatchFileTest, SaysWhatIsFollowedAndWhereItGoes) {
   EXPECT_EQ(watch.registration, std::vector<std::string>{"--preset=fast"});
   ASSERT_EQ(watch.peers.size(), 1U);
   EXPECT_EQ(watch.peers[0].tls->key, folder_ / "k.pem");
+  EXPECT_EQ(watch.peers[0].tls->fingerprint, "");
   EXPECT_FALSE(read(with(", \"peers\": [" + peer("false") + "]")).peers[0].tls);
+}
+
+TEST_F(WatchFileTest, ACertificateIsPinnedByItsFingerprintAsOpensslPrintsIt) {
+  const auto with_fingerprint = [](const std::string& digits) {
+    return with(", \"peers\": [" +
+                peer(R"({"ca": "ca.pem", "certificate": "c.pem", "key": "k.pem", "fingerprint": ")" + digits + "\"}") +
+                "]");
+  };
+  std::string printed, plain;
+  for (int n = 0; n < 32; ++n) {
+    printed += n == 0 ? "AB" : ":AB";
+    plain += "ab";
+  }
+  EXPECT_EQ(read(with_fingerprint(printed)).peers[0].tls->fingerprint, plain);
+  EXPECT_EQ(read(with_fingerprint(plain)).peers[0].tls->fingerprint, plain);
+  for (const std::string& wrong : {plain.substr(1), plain + "a", std::string(64, 'g'), std::string()})
+    EXPECT_THAT(error_of(with_fingerprint(wrong)), HasSubstr("tls: fingerprint is \"" + wrong + "\", expected 64"));
 }
 
 TEST_F(WatchFileTest, MistakesAreNamed) {

@@ -33,6 +33,16 @@ TEST(Watch, InTroubleLosesNothingAndLetsNobodyElseWait) {
   EXPECT_EQ(checked.exit_status, 0) << checked.out << std::string(std::istreambuf_iterator<char>(log), {});
 }
 
+TEST(Watch, SendsNothingThatWasExchangedCopiedOrReleasedByNobody) {
+  if (run_shell("command -v storescp").exit_status != 0) GTEST_SKIP() << "storescp (dcmtk) is not installed";
+  const TemporaryFolder work;
+  const CommandOutcome checked =
+      run_shell(fmt::format("/usr/bin/python3 {}/tests/workflow/room/watch_and_forgers.py {} {}", ISOSHIFT_SOURCE_DIR,
+                            ISOSHIFT_PROGRAM, (work / "").string()));
+  std::ifstream log(work / "watch.log");
+  EXPECT_EQ(checked.exit_status, 0) << checked.out << std::string(std::istreambuf_iterator<char>(log), {});
+}
+
 TEST(Watch, FollowsAFolder) {
   const TemporaryFolder work;
   const SmallStudy study;

@@ -8,6 +8,7 @@
 #include <iterator>
 
 #include "base/output_folder.h"
+#include "tests/support/registered_session.h"
 #include "tests/support/temporary_folder.h"
 
 namespace isoshift {
@@ -19,16 +20,14 @@ using testing::Not;
 
 class SessionIndexTest : public testing::Test {
  protected:
-  void add(const std::string& session, const std::string& acquired, Verdict verdict = Verdict::kAccepted) {
-    fs::create_directories(tree_.session(session));
-    write_text(tree_.session(session) / "result.json", fmt::format("{{\"verdict\": \"{}\"}}", to_string(verdict)));
-    write_text(tree_.session(session) / "report.dcm", "report");
+  void add(const std::string& session, const std::string& acquired, Verdict verdict = Verdict::kAccepted,
+           const std::string& obstacle = "") {
     SetupReport report;
     report.verdict = verdict;
     report.identity.patient_name = "Doe^Jane";
     report.identity.patient_id = "7";
     report.views.emplace_back().acquired = acquired;
-    index_.add(session, report);
+    index_.add(session, report, obstacle);
   }
   std::string page(const std::string& name) const {
     std::ifstream file(tree_.path() / name);
@@ -56,7 +55,7 @@ TEST_F(SessionIndexTest, ListsWhatWaitsAndTheNewestFirst) {
 TEST_F(SessionIndexTest, ShowsTheTimeOfEveryXray) {
   SetupReport report;
   report.views = {{.label = "AP", .acquired = "2026-03-01 10:15:00"}, {.label = "LAT", .acquired = ""}};
-  index_.add("a", report);
+  index_.add("a", report, "");
   StudyFiles::Image waiting{.label = "", .acquired = "2026-03-01 10:20:10"};
   index_.update({{.name = "next", .patient_id = "8", .acquired = times_of({waiting}), .why = "1 of 2 X-rays"}}, {});
   const std::string index = page("index.html");
@@ -72,16 +71,19 @@ TEST_F(SessionIndexTest, ADateThatIsNoneHasAPageToo) {
 }
 
 TEST_F(SessionIndexTest, TellsWhatBecomesOfASession) {
-  add("a", "2026-03-01 10:15:00");
+  const std::string a = register_session(tree_, {"1.2.1"}, "review");
+  add(a, "2026-03-01 10:15:00", Verdict::kReview);
   add("r", "2026-03-01 10:15:00", Verdict::kRejected);
+  add("u", "2026-03-01 10:15:00", Verdict::kAccepted, "there is no record");
   index_.update({}, {});
   EXPECT_THAT(page("index.html"), HasSubstr("<td>held</td>"));
+  EXPECT_THAT(page("index.html"), HasSubstr("<td>held, cannot be released: there is no record</td>"));
   EXPECT_THAT(page("index.html"), HasSubstr("<td>rejected</td></tr>"));
-  tree_.release("a", "J. Doe", {"record"});
+  tree_.release(a, {.by = "J. Doe", .user = "isoshift", .sudo_user = "doe"}, {"record"});
   index_.update({}, {});
-  EXPECT_THAT(page("index.html"), HasSubstr("released by J. Doe on "));
+  EXPECT_THAT(page("index.html"), HasSubstr("released by J. Doe (user isoshift, sudo of doe) on "));
   EXPECT_THAT(page("index.html"), HasSubstr("; 1 to be sent"));
-  for (const Delivery& delivery : tree_.pending()) {
+  for (const Delivery& delivery : tree_.pending().deliveries) {
     tree_.prepare_to_send(delivery);
     tree_.mark_sent(delivery, "");
   }
@@ -95,8 +97,15 @@ TEST_F(SessionIndexTest, OneReleaseThatCannotBeReadHidesNoSession) {
   add("b", "2026-03-01 10:15:00");
   write_text(tree_.path() / "released" / "a.json", "{");
   index_.update({}, {});
-  EXPECT_THAT(page("index.html"), HasSubstr("a.json"));
+  EXPECT_THAT(page("index.html"), HasSubstr("a.json: is no JSON"));
   EXPECT_THAT(page("index.html"), HasSubstr("sessions/b/"));
+}
+
+TEST_F(SessionIndexTest, AHandWrittenReleaseIsTold) {
+  add("a", "2026-03-01 10:15:00");
+  write_text(tree_.path() / "released" / "a.json", "{}");
+  index_.update({}, {});
+  EXPECT_THAT(page("index.html"), HasSubstr("a.json: audit.jsonl has no line of this release"));
 }
 
 TEST_F(SessionIndexTest, AYearOfSessionsIsNotInOnePage) {

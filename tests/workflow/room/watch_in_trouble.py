@@ -83,7 +83,7 @@ def main(program, work):
     results = disk / "results"
 
     def sessions():
-        return {f.parent.name for f in (results / "sessions").glob("*/result.json") if ".partial" not in f.parent.name}
+        return {f.parent.name for f in (results / "sessions").glob("*/result.json") if "." not in f.parent.name}
 
     log = work / "watch.log"
 
@@ -126,7 +126,7 @@ def main(program, work):
         wait_for(lambda: damaged.exists() and damaged.read_bytes() == content, 30, "the damaged object to come again")
         server.publish(study(program, work / "c", 3))
         wait_for(lambda: len(sessions()) == 3, 60, "a session beside a damaged one")
-        wait_for(lambda: "result.json" in (results / "index.html").read_text(), 10, "the index to tell of the damaged one")
+        wait_for(lambda: "holds no readable result" in (results / "index.html").read_text(), 10, "the index to tell of the damaged one")
 
         # Another server's database, with more changes than the first had.
         kill()

@@ -27,7 +27,8 @@ VIEWS, QUIET_S = 2, 2
 
 
 def make_certificate(folder):
-    subprocess.run(["openssl", "req", "-x509", "-newkey", "rsa:3072", "-nodes", "-days", "2", "-subj", "/CN=isoshift test", "-keyout", folder / "key.pem",
+    subprocess.run(["openssl", "req", "-x509", "-newkey", "rsa:3072", "-nodes", "-days", "2", "-subj", "/CN=isoshift test", "-addext", "subjectAltName=IP:127.0.0.1",
+                    "-keyout", folder / "key.pem",
                     "-out", folder / "certificate.pem"], check=True, capture_output=True)
     return {"ca": str(folder / "certificate.pem"), "certificate": str(folder / "certificate.pem"), "key": str(folder / "key.pem")}
 
@@ -56,7 +57,7 @@ class Room:
 
     def sessions(self):
         folder = self.results / "sessions"
-        return sorted(f.parent.name for f in folder.glob("*/result.json") if ".partial" not in f.parent.name) if folder.exists() else []
+        return sorted(f.parent.name for f in folder.glob("*/result.json") if "." not in f.parent.name) if folder.exists() else []
 
     def result(self, session):
         return json.loads((self.results / "sessions" / session / "result.json").read_text())

@@ -1,0 +1,136 @@
+#include "workflow/room/audit_log.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/file.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <array>
+#include <cerrno>
+#include <cstring>
+#include <fstream>
+#include <string_view>
+
+#include "base/error.h"
+#include "base/local_time.h"
+#include "base/output_folder.h"
+
+namespace isoshift {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+std::string line_of(const std::string& event, const Json& details) {
+  Json line = {{"on", local_time()}, {"event", event}};
+  line.update(details);
+  return line.dump() + "\n";
+}
+
+// Empty where the line has no such text.
+std::string text_of(const Json& line, const char* key) {
+  const auto found = line.find(key);
+  return found != line.end() && found->is_string() ? found->get<std::string>() : "";
+}
+
+// 0, or the errno of what failed: then all of it may be missing.
+int append_and_flush(int descriptor, std::string_view text) {
+  while (!text.empty()) {
+    const ssize_t written = ::write(descriptor, text.data(), text.size());
+    if (written < 0 && errno == EINTR) continue;
+    if (written < 0) return errno;
+    text.remove_prefix(static_cast<std::size_t>(written));
+  }
+  return ::fsync(descriptor) == 0 ? 0 : errno;
+}
+
+}  // namespace
+
+void AuditLog::append(const std::string& event, const Json& details) {
+  write(kept_ + line_of(event, details));
+  kept_.clear();
+}
+
+void AuditLog::note(const std::string& event, const Json& details) {
+  kept_ += line_of(event, details);
+  try {
+    write_kept();
+  } catch (const Error&) {
+    return;  // kept; whoever calls write_kept() next says why
+  }
+}
+
+void AuditLog::write_kept() {
+  if (kept_.empty()) return;
+  write(kept_);
+  kept_.clear();
+}
+
+void AuditLog::write(const std::string& lines) const {
+  const int descriptor = ::open(path_.c_str(), O_RDWR | O_APPEND | O_CREAT | O_CLOEXEC, 0640);
+  if (descriptor < 0) throw Error(fmt::format("{}: cannot be written: {}", path_.string(), std::strerror(errno)));
+  ::flock(descriptor, LOCK_EX);
+  const off_t before = ::lseek(descriptor, 0, SEEK_END);
+  char last = '\n';  // a line that was cut off gets an end
+  const bool is_cut = before > 0 && ::pread(descriptor, &last, 1, before - 1) == 1 && last != '\n';
+  const int failure = append_and_flush(descriptor, (is_cut ? "\n" : "") + lines);
+  // What was written of a line is taken back. In a log that can only grow it stays, and the next line begins after it.
+  [[maybe_unused]] const int undone = failure != 0 ? ::ftruncate(descriptor, before) : 0;
+  ::close(descriptor);
+  if (failure != 0) throw Error(fmt::format("{}: cannot be written: {}", path_.string(), std::strerror(failure)));
+  if (before == 0) flush(path_.parent_path());
+}
+
+const AuditLog::Proofs& AuditLog::proofs() const {
+  struct stat status {};
+  if (::stat(path_.c_str(), &status) != 0) {
+    if (errno != ENOENT) throw Error(fmt::format("{}: cannot be read: {}", path_.string(), std::strerror(errno)));
+    read_version_ = {};
+    proofs_ = {};
+    return proofs_;
+  }
+  const bool is_same = status.st_ino == read_version_.inode && status.st_size == read_version_.size &&
+                       status.st_mtim.tv_sec == read_version_.written.tv_sec &&
+                       status.st_mtim.tv_nsec == read_version_.written.tv_nsec;
+  if (is_same) return proofs_;
+  std::ifstream file(path_);
+  if (!file || S_ISDIR(status.st_mode)) throw Error(fmt::format("{}: cannot be read", path_.string()));
+  Proofs proofs;
+  for (std::string text; std::getline(file, text);) {
+    const Json line = Json::parse(text, nullptr, false);
+    if (!line.is_object()) continue;  // a line that was cut off
+    const std::string event = text_of(line, "event"), session = text_of(line, "session");
+    if (event == "registered") proofs.registrations[session] = text_of(line, "record");
+    if (event == "sent") proofs.sendings.insert({session, text_of(line, "peer"), text_of(line, "object")});
+    if (event != "released") continue;
+    proofs.releases.emplace(session, text_of(line, "release"));
+    if (line.contains("objects") && line["objects"].is_array())
+      for (const Json& object : line["objects"])
+        if (object.is_object()) proofs.objects.emplace(text_of(object, "sha256"), session);
+  }
+  proofs_ = std::move(proofs);
+  read_version_ = {.inode = status.st_ino, .size = status.st_size, .written = status.st_mtim};
+  return proofs_;
+}
+
+bool AuditLog::has_registration(const std::string& session, const std::string& record_sha256) const {
+  const auto& registrations = proofs().registrations;
+  const auto found = registrations.find(session);
+  return found != registrations.end() && found->second == record_sha256;
+}
+
+bool AuditLog::has_release(const std::string& session, const std::string& release_sha256) const {
+  return proofs().releases.contains({session, release_sha256});
+}
+
+bool AuditLog::has_sending(const std::string& session, const std::string& peer,
+                           const std::string& object_sha256) const {
+  return proofs().sendings.contains({session, peer, object_sha256});
+}
+
+std::optional<std::string> AuditLog::session_releasing(const std::string& object_sha256) const {
+  const auto found = proofs().objects.find(object_sha256);
+  return found == proofs().objects.end() ? std::nullopt : std::optional(found->second);
+}
+
+}  // namespace isoshift

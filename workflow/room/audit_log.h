@@ -1,0 +1,61 @@
+#pragma once
+// The audit log of a results tree: one JSON object per line, lines are only ever added. It holds no names of patients
+// and no UIDs. It also proves which registrations and releases took place: their lines name the SHA-256 of their files.
+
+#include <sys/types.h>
+
+#include <array>
+#include <ctime>
+#include <filesystem>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <set>
+#include <string>
+#include <utility>
+
+namespace isoshift {
+
+class AuditLog {
+ public:
+  explicit AuditLog(std::filesystem::path path) : path_(std::move(path)) {}
+
+  // Adds a line for something that is about to take effect. On return the line is on the disk. Throws Error where it
+  // cannot be: then the step must not be taken.
+  void append(const std::string& event, const nlohmann::ordered_json& details);
+  // Adds a line for something that has happened. A line that cannot be written now is kept for later.
+  void note(const std::string& event, const nlohmann::ordered_json& details);
+  // Writes the lines that were kept. Throws Error if they still cannot be written.
+  void write_kept();
+
+  // What the lines prove. All throw Error for a log that is there and cannot be read.
+  // The newest registration of the session has this record.
+  bool has_registration(const std::string& session, const std::string& record_sha256) const;
+  // A release of the session has this file.
+  bool has_release(const std::string& session, const std::string& release_sha256) const;
+  bool has_sending(const std::string& session, const std::string& peer, const std::string& object_sha256) const;
+  // The session with which an object was released, if it was.
+  std::optional<std::string> session_releasing(const std::string& object_sha256) const;
+
+ private:
+  struct Version {
+    ino_t inode = 0;
+    off_t size = -1;
+    timespec written{};
+  };
+  struct Proofs {
+    std::map<std::string, std::string> registrations;        // SHA-256 of the newest record, by session
+    std::set<std::pair<std::string, std::string>> releases;  // session, SHA-256 of the release file
+    std::map<std::string, std::string> objects;              // session, by SHA-256 of a released object
+    std::set<std::array<std::string, 3>> sendings;           // session, peer, SHA-256 of the object
+  };
+  void write(const std::string& lines) const;
+  const Proofs& proofs() const;  // reads the log again if it has changed
+
+  std::filesystem::path path_;
+  std::string kept_;  // lines that could not be written yet
+  mutable Version read_version_;
+  mutable Proofs proofs_;
+};
+
+}  // namespace isoshift

@@ -1,0 +1,93 @@
+#include "workflow/room/session_record.h"
+
+#include <fmt/format.h>
+
+#include <nlohmann/json.hpp>
+#include <set>
+
+#include "base/error.h"
+#include "base/json_file.h"
+#include "base/local_time.h"
+#include "base/sha256.h"
+#include "io/report/result_folder.h"
+#include "io/study/session_files.h"
+
+namespace isoshift {
+namespace {
+
+namespace fs = std::filesystem;
+
+// A link could lead to another file tomorrow, and a folder would hide files from the record.
+std::map<std::string, std::string> hashes_in(const fs::path& folder) {
+  if (fs::symlink_status(folder).type() != fs::file_type::directory)
+    throw Error(fmt::format("{}: is no folder of its own", folder.string()));
+  std::map<std::string, std::string> hashes;
+  for (const auto& entry : fs::directory_iterator(folder)) {
+    if (entry.symlink_status().type() != fs::file_type::regular)
+      throw Error(fmt::format("{}: is not a plain file", entry.path().string()));
+    hashes[entry.path().filename().string()] = sha256_of_file(entry.path());
+  }
+  return hashes;
+}
+
+}  // namespace
+
+SessionRecord record_of(const std::string& session, const fs::path& folder) {
+  const nlohmann::json result = read_json_file(folder / kResultFile).json;
+  SessionRecord record{.session = session, .verdict = "", .on = local_time(), .files = hashes_in(folder), .sha256 = ""};
+  std::set<std::string> xrays;
+  try {
+    record.verdict = result.at("verdict").get<std::string>();
+    for (const nlohmann::json& view : result.at("views")) xrays.insert(view.at("sop_instance_uid").get<std::string>());
+  } catch (const nlohmann::json::exception&) {
+    throw Error(fmt::format("{}: is no result of isoshift register", (folder / kResultFile).string()));
+  }
+  if (const std::string name = session_name(xrays); name != session)
+    throw Error(fmt::format("{}: is the result of other X-rays: they make session {}, expected {}",
+                            (folder / kResultFile).string(), name, session));
+  return record;
+}
+
+std::string json_of(const SessionRecord& record) {
+  nlohmann::ordered_json files = nlohmann::ordered_json::array();
+  for (const auto& [file, sha256] : record.files) files.push_back({{"file", file}, {"sha256", sha256}});
+  return nlohmann::ordered_json{{"schema", 1},
+                                {"session", record.session},
+                                {"verdict", record.verdict},
+                                {"on", record.on},
+                                {"files", files}}
+             .dump(2) +
+         "\n";
+}
+
+SessionRecord read_session_record(const fs::path& path) {
+  const JsonFile file = read_json_file(path);
+  try {
+    SessionRecord record{.session = file.json.at("session"),
+                         .verdict = file.json.at("verdict"),
+                         .on = file.json.at("on"),
+                         .files = {},
+                         .sha256 = file.sha256};
+    for (const nlohmann::json& entry : file.json.at("files"))
+      record.files[entry.at("file").get<std::string>()] = entry.at("sha256").get<std::string>();
+    return record;
+  } catch (const nlohmann::json::exception& error) {
+    throw Error(fmt::format("{}: is no record of a registered session: {}", path.string(), error.what()));
+  }
+}
+
+void check_unchanged(const SessionRecord& record, const fs::path& folder) {
+  const std::map<std::string, std::string> found = hashes_in(folder);
+  for (const auto& [file, sha256] : record.files) {
+    const auto same = found.find(file);
+    if (same == found.end()) throw Error(fmt::format("{}: is missing", (folder / file).string()));
+    if (same->second != sha256)
+      throw Error(fmt::format("{}: is not what was registered: its SHA-256 is {}, expected {}",
+                              (folder / file).string(), same->second, sha256));
+  }
+  for (const auto& [file, sha256] : found)
+    if (!record.files.contains(file))
+      throw Error(fmt::format("{}: was added after the registration", (folder / file).string()));
+}
+
+}  // namespace isoshift
