@@ -103,7 +103,7 @@ def exchanged_edited_and_added(room, found):
     victim.rename(room.work / "aside")
     other.rename(victim)
     room.expect_refused(victim.name, "is not what was registered", "two folders that changed their names")
-    victim.symlink_to(room.work / "aside") if not victim.exists() else victim.rename(other)
+    victim.rename(other)
     (room.work / "aside").rename(victim)
 
 
@@ -130,14 +130,18 @@ def forged(room, session):
         release["record"] = sha256(record)
     before = len(room.at_peer())
     room.release_file(session).write_text(json.dumps(release))
+    copy = room.session("0123456789ab")
+    shutil.copytree(folder, copy)
     room.start_watch()
     wait_for(lambda: f"{session}.json" in room.log.read_text() and f"{session}.json" in (room.results / "index.html").read_text(), 20, "the forged release to be told")
+    wait_for(lambda: f"session {copy.name}: there is no record of its registration" in (room.results / "index.html").read_text(), 20, "the copied folder to be told")
     time.sleep(3)
     expect(room.log.read_text().count(f"{session}.json") == 1, "the forged release is told more than once")
     room.end_watch()
     expect(len(room.at_peer()) == before, "a forged release was sent")
     expect(all(line.get("session") != session for line in room.audit() if line["event"] in ("released", "sent")), "a forged release entered the audit log")
     room.release_file(session).unlink()
+    shutil.rmtree(copy)
 
 
 def without_audit_log(room, session):
