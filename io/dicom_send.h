@@ -1,5 +1,5 @@
 #pragma once
-// Sends DICOM objects to a peer: C-STORE (PS3.4 Annex B), with TLS as PS3.15 B.9 (BCP 195) has it.
+// Sends DICOM objects to a peer: C-STORE (PS3.4 Annex B), with TLS as peer_tls.h has it.
 
 #include <filesystem>
 

@@ -201,6 +201,18 @@ def main(program, work):
         time.sleep(3)
         expect(len(room.at_peer()) == before, "an exchanged result was sent")
         room.end_watch(signal.SIGTERM)
+
+        # The way out: the X-rays are registered again, and somebody releases that.
+        room.session(session).rename(work / "exchanged")
+        room.start_watch()
+        wait_for(lambda: "PHANTOM4" in room.by_patient(), 60, "the session to be registered again")
+        wait_for(lambda: "releases an earlier registration" in (room.results / "index.html").read_text(), 20, "the index to tell of the earlier release")
+        expect(len(room.at_peer()) == before, "a result was sent with the release of an earlier one")
+        room.release_file(session).unlink()
+        released = room.release(session)
+        expect(released.returncode == 0, f"release: {released.stdout}{released.stderr}")
+        wait_for(lambda: len(room.at_peer()) == before + len(list(room.session(session).glob("*.dcm"))), 30, "the new result at the peer")
+        room.end_watch(signal.SIGTERM)
         audit = (room.results / "audit.jsonl").read_text()
         expect("PHANTOM" not in audit and "Phantom" not in audit and "2.25." not in audit, "the audit log names a patient or a UID")
     finally:
