@@ -59,7 +59,8 @@ void add_release_command(CLI::App& app, Console& console, int& exit_status) {
   CLI::App* command = app.add_subcommand("release", "Send a result of watch to its peers");
   command->footer(
       "\nExample:\n  isoshift release 3fa94c1e02b7 --by \"J. Doe\"\n\n"
-      "Records who released what, then sends spatial_registration.dcm, where there is one, and report.dcm.");
+      "Checks that the session is what was registered, records who released what, as which user of the system, then\n"
+      "sends spatial_registration.dcm, where there is one, and report.dcm.");
   command->add_option("session", options->session, "As index.html names it")->required()->type_name("SESSION");
   command->add_option("--by", options->by, "Who has looked at it and releases it")->required()->type_name("NAME");
   command->add_option("--watch", options->watch, "The watch file")->type_name("FILE")->capture_default_str();

@@ -8,6 +8,7 @@
 
 #include <optional>
 
+#include "base/sha256.h"
 #include "io/dicom/dicom_dataset.h"
 #include "io/network/peer_tls.h"
 
@@ -97,12 +98,19 @@ bool is_listed(const DicomItem& object, const DicomPeer& peer) {
 
 }  // namespace
 
-std::string send_object(const std::filesystem::path& file, const DicomPeer& peer, bool may_be_there) {
+std::string send_object(const std::filesystem::path& file, const std::string& sha256, const DicomPeer& peer,
+                        bool may_be_there) {
   const DicomFile object = DicomFile::read(file, DicomFile::Extent::kHeader);
   if (may_be_there && is_listed(object.dataset(), peer)) return "was there, from an earlier attempt";
   Association association(peer, object.dataset().required_text(DCM_SOPClassUID).c_str());
+  // What is sent is what was read before the hash was taken: a peer may have taken its time until here.
+  DcmFileFormat whole;
+  if (const OFCondition loaded = whole.loadFile(file.c_str()); loaded.bad())
+    throw Error(fmt::format("{}: cannot be read: {}", file.string(), loaded.text()));
+  if (const std::string found = sha256_of_file(file); found != sha256)
+    throw Error(fmt::format("{}: was changed: its SHA-256 is {}, expected {}", file.string(), found, sha256));
   Uint16 status = 0xFFFF;
-  association.check(association.scu().sendSTORERequest(association.context(), file.c_str(), nullptr, status),
+  association.check(association.scu().sendSTORERequest(association.context(), "", whole.getDataset(), status),
                     "the object was not sent whole");
   if (status == STATUS_Success) return "";
   if ((status & kWarningMask) == kWarning) return fmt::format("stored with warning 0x{:04X}", status);

@@ -57,7 +57,7 @@ void Deliverer::deliver(const Delivery& delivery, Observer& observer) {
     if (peer == watch_.peers.end()) throw PeerError(fmt::format("peer {}: the watch file does not name it", peer_name));
     const bool may_be_there = tree_.is_in_doubt(delivery);
     tree_.prepare_to_send(delivery);
-    const std::string answer = send_object(file, *peer, may_be_there);
+    const std::string answer = send_object(file, object.sha256, *peer, may_be_there);
     tree_.mark_sent(delivery, answer);
     observer.say(fmt::format("session {}: {} sent to {}{}", session, object.file, peer_name,
                              answer.empty() ? "" : ": " + answer));

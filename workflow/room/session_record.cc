@@ -19,8 +19,9 @@ namespace fs = std::filesystem;
 
 // A link could lead to another file tomorrow, and a folder would hide files from the record.
 std::map<std::string, std::string> hashes_in(const fs::path& folder) {
-  if (fs::symlink_status(folder).type() != fs::file_type::directory)
-    throw Error(fmt::format("{}: is no folder of its own", folder.string()));
+  const fs::file_status status = fs::symlink_status(folder);
+  if (!fs::exists(status)) throw Error(fmt::format("{}: is missing", folder.string()));
+  if (!fs::is_directory(status)) throw Error(fmt::format("{}: is not a plain folder", folder.string()));
   std::map<std::string, std::string> hashes;
   for (const auto& entry : fs::directory_iterator(folder)) {
     if (entry.symlink_status().type() != fs::file_type::regular)

@@ -12,6 +12,7 @@
 #include <optional>
 
 #include "base/child_process.h"
+#include "base/sha256.h"
 #include "tests/support/certificates.h"
 #include "tests/support/small_study.h"
 
@@ -23,6 +24,7 @@ using namespace std::chrono_literals;
 using testing::AllOf;
 using testing::HasSubstr;
 using testing::Not;
+using testing::StartsWith;
 
 class DicomSendTest : public testing::Test {
  protected:
@@ -58,13 +60,23 @@ class DicomSendTest : public testing::Test {
                          60s);
     wait_for_listener(port);
     try {
-      send_object(study_.plan(), peer_at(host, port, pinned), false);
+      send_object(study_.plan(), sha256_, peer_at(host, port, pinned), false);
     } catch (const PeerError& error) {
       return error.what();
+    } catch (const Error& error) {
+      return std::string("the object: ") + error.what();
     }
     return "";
   }
-  void expect_sent() const { EXPECT_FALSE(fs::is_empty(folder_ / "received")) << log(); }
+  // The object, not its file: the receiver writes a header of its own.
+  void expect_sent() const {
+    ASSERT_FALSE(fs::is_empty(folder_ / "received")) << log();
+    const auto elements = [](const fs::path& file) {
+      return run_shell(fmt::format("dcmdump -q +L {} | grep '^ *(' | grep -v '^(0002,'", file.string())).out;
+    };
+    EXPECT_THAT(elements(study_.plan()), HasSubstr("SOPInstanceUID"));
+    EXPECT_EQ(elements(fs::directory_iterator(folder_ / "received")->path()), elements(study_.plan()));
+  }
   void expect_nothing_sent() const {
     EXPECT_TRUE(fs::is_empty(folder_ / "received"));
     EXPECT_THAT(log(), Not(HasSubstr("Association Received")));
@@ -77,6 +89,7 @@ class DicomSendTest : public testing::Test {
   TemporaryFolder folder_;
   std::optional<Certificates> certificates_;
   SmallStudy study_;
+  std::string sha256_ = sha256_of_file(study_.plan());
   std::string key_ = "client.key";
 };
 
@@ -104,7 +117,7 @@ TEST_F(DicomSendTest, ACertificateOfAnotherHostIsRefusedBeforeAnythingIsSent) {
   certificates_->make("server", "other", "DNS:other.example,IP:10.0.0.5");
   for (const char* host : {"127.0.0.1", "localhost"})
     EXPECT_THAT(error_of_sending("server", host),
-                AllOf(HasSubstr(fmt::format("peer record: {}:", host)), HasSubstr("CN = other, DNS:other.example"),
+                AllOf(StartsWith(fmt::format("peer record: {}:", host)), HasSubstr("CN = other, DNS:other.example"),
                       HasSubstr("10.0.0.5"), HasSubstr(fmt::format("expected a certificate of {}", host)),
                       HasSubstr(certificates_->fingerprint("server"))));
   expect_nothing_sent();
@@ -130,15 +143,24 @@ TEST_F(DicomSendTest, ACertificateThatTheAuthorityDidNotSignIsRefusedEvenIfItIsP
   certificates_->make_authority("stranger");
   certificates_->make("server", "record", "IP:127.0.0.1", "stranger");
   EXPECT_THAT(error_of_sending("server", "127.0.0.1", certificates_->fingerprint("server")),
-              AllOf(HasSubstr("expected one that"), HasSubstr("ca.pem vouches for")));
+              AllOf(StartsWith("peer record: "), HasSubstr("expected one that"), HasSubstr("ca.pem vouches for")));
   EXPECT_THAT(error_of_sending("server", "127.0.0.1"), HasSubstr("ca.pem vouches for"));
   expect_nothing_sent();
+}
+
+TEST_F(DicomSendTest, AFileThatWasExchangedWhileThePeerWasCalledIsNotSent) {
+  certificates_->make("server", "record", "IP:127.0.0.1");
+  sha256_ = std::string(64, '0');
+  EXPECT_THAT(error_of_sending("server", "127.0.0.1"),
+              AllOf(StartsWith("the object: "), HasSubstr("RTPLAN.dcm: was changed: its SHA-256 is ")));
+  EXPECT_TRUE(fs::is_empty(folder_ / "received"));
 }
 
 TEST_F(DicomSendTest, FilesThatCannotBeUsedAreNamed) {
   certificates_->make("server", "record", "IP:127.0.0.1");
   key_ = "ca.key";
-  EXPECT_THAT(error_of_sending("server", "127.0.0.1"), AllOf(HasSubstr("ca.key: expected the key of the certificate")));
+  EXPECT_THAT(error_of_sending("server", "127.0.0.1"),
+              AllOf(StartsWith("peer record: "), HasSubstr("ca.key: expected the key of the certificate")));
   certificates_->openssl("rsa -aes128 -passout pass:secret -in client.key -out locked.key");
   key_ = "locked.key";
   EXPECT_THAT(error_of_sending("server", "127.0.0.1"), HasSubstr("without a passphrase"));
@@ -158,7 +180,8 @@ TEST_F(DicomSendTest, ACipherThatBcp195DoesNotAllowIsRefused) {
                               folder_.path().string(), port, cipher)},
                  60s);
     wait_for_listener(port);
-    EXPECT_THROW(send_object(study_.plan(), peer_at("127.0.0.1", port, ""), false), PeerError);  // it is no DICOM peer
+    EXPECT_THROW(send_object(study_.plan(), sha256_, peer_at("127.0.0.1", port, ""), false),
+                 PeerError);  // it is no DICOM peer
     const auto end = server.end(30s);
     ASSERT_TRUE(end);
     EXPECT_EQ(end->output.find("   1 server accepts that finished") != std::string::npos, is_allowed) << end->output;

@@ -196,7 +196,7 @@ TEST_F(ResultsTreeTest, AFolderThatIsNotWhatWasRegisteredIsNotReleased) {
           fs::create_symlink(aside, folder / "report.dcm");
         },
         move_back},
-       {"is no folder of its own",
+       {"is not a plain folder",
         [&] {
           fs::rename(folder, aside);
           fs::create_directory_symlink(aside, folder);
@@ -300,13 +300,13 @@ TEST_F(ResultsTreeTest, NothingIsReleasedOrRegisteredWithoutItsLineInTheLog) {
 }
 
 TEST_F(ResultsTreeTest, AReleaseWhoseLineDoesNotFitOnTheDiskLeavesNothing) {
-  std::ofstream(tree_.path() / "audit.jsonl", std::ios::app) << std::string(100'000, '\n');
+  std::ofstream(tree_.path() / "audit.jsonl", std::ios::app) << std::string(10'000, ' ') << '\n';
   const std::string before = audit();
   {
     const FileSizeLimit full(before.size() + 10);
     EXPECT_THAT(error_of_release(a_), AllOf(HasSubstr("is not released"), HasSubstr("audit.jsonl: cannot be written")));
   }
-  EXPECT_EQ(audit(), before);  // the 10 bytes that fitted are taken back
+  EXPECT_TRUE(audit() == before);  // the 10 bytes that fitted are taken back
   EXPECT_TRUE(fs::is_empty(tree_.path() / "released"));
   EXPECT_EQ(error_of_release(a_), "");
 }

@@ -104,7 +104,7 @@ def exchanged_edited_and_added(room, found):
     victim.rename(room.work / "aside")
     other.rename(victim)
     room.expect_refused(victim.name, "is not what was registered", "two folders that changed their names")
-    victim.symlink_to(room.work / "aside") if not victim.exists() else victim.rename(other)
+    victim.rename(other)
     (room.work / "aside").rename(victim)
 
 
@@ -131,14 +131,18 @@ def forged(room, session):
         release["record"] = sha256(record)
     before = len(room.at_peer())
     room.release_file(session).write_text(json.dumps(release))
+    copy = room.session("0123456789ab")
+    shutil.copytree(folder, copy)
     room.start_watch()
     wait_for(lambda: f"{session}.json" in room.log.read_text() and f"{session}.json" in (room.results / "index.html").read_text(), 20, "the forged release to be told")
+    wait_for(lambda: f"session {copy.name}: there is no record of its registration" in (room.results / "index.html").read_text(), 20, "the copied folder to be told")
     time.sleep(3)
     expect(room.log.read_text().count(f"{session}.json") == 1, "the forged release is told more than once")
     room.end_watch()
     expect(len(room.at_peer()) == before, "a forged release was sent")
     expect(all(line.get("session") != session for line in room.audit() if line["event"] in ("released", "sent")), "a forged release entered the audit log")
     room.release_file(session).unlink()
+    shutil.rmtree(copy)
 
 
 def without_audit_log(room, session):
@@ -197,6 +201,18 @@ def main(program, work):
         wait_for(lambda: "view1.png" in room.log.read_text(), 20, "the exchanged picture to be told")
         time.sleep(3)
         expect(len(room.at_peer()) == before, "an exchanged result was sent")
+        room.end_watch(signal.SIGTERM)
+
+        # The way out: the X-rays are registered again, and somebody releases that.
+        room.session(session).rename(work / "exchanged")
+        room.start_watch()
+        wait_for(lambda: "PHANTOM4" in room.by_patient(), 60, "the session to be registered again")
+        wait_for(lambda: "releases an earlier registration" in (room.results / "index.html").read_text(), 20, "the index to tell of the earlier release")
+        expect(len(room.at_peer()) == before, "a result was sent with the release of an earlier one")
+        room.release_file(session).unlink()
+        released = room.release(session)
+        expect(released.returncode == 0, f"release: {released.stdout}{released.stderr}")
+        wait_for(lambda: len(room.at_peer()) == before + len(list(room.session(session).glob("*.dcm"))), 30, "the new result at the peer")
         room.end_watch(signal.SIGTERM)
         audit = (room.results / "audit.jsonl").read_text()
         expect("PHANTOM" not in audit and "Phantom" not in audit and "2.25." not in audit, "the audit log names a patient or a UID")
