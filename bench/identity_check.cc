@@ -130,7 +130,7 @@ int check(int patient_count, std::optional<int> only) {
     }
     const Eigen::Isometry3d found = result.actual_room_from_patient * planned.inverse();
     double least = 1.0, disagreeing = 0.0, best = 0.0;  // of the worst view
-    for (const ViewReport& view : result.views) {
+    for (const ViewMatch& view : result.views) {
       least = std::min(least, view.similarity_final);
       disagreeing = std::max(disagreeing, static_cast<double>(view.consistency.disagreeing()) /
                                               std::max(1, view.consistency.with_signal()));

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <numeric>
 
 #include "base/error.h"
 #include "registration/objective.h"
@@ -62,16 +61,6 @@ void RegistrationOptions::check() const {
   if (stages.empty()) throw UsageError("stages is empty, expected at least one");
 }
 
-void RegistrationResult::demote(Verdict to, std::string reason) {
-  verdict = std::max(verdict, to);
-  reasons.push_back(std::move(reason));
-}
-
-int RegistrationResult::evaluations() const {
-  return std::accumulate(stages.begin(), stages.end(), 0,
-                         [](int sum, const StageReport& stage) { return sum + stage.evaluations; });
-}
-
 RegistrationResult register_views(const RendererPyramid& renderers, std::span<const XrayImage> xrays,
                                   const Eigen::Isometry3d& start_room_from_patient, const RegistrationOptions& options,
                                   const SearchProgress& progress) {
@@ -93,12 +82,13 @@ RegistrationResult register_views(const RendererPyramid& renderers, std::span<co
                                      .bound_rad = options.bound_rad,
                                      .seed = options.seed};
   const SearchResult found = search(renderers, fixed, start_room_from_patient, search_options, progress);
-  RegistrationResult result{
-      .renderer = renderers.finest().kind(),
-      .actual_room_from_patient = setup_error_from_parameters(found.parameters) * start_room_from_patient,
-      .stages = found.stages,
-      .seconds_rendering = found.seconds_rendering,
-      .seconds_similarity = found.seconds_similarity};
+  RegistrationResult result;
+  result.renderer = to_string(renderers.finest().kind());
+  result.device = renderers.finest().device();
+  result.actual_room_from_patient = setup_error_from_parameters(found.parameters) * start_room_from_patient;
+  result.stages = found.stages;
+  result.seconds_rendering = found.seconds_rendering;
+  result.seconds_similarity = found.seconds_similarity;
   const Stage& last = options.stages.back();
   report_views(renderers, fixed, start_room_from_patient, last, result);
   Objective gradient_correlation(renderers.with_voxels_up_to(last.voxel_mm),

@@ -20,7 +20,7 @@
 #include "registration/quality/cross_checks.h"
 #include "registration/quality/uncertainty.h"
 #include "registration/search.h"
-#include "setup/verdict.h"
+#include "setup/registration.h"
 
 namespace isoshift {
 
@@ -41,31 +41,8 @@ struct RegistrationOptions {
   void check() const;
 };
 
-// Gradient correlation of one view over all that is compared, in pixels twice as large as those of the last stage.
-struct ViewReport {
-  std::string label;  // of the X-ray
-  double similarity_start = -1.0;
-  double similarity_final = -1.0;
-  bool has_all_left_out = true;         // what was excluded, with the patient at the pose found
-  ViewConsistency consistency;          // of its parts with the pose found
-  std::optional<LeftOutView> left_out;  // with three or more views
-};
-
-struct RegistrationResult {
-  Verdict verdict = Verdict::kRejected;
-  std::vector<std::string> reasons = {"not run"};  // why the verdict is not `accepted`
-  RendererKind renderer = RendererKind::kCpu;      // what rendered the DRRs
-  Eigen::Isometry3d actual_room_from_patient = Eigen::Isometry3d::Identity();
-  std::vector<Eigen::Vector3d> unobservable_room;  // unit directions along which the views cannot tell
-  std::optional<Uncertainty> uncertainty;          // nothing: the images do not determine the pose
-  std::vector<ViewReport> views;
-  std::vector<StageReport> stages;
-  std::vector<Alternative> alternatives;                                    // empty: the preset leaves them out
-  double seconds = 0.0, seconds_rendering = 0.0, seconds_similarity = 0.0;  // in all, and of that in the search
-
-  // Makes the verdict `to`, if that is worse than what it was, and adds the reason.
-  void demote(Verdict to, std::string reason);
-  int evaluations() const;
+struct RegistrationResult : Registration {
+  std::vector<ViewMatch> views;
 };
 
 // Searches from `start_room_from_patient`, the planned pose, and judges what it finds. Throws Error for a blank X-ray,

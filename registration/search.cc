@@ -92,6 +92,25 @@ std::vector<Parameters> best_of(std::vector<Parameters> poses, std::size_t count
   return best;
 }
 
+StageReport report_of(const Stage& stage) {
+  return {.name = stage.name,
+          .similarity = std::string(to_string(stage.similarity)),
+          .optimizer = std::string(to_string(stage.optimizer)),
+          .parameters = {{"pixel_mm", stage.pixel_mm},
+                         {"voxel_mm", stage.voxel_mm},
+                         {"pixel_fraction", stage.pixel_fraction},
+                         {"min_pixels", stage.min_pixels},
+                         {"candidates", stage.candidates},
+                         {"starts", stage.starts},
+                         {"keep", stage.keep},
+                         {"reach_mm", stage.reach_mm},
+                         {"reach_rad", stage.reach_rad},
+                         {"initial_step_mm", stage.initial_step_mm},
+                         {"initial_step_rad", stage.initial_step_rad},
+                         {"relative_tolerance", stage.relative_tolerance},
+                         {"max_evaluations", stage.max_evaluations}}};
+}
+
 // `found` is sorted, best first.
 void report_spread(const std::vector<OptimizerResult>& found, StageReport& report) {
   if (found.size() < 2) return;
@@ -132,7 +151,7 @@ SearchResult search(const RendererPyramid& renderers, const FixedViews& views,
                          .pixel_fraction = stage.pixel_fraction,
                          .min_pixels = static_cast<std::size_t>(stage.min_pixels),
                          .seed = options.seed});
-    StageReport report{.name = stage.name, .similarity = std::string(to_string(stage.similarity))};
+    StageReport report = report_of(stage);
     const BatchObjective similarity_at = [&](std::span<const Parameters> points) {
       std::vector<Eigen::Isometry3d> poses;
       for (const Parameters& point : points)

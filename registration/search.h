@@ -14,6 +14,7 @@
 #include "registration/preprocess/preprocess.h"
 #include "registration/region.h"
 #include "registration/similarity/similarity.h"
+#include "setup/registration.h"
 
 namespace isoshift {
 
@@ -47,20 +48,6 @@ struct SearchOptions {
   double bound_rad = 0.35;  // the same for rotations
   std::uint64_t seed = 1;
   std::vector<double> parameters;  // where to begin; empty: at no setup error
-};
-
-struct StageReport {
-  std::string name;
-  std::string similarity;
-  int evaluations = 0;
-  double seconds = 0.0;
-  double value = 0.0;  // the similarity reached
-  std::string termination = "not run";
-  bool reached_limit = false;  // the evaluations ran out before the search converged
-  // Between the poses that the starts ended at, where there were several: the largest distance of those that leave not
-  // clearly more unexplained than the best one from that.
-  std::optional<double> spread_mm, spread_rad;
-  std::vector<double> best;  // the similarity reached after each evaluation
 };
 
 // Progress of a search: the share done, from 0 to 1, an estimate.

@@ -18,6 +18,7 @@
 #include "drr/raycast/rasterized.h"
 #include "geometry/rotation.h"
 #include "io/report/drawings.h"
+#include "io/report/view_picture.h"
 
 namespace isoshift {
 namespace {

@@ -15,7 +15,7 @@
 #include "io/report/formats.h"
 #include "io/report/result_folder.h"
 #include "setup/couch_shift.h"
-#include "workflow/register/setup_report_of.h"
+#include "workflow/register/setup_result_of.h"
 #include "workflow/register/truth.h"
 
 namespace isoshift {
@@ -37,7 +37,7 @@ int run_register(RegisterOptions options, const std::filesystem::path& truth_fil
   if (!truth_file.empty()) truth = read_setup_error(truth_file);
   SharedWork none;
   ConsoleObserver observer(console);
-  const SetupReport report = register_study(options, none, observer);
+  const SetupResult report = register_study(options, none, observer);
   print_warnings(report.warnings, console);
   console.out << (as_json ? json_report(report) : text_report(report_page(report)));
   if (!as_json) {

@@ -9,7 +9,7 @@
 #include "cli/commands/commands.h"
 #include "io/report/formats.h"
 #include "io/report/result_folder.h"
-#include "workflow/register/setup_report_of.h"
+#include "workflow/register/setup_result_of.h"
 
 namespace isoshift {
 namespace {
@@ -21,7 +21,7 @@ struct ReportOptions {
 };
 
 void run_report(const ReportOptions& options, Console& console) {
-  SetupReport report = read_result(options.result);
+  SetupResult report = read_result(options.result);
   report.site = chosen_site(named_site(options.site), options.anatomy, report.site);
   OutputFolder output(options.output.empty() ? options.result : options.output, options.overwrite);
   write_result(report, output.path());

@@ -27,7 +27,7 @@
 #include "io/config/watch_file.h"
 #include "io/report/result_folder.h"
 #include "io/study/session_files.h"
-#include "workflow/register/setup_report_of.h"
+#include "workflow/register/setup_result_of.h"
 #include "workflow/room/deliver.h"
 #include "workflow/room/inbox.h"
 #include "workflow/room/results_tree.h"
@@ -179,9 +179,9 @@ class Watch {
   }
 
   Verdict take_result(const std::string& name) {
-    const SetupReport report = read_report(tree_.session(name));
+    const SetupResult report = read_report(tree_.session(name));
     if (report.views.empty()) throw Error(fmt::format("{}: names no views", tree_.session(name).string()));
-    for (const SetupReport::View& view : report.views) registered_.insert(view.sop_instance_uid);
+    for (const SetupResult::View& view : report.views) registered_.insert(view.sop_instance_uid);
     index_.add(name, report, obstacle_to_release(name));
     // What was made under another site file waits for a person.
     if (watch_.site.automatic_release && report.verdict == Verdict::kAccepted && report.site &&

@@ -35,11 +35,11 @@ ActionLevel level_from(JsonSection section) {
   return level;
 }
 
-SiteFile::Scale scale_from(JsonSection section) {
+ValidatedScale scale_from(JsonSection section) {
   constexpr const char* kExpected = "\"IEC 61217\", \"Varian IEC\" or \"Varian Standard\"";
   const auto scale = couch_scale_from(section.required<std::string>("name", kExpected));
   if (!scale) section.refuse("name", kExpected);
-  SiteFile::Scale result{.scale = *scale,
+  ValidatedScale result{.scale = *scale,
                          .validated_by = required_text(section, "validated_by", "who compared it with the couch"),
                          .validated_on = required_day(section, "validated_on")};
   section.end();
@@ -58,11 +58,11 @@ void read_couch(JsonSection section, SiteFile& site) {
   section.end();
 }
 
-std::optional<SiteFile::Release> release_from(JsonSection section) {
+std::optional<AutomaticRelease> release_from(JsonSection section) {
   constexpr const char* kExpected = "\"manual\" or \"automatic\"";
   const auto rule = section.required<std::string>("rule", kExpected);
   if (rule != "manual" && rule != "automatic") section.refuse("rule", kExpected);
-  std::optional<SiteFile::Release> release;
+  std::optional<AutomaticRelease> release;
   if (rule == "automatic")
     release = {.by = required_text(section, "by", "who allowed it"), .on = required_day(section, "on")};
   section.end();

@@ -7,32 +7,14 @@
 #include <string>
 #include <string_view>
 
-#include "setup/couch_scale.h"
-#include "setup/couch_shift.h"
+#include "setup/site_rules.h"
 
 namespace isoshift {
 
 constexpr double kMaxTimeSpanS = 600.0;        // between the views of one session
 constexpr double kDefaultUntoldSpanS = 120.0;  // between those without table read-outs, where no site file says other
 
-enum class LengthUnit { kMm, kCm };
-
-// From which a person must act. At least one is set.
-struct ActionLevel {
-  std::optional<double> translation_mm;  // along any axis
-  std::optional<double> vector_mm;       // length of the translation
-  std::optional<double> rotation_deg;    // about any axis
-};
-
 struct SiteFile {
-  struct Scale {
-    CouchScale scale = CouchScale::kIec61217;
-    std::string validated_by, validated_on;  // the day as YYYY-MM-DD
-  };
-  struct Release {
-    std::string by, on;
-  };
-
   // When a session of X-rays is complete.
   struct Sessions {
     int views = 2;                            // so many X-rays are there,
@@ -45,10 +27,10 @@ struct SiteFile {
   std::string sha256;                                             // of the file, hexadecimal
   std::map<std::string, ActionLevel, std::less<>> action_levels;  // by anatomy; "default" where none is named
   CouchDof couch_dof = CouchDof::kSix;
-  std::optional<Scale> couch_scale;  // shown beside IEC 61217
+  std::optional<ValidatedScale> couch_scale;  // shown beside IEC 61217
   LengthUnit length_unit = LengthUnit::kMm;
   std::optional<Sessions> sessions;
-  std::optional<Release> automatic_release;  // who allowed it, and when; unset: a person releases every result
+  std::optional<AutomaticRelease> automatic_release;  // who allowed it, and when; unset: a person releases every result
 };
 
 // Throws Error naming the file, the place in it and what is expected there.

@@ -1,27 +1,10 @@
 #pragma once
 // Whom and which study a DICOM object belongs to: PS3.3 C.7.1.1 and C.7.2.1.
 
-#include <string>
-
 #include "io/dicom/dicom_dataset.h"
+#include "setup/identity.h"
 
 namespace isoshift {
-
-// Text as in the file, UTF-8 where the character set could be converted (then character_set says ISO_IR 192).
-struct Identity {
-  std::string character_set;
-  std::string patient_id;
-  std::string patient_id_issuer;
-  std::string patient_name;
-  std::string patient_birth_date;
-  std::string patient_sex;
-  std::string study_instance_uid;
-  std::string study_date;
-  std::string study_time;
-  std::string study_id;
-  std::string accession_number;
-  std::string referring_physician;
-};
 
 Identity read_identity(const DicomItem& dataset);
 

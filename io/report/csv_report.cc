@@ -20,8 +20,8 @@ std::string joined(const std::vector<std::string>& texts) { return fmt::format("
 
 }  // namespace
 
-std::string csv_report(const SetupReport& report) {
-  SetupReport in_mm = report;
+std::string csv_report(const SetupResult& report) {
+  SetupResult in_mm = report;
   if (in_mm.site) in_mm.site->length_unit = LengthUnit::kMm;
   const ReportPage page = report_page(in_mm);
 
@@ -36,7 +36,7 @@ std::string csv_report(const SetupReport& report) {
   add("plan", csv_cell(printable(report.plan_label)));
   add("plan_uid", csv_cell(report.plan_uid));
   std::vector<std::string> views;
-  for (const SetupReport::View& view : report.views) views.push_back(printable(view.label));
+  for (const SetupResult::View& view : report.views) views.push_back(printable(view.label));
   add("views", csv_cell(joined(views)));
   add("verdict", std::string(to_string(page.verdict)));
   add("reasons", csv_cell(joined(page.reasons)));

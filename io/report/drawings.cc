@@ -1,4 +1,5 @@
 #include "io/report/drawings.h"
+#include "io/report/view_picture.h"
 
 #include <fmt/format.h>
 
@@ -59,10 +60,10 @@ std::string caption_of(ViewTile tile) {
   return "";
 }
 
-MismatchMarks mismatch_marks(const SetupReport::View& view) {
+MismatchMarks mismatch_marks(const SetupResult::View& view) {
   MismatchMarks marks;
   const double shrink = view.picture.xray.columns / static_cast<double>(view.columns);
-  for (const SetupReport::Part& part : view.parts) {
+  for (const ViewPart& part : view.match.consistency.parts) {
     if (!part.disagrees) continue;
     const double half = 0.25 * shrink * part.width_px;  // parts overlap by half
     const Vector2d center = shrink * part.center_px;
@@ -73,7 +74,7 @@ MismatchMarks mismatch_marks(const SetupReport::View& view) {
   return marks;
 }
 
-double draw_view_tile(Canvas& canvas, double x, double y, double width, const SetupReport::View& view, ViewTile tile) {
+double draw_view_tile(Canvas& canvas, double x, double y, double width, const SetupResult::View& view, ViewTile tile) {
   const ViewPicture& picture = view.picture;
   const double zoom = width / picture.xray.columns, height = zoom * picture.xray.rows;
   const auto place = [&](const Vector2d& pixel) {
@@ -110,7 +111,7 @@ double draw_view_tile(Canvas& canvas, double x, double y, double width, const Se
   return height;
 }
 
-double draw_view(Canvas& canvas, double x, double y, double width, const SetupReport::View& view) {
+double draw_view(Canvas& canvas, double x, double y, double width, const SetupResult::View& view) {
   const double gap = 0.006 * width, tile = (width - 4.0 * gap) / 5.0;
   const TextStyle style{.size = 0.0145 * width, .width = tile, .one_line = true};
   const double captions = 1.45 * style.size;
@@ -139,7 +140,7 @@ std::string captioned_png(const std::vector<CaptionedPicture>& pictures, int per
   return canvas.finish();
 }
 
-void draw_couch(Canvas& canvas, double x, double y, double width, double height, const SetupReport& report,
+void draw_couch(Canvas& canvas, double x, double y, double width, double height, const SetupResult& report,
                 const ReportPage& page) {
   // Room (right, toward the gantry, up) in units of the drawing; depth goes up and to the right.
   const double unit = std::min(width / 2.9, height / 2.35);
@@ -221,10 +222,10 @@ void draw_couch(Canvas& canvas, double x, double y, double width, double height,
 }
 
 void draw_convergence(Canvas& canvas, double x, double y, double width, double height,
-                      const std::vector<SetupReport::Stage>& stages) {
+                      const std::vector<StageReport>& stages) {
   std::size_t evaluations = 0;
   double low = 1.0, high = 0.0;
-  for (const SetupReport::Stage& stage : stages) {
+  for (const StageReport& stage : stages) {
     evaluations += stage.best.size();
     for (const double value : stage.best) {
       low = std::min(low, value);
@@ -247,7 +248,7 @@ void draw_convergence(Canvas& canvas, double x, double y, double width, double h
               fmt::format("{} evaluations; highest similarity so far in each stage", evaluations),
               {.size = 7.0, .color = color::kGray, .align = TextStyle::Align::kCenter});
   std::size_t done = 0;
-  for (const SetupReport::Stage& stage : stages) {
+  for (const StageReport& stage : stages) {
     if (stage.best.empty()) continue;
     const Vector2d begin = place(static_cast<double>(done), high);
     canvas.line({begin.x(), y + kTop}, {begin.x(), y + height - kBottom},

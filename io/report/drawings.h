@@ -20,15 +20,15 @@ std::string caption_of(ViewTile tile);
 struct MismatchMarks {
   std::vector<Polygon> squares, ways;
 };
-MismatchMarks mismatch_marks(const SetupReport::View& view);
+MismatchMarks mismatch_marks(const SetupResult::View& view);
 
 // Draws a tile of that width with its upper left corner at (x, y): the picture with isocenter, field and structures,
 // scale bar and the patient's directions; in the overlay as found also squares where parts match elsewhere. Returns its
 // height.
-double draw_view_tile(Canvas& canvas, double x, double y, double width, const SetupReport::View& view, ViewTile tile);
+double draw_view_tile(Canvas& canvas, double x, double y, double width, const SetupResult::View& view, ViewTile tile);
 
 // All tiles of a view side by side, each below its caption. Returns their height.
-double draw_view(Canvas& canvas, double x, double y, double width, const SetupReport::View& view);
+double draw_view(Canvas& canvas, double x, double y, double width, const SetupResult::View& view);
 
 // Pictures in rows, each below its caption, as a PNG.
 struct CaptionedPicture {
@@ -39,11 +39,11 @@ std::string captioned_png(const std::vector<CaptionedPicture>& pictures, int per
 
 // Gantry, couch and patient seen by a person who faces the gantry, the axes of IEC 61217, and as arrows the
 // translations to be made.
-void draw_couch(Canvas& canvas, double x, double y, double width, double height, const SetupReport& report,
+void draw_couch(Canvas& canvas, double x, double y, double width, double height, const SetupResult& report,
                 const ReportPage& page);
 
 // The similarity reached against the evaluations made, stage by stage.
 void draw_convergence(Canvas& canvas, double x, double y, double width, double height,
-                      const std::vector<SetupReport::Stage>& stages);
+                      const std::vector<StageReport>& stages);
 
 }  // namespace isoshift

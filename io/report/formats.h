@@ -8,22 +8,22 @@
 namespace isoshift {
 
 // result.json, full precision. docs/result.schema.json describes it.
-std::string json_report(const SetupReport& report);
+std::string json_report(const SetupResult& report);
 
 // The report that such a text was made from, without pictures. Throws Error naming `where` for anything else.
-SetupReport report_from_json(const std::string& json, const std::string& where);
+SetupResult report_from_json(const std::string& json, const std::string& where);
 
 // report.txt, for a terminal.
 std::string text_report(const ReportPage& page);
 
 // report.csv: names, then one row (RFC 4180). Texts that a spreadsheet would take for a formula begin with '. Lengths
 // are in mm, whatever the site's unit.
-std::string csv_report(const SetupReport& report);
+std::string csv_report(const SetupResult& report);
 
 // report.pdf: one sheet of A4 to sign, then the details.
-std::string pdf_report(const SetupReport& report, const ReportPage& page);
+std::string pdf_report(const SetupResult& report, const ReportPage& page);
 
 // report.html: one page that needs no other file and no network.
-std::string html_report(const SetupReport& report, const ReportPage& page);
+std::string html_report(const SetupResult& report, const ReportPage& page);
 
 }  // namespace isoshift

@@ -81,7 +81,7 @@ std::string png_image(const Image<std::uint8_t>& gray, std::string_view name, st
                      data_uri("image/png", png_of(gray)));
 }
 
-std::string view_figure(const SetupReport::View& view, std::size_t number) {
+std::string view_figure(const SetupResult::View& view, std::size_t number) {
   const auto radio = [&](const char* group, const char* value, const char* words, bool checked) {
     return fmt::format("<label><input type=\"radio\" name=\"{}{}\" value=\"{}\"{}> {}</label>", group, number, value,
                        checked ? " checked" : "", words);
@@ -104,7 +104,7 @@ std::string view_figure(const SetupReport::View& view, std::size_t number) {
 
 using Json = nlohmann::ordered_json;
 
-Json view_data(const SetupReport::View& view, std::size_t number) {
+Json view_data(const SetupResult::View& view, std::size_t number) {
   Json structures = Json::array();
   for (const ViewPicture::Outline& outline : view.picture.structures)
     structures.push_back({{"name", printable(outline.name)},
@@ -130,7 +130,7 @@ std::string in_script(const Json& json) {
   return result;
 }
 
-std::string details(const SetupReport& report, const ReportPage& page) {
+std::string details(const SetupResult& report, const ReportPage& page) {
   std::string html;
   for (const ReportPage::Section& section : page.details) {
     html +=
@@ -146,7 +146,7 @@ std::string details(const SetupReport& report, const ReportPage& page) {
 
 }  // namespace
 
-std::string html_report(const SetupReport& report, const ReportPage& page) {
+std::string html_report(const SetupResult& report, const ReportPage& page) {
   std::string views, notes, conventions;
   Json data = Json::array();
   for (std::size_t n = 0; n < report.views.size(); ++n) {

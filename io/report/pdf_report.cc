@@ -4,6 +4,7 @@
 
 #include "io/report/drawings.h"
 #include "io/report/formats.h"
+#include "setup/shown_shift.h"
 
 namespace isoshift {
 namespace {
@@ -25,7 +26,7 @@ Rgb color_of(Verdict verdict) {
 
 class PdfReport {
  public:
-  PdfReport(const SetupReport& report, const ReportPage& page) : report_(report), page_(page) {
+  PdfReport(const SetupResult& report, const ReportPage& page) : report_(report), page_(page) {
     canvas_.describe(page.title, page.program);
   }
 
@@ -219,7 +220,7 @@ class PdfReport {
     y_ = std::max(y_, left_end) + kGap;
   }
 
-  double view_height(const SetupReport::View& view, double width) const {
+  double view_height(const SetupResult::View& view, double width) const {
     return 0.022 * width + 0.2 * width * view.picture.xray.rows / std::max(1, view.picture.xray.columns) + 4.0;
   }
 
@@ -345,7 +346,7 @@ class PdfReport {
     list("Left aside", page_.left_aside);
   }
 
-  const SetupReport& report_;
+  const SetupResult& report_;
   const ReportPage& page_;
   Canvas canvas_{Canvas::Kind::kPdf, kPageWidth, kPageHeight};
   double y_ = kMargin - 6.0;
@@ -354,6 +355,6 @@ class PdfReport {
 
 }  // namespace
 
-std::string pdf_report(const SetupReport& report, const ReportPage& page) { return PdfReport(report, page).write(); }
+std::string pdf_report(const SetupResult& report, const ReportPage& page) { return PdfReport(report, page).write(); }
 
 }  // namespace isoshift

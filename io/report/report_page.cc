@@ -9,6 +9,7 @@
 #include "geometry/rotation.h"
 #include "io/report/canvas.h"
 #include "io/report/rounding.h"
+#include "setup/shown_shift.h"
 
 namespace isoshift {
 namespace {
@@ -99,14 +100,14 @@ std::string joined(const std::vector<std::string>& parts, const char* separator 
   return text;
 }
 
-std::string described_view(const SetupReport::View& view) {
+std::string described_view(const SetupResult::View& view) {
   return joined({printable(view.label),
                  view.gantry_deg ? fmt::format("gantry {:.1f} deg", *view.gantry_deg) : "by its matrix",
                  view.is_megavoltage ? "MV" : "kV", printable(view.acquired),
                  view.origin.empty() ? "" : "angles " + printable(view.origin)});
 }
 
-std::vector<ReportPage::Row> who(const SetupReport& report) {
+std::vector<ReportPage::Row> who(const SetupResult& report) {
   const Identity& patient = report.identity;
   std::vector<ReportPage::Row> rows;
   rows.push_back(
@@ -127,11 +128,11 @@ std::vector<ReportPage::Row> who(const SetupReport& report) {
   return rows;
 }
 
-std::string action_words(const SetupReport& report, const ShownShift& shown) {
+std::string action_words(const SetupResult& report, const ShownShift& shown) {
   const std::string level = report.site && !report.site->anatomy.empty()
                                 ? fmt::format("the action level \"{}\"", printable(report.site->anatomy))
                                 : "the action level";
-  switch (shown.action) {
+  switch (shown.decision.action) {
     case Action::kWithin: return "The shift is within " + level;
     case Action::kExceeds: return "The shift exceeds " + level;
     case Action::kUnset: break;
@@ -142,7 +143,7 @@ std::string action_words(const SetupReport& report, const ShownShift& shown) {
                             : "No action level: the site file has none for this anatomy";
 }
 
-std::vector<Quantity> couch_rows(const ShownShift& shown, const SetupReport& report, LengthUnit unit) {
+std::vector<Quantity> couch_rows(const ShownShift& shown, const SetupResult& report, LengthUnit unit) {
   const auto sigma_of = [&](int axis) { return shown.sigma_deg[static_cast<std::size_t>(axis)]; };
   const double yaw = report.table.yaw_rad();
   std::vector<Quantity> rows = {length("Lateral", shown.couch_mm[0], shown.couch_sigma_mm[0], unit, kLateral),
@@ -189,8 +190,8 @@ std::string target_words(const ShownShift& shown, const TableAngles& table) {
 }
 
 // The shift as a vendor's couch shows it: the change, and from where to where if the read-outs at imaging are known.
-ReportPage::Display display_of(const SetupReport& report, const ShownShift& shown, LengthUnit unit) {
-  const SiteFile::Scale& scale = *report.site->couch_scale;
+ReportPage::Display display_of(const SetupResult& report, const ShownShift& shown, LengthUnit unit) {
+  const ValidatedScale& scale = *report.site->couch_scale;
   ReportPage::Display display{.title = fmt::format("On the couch's display: {} scale, validated by {} on {}",
                                                    to_string(scale.scale), printable(scale.validated_by),
                                                    scale.validated_on)};
@@ -227,7 +228,7 @@ ReportPage::Display display_of(const SetupReport& report, const ShownShift& show
   return display;
 }
 
-void put_shift(const SetupReport& report, const ShownShift& shown, LengthUnit unit, ReportPage& page) {
+void put_shift(const SetupResult& report, const ShownShift& shown, LengthUnit unit, ReportPage& page) {
   page.couch = couch_rows(shown, report, unit);
   page.couch_order = "Translate, then rotate about the isocenter";
   page.couch_target = target_words(shown, report.table);
@@ -241,7 +242,7 @@ void put_shift(const SetupReport& report, const ShownShift& shown, LengthUnit un
     for (std::size_t n = 3; n < 6; ++n) page.setup_error[n] = taken_as_zero(page.setup_error[n].name);
   if (report.unobservable_room.empty()) {
     std::optional<double> two_sigma_mm;
-    if (report.sigma) two_sigma_mm = 2.0 * report.sigma->translation_mm.maxCoeff();
+    if (report.uncertainty) two_sigma_mm = 2.0 * report.uncertainty->translation_mm.maxCoeff();
     const std::string text = rounded_length(report.setup_error.translation().norm(), unit, two_sigma_mm);
     page.setup_error_length =
         fmt::format("Length of the translation {} {}", text.substr(text.starts_with('+') ? 1 : 0), name_of(unit));
@@ -262,7 +263,7 @@ std::string vector_words(const Eigen::Vector3d& mm, int decimals = 1) {
   return fmt::format("({:.{}f}, {:.{}f}, {:.{}f}) mm", mm.x(), decimals, mm.y(), decimals, mm.z(), decimals);
 }
 
-ReportPage::Section geometry_section(const SetupReport& report) {
+ReportPage::Section geometry_section(const SetupResult& report) {
   ReportPage::Section section{.title = "Geometry as understood"};
   section.rows.push_back(
       {"Isocenter", vector_words(report.isocenter_patient_mm, 2) + ", patient coordinates of the CT"});
@@ -273,7 +274,7 @@ ReportPage::Section geometry_section(const SetupReport& report) {
   if (report.table_position_mm)
     section.rows.push_back({"Table position at imaging",
                             vector_words(*report.table_position_mm) + " lateral, longitudinal, vertical, IEC 61217"});
-  for (const SetupReport::View& view : report.views)
+  for (const SetupResult::View& view : report.views)
     section.rows.push_back({printable(view.label),
                             fmt::format("source at {} IEC fixed; {} x {} pixels of {:.3f} mm at the isocenter",
                                         vector_words(view.source_room_mm), view.columns, view.rows, view.pixel_mm)});
@@ -288,43 +289,43 @@ ReportPage::Section left_over_section(const ReportPage& page) {
   return section;
 }
 
-ReportPage::Section search_section(const SetupReport& report) {
+ReportPage::Section search_section(const SetupResult& report) {
   ReportPage::Section section{.title = "Search"};
   section.rows.push_back({"Preset", fmt::format("{}, seed {}, {}", report.preset, report.seed,
                                                 report.translation_only ? "translations only: rotations were taken as 0"
                                                                         : "six degrees of freedom")});
   section.rows.push_back({"Region", report.region.empty() ? "everything" : printable(joined(report.region, "; "))});
-  for (const SetupReport::Stage& stage : report.stages)
+  for (const StageReport& stage : report.stages)
     section.rows.push_back(
         {"Stage " + stage.name,
          fmt::format("{} by {}: {:.4f} after {} evaluations in {:.2f} s, {}{}", stage.similarity, stage.optimizer,
                      stage.value, stage.evaluations, stage.seconds, stage.termination,
                      stage.spread_mm ? fmt::format("; ends of its starts within {:.2f} mm, {:.2f} deg",
-                                                   *stage.spread_mm, stage.spread_deg.value_or(0.0))
+                                                   *stage.spread_mm, deg_from_rad(stage.spread_rad.value_or(0.0)))
                                      : "")});
   return section;
 }
 
-ReportPage::Section checks_section(const SetupReport& report) {
+ReportPage::Section checks_section(const SetupResult& report) {
   ReportPage::Section section{.title = "Checks"};
-  for (const SetupReport::View& view : report.views) {
-    std::string words = fmt::format(
-        "similarity {:.4f} as planned, {:.4f} as found; {} of {} parts with signal match elsewhere",
-        view.similarity_start, view.similarity_final, std::ranges::count_if(view.parts, &SetupReport::Part::disagrees),
-        std::ranges::count_if(view.parts, &SetupReport::Part::has_signal));
-    if (view.left_out_mm)
-      words += fmt::format("; without it the pose moves {:.2f} mm, {:.2f} deg", *view.left_out_mm,
-                           view.left_out_deg.value_or(0.0));
+  for (const SetupResult::View& view : report.views) {
+    std::string words =
+        fmt::format("similarity {:.4f} as planned, {:.4f} as found; {} of {} parts with signal match elsewhere",
+                    view.match.similarity_start, view.match.similarity_final, view.match.consistency.disagreeing(),
+                    view.match.consistency.with_signal());
+    if (const auto& left_out = view.match.left_out)
+      words += fmt::format("; without it the pose moves {:.2f} mm, {:.2f} deg", left_out->distance_mm,
+                           deg_from_rad(left_out->angle_rad));
     section.rows.push_back({printable(view.label), words});
   }
-  for (const SetupReport::Alternative& alternative : report.alternatives)
+  for (const Alternative& alternative : report.alternatives)
     section.rows.push_back(
         {"If " + printable(alternative.description),
          fmt::format("similarity {:.4f}, as it is {:.4f}", alternative.similarity, alternative.as_is)});
   return section;
 }
 
-ReportPage::Section provenance_section(const SetupReport& report) {
+ReportPage::Section provenance_section(const SetupResult& report) {
   ReportPage::Section section{.title = "Provenance"};
   std::string settings;
   for (const auto& [name, value] : report.renderer_settings) settings += fmt::format(", {} {}", name, value);
@@ -332,11 +333,11 @@ ReportPage::Section provenance_section(const SetupReport& report) {
       {"Program", fmt::format("isoshift {} ({})", report.version, report.commit)},
       {"Renderer", fmt::format("{} on {}{}; attenuation {}, threshold {:.0f} HU", report.renderer,
                                printable(report.device), settings, report.attenuation, report.threshold_hu)},
-      {"Time", fmt::format("{:.1f} s, of which registration {:.1f} s", report.seconds_total, report.seconds_register)},
+      {"Time", fmt::format("{:.1f} s, of which registration {:.1f} s", report.seconds_total, report.seconds)},
       {"CT series", fmt::format("{}; SHA-256 {}", printable(report.ct_series_uid), report.ct_sha256)}};
   if (!report.plan_uid.empty())
     section.rows.push_back({"Plan", fmt::format("{}; SHA-256 {}", printable(report.plan_uid), report.plan_sha256)});
-  for (const SetupReport::View& view : report.views)
+  for (const SetupResult::View& view : report.views)
     section.rows.push_back(
         {printable(view.label),
          fmt::format("{} frame {}; SHA-256 {}", printable(view.sop_instance_uid), view.frame, view.sha256)});
@@ -395,7 +396,7 @@ std::string name_for_people(const std::string& person_name) {
   return name.empty() ? ideographic : fmt::format("{} ({})", name, ideographic);
 }
 
-ReportPage report_page(const SetupReport& report) {
+ReportPage report_page(const SetupResult& report) {
   const ShownShift shown = shown_shift(report);
   const LengthUnit unit = report.site ? report.site->length_unit : LengthUnit::kMm;
   ReportPage page;
@@ -406,9 +407,9 @@ ReportPage report_page(const SetupReport& report) {
   page.verdict = report.verdict;
   page.verdict_words = fmt::format("{}: {}", upper_case(to_string(report.verdict)), meaning(report.verdict));
   page.reasons = all_printable(report.reasons);
-  page.action = shown.action;
+  page.action = shown.decision.action;
   page.action_words = action_words(report, shown);
-  page.action_reasons = shown.action_reasons;
+  page.action_reasons = shown.decision.reasons;
   page.withheld = shown.withheld;
   if (!shown.withheld) put_shift(report, shown, unit, page);
   page.conventions = {

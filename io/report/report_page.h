@@ -7,7 +7,7 @@
 #include <string_view>
 #include <vector>
 
-#include "io/report/setup_report.h"
+#include "setup/shown_shift.h"
 
 namespace isoshift {
 
@@ -61,7 +61,7 @@ struct ReportPage {
   std::vector<std::string> warnings, overrides, left_aside;
   std::vector<Section> details;  // geometry as understood, stages, checks, hashes, versions
 };
-ReportPage report_page(const SetupReport& report);
+ReportPage report_page(const SetupResult& report);
 
 std::string upper_case(std::string_view text);  // of ASCII letters
 

@@ -26,7 +26,7 @@ std::filesystem::path picture_path(const std::filesystem::path& folder, std::siz
 }
 
 // All pictures of a view beside each other, for people without the report.
-std::string comparison_png(const SetupReport::View& view) {
+std::string comparison_png(const SetupResult::View& view) {
   constexpr double kWidth = 1600.0, kMargin = 6.0;
   const double height =
       0.2 * kWidth * view.picture.xray.rows / view.picture.xray.columns + 0.022 * kWidth + 2.0 * kMargin;
@@ -35,10 +35,10 @@ std::string comparison_png(const SetupReport::View& view) {
   return canvas.finish();
 }
 
-EncapsulatedPdf document_of(const SetupReport& report, const ReportPage& page) {
+EncapsulatedPdf document_of(const SetupResult& report, const ReportPage& page) {
   EncapsulatedPdf document{.identity = report.identity, .title = page.title};
   if (!report.plan_uid.empty()) document.sources.push_back({report.plan_class_uid, report.plan_uid});
-  for (const SetupReport::View& view : report.views)
+  for (const SetupResult::View& view : report.views)
     if (document.sources.empty() || document.sources.back().sop_instance_uid != view.sop_instance_uid)
       document.sources.push_back({view.sop_class_uid, view.sop_instance_uid});
   if (!report.spatial_registration_uid.empty())
@@ -48,7 +48,7 @@ EncapsulatedPdf document_of(const SetupReport& report, const ReportPage& page) {
 
 }  // namespace
 
-void write_result(const SetupReport& report, const std::filesystem::path& folder) {
+void write_result(const SetupResult& report, const std::filesystem::path& folder) {
   const ReportPage page = report_page(report);
   const std::string pdf = pdf_report(report, page);
   write_text(folder / kResultFile, json_report(report));
@@ -64,7 +64,7 @@ void write_result(const SetupReport& report, const std::filesystem::path& folder
   }
 }
 
-SetupReport read_report(const std::filesystem::path& folder) {
+SetupResult read_report(const std::filesystem::path& folder) {
   const std::filesystem::path path = folder / kResultFile;
   std::ifstream file(path, std::ios::binary);
   const std::string json{std::istreambuf_iterator<char>(file), {}};
@@ -72,8 +72,8 @@ SetupReport read_report(const std::filesystem::path& folder) {
   return report_from_json(json, path.string());
 }
 
-SetupReport read_result(const std::filesystem::path& folder) {
-  SetupReport report = read_report(folder);
+SetupResult read_result(const std::filesystem::path& folder) {
+  SetupResult report = read_report(folder);
   for (std::size_t n = 0; n < report.views.size(); ++n) {
     ViewPicture& picture = report.views[n].picture;
     for (const auto& [name, member] : kPictures) picture.*member = read_gray_png(picture_path(folder, n, name));

@@ -3,7 +3,7 @@
 
 #include <filesystem>
 
-#include "io/report/setup_report.h"
+#include "setup/setup_result.h"
 
 namespace isoshift {
 
@@ -11,12 +11,12 @@ inline constexpr const char* kResultFile = "result.json";
 inline constexpr const char* kRegistrationFile = "spatial_registration.dcm";
 
 // Writes result.json, report.txt, report.csv, report.pdf, report.html, report.dcm, and pictures per view.
-void write_result(const SetupReport& report, const std::filesystem::path& folder);
+void write_result(const SetupResult& report, const std::filesystem::path& folder);
 
 // Its numbers, without pictures. Throws Error naming the file that is missing or is none of a result.
-SetupReport read_report(const std::filesystem::path& folder);
+SetupResult read_report(const std::filesystem::path& folder);
 
 // The same with pictures. Throws Error naming the file that is missing or is none of a result.
-SetupReport read_result(const std::filesystem::path& folder);
+SetupResult read_result(const std::filesystem::path& folder);
 
 }  // namespace isoshift

@@ -20,10 +20,6 @@ constexpr double kMinGain = 0.1;  // of correlation, by moving the tile
 
 }  // namespace
 
-int ViewConsistency::with_signal() const { return static_cast<int>(std::ranges::count_if(tiles, &Tile::has_signal)); }
-
-int ViewConsistency::disagreeing() const { return static_cast<int>(std::ranges::count_if(tiles, &Tile::disagrees)); }
-
 std::vector<ViewConsistency> regional_consistency(const RendererPyramid& renderers, const FixedViews& fixed,
                                                   const Eigen::Isometry3d& room_from_patient) {
   std::vector<ViewConsistency> views;
@@ -45,15 +41,15 @@ std::vector<ViewConsistency> regional_consistency(const RendererPyramid& rendere
         const PixelSquare square{.column = column, .row = row, .edge = edge};
         if (share_inside(level.field, square) < kMinField) continue;
         const SquareMatch match = best_match(xray, level.field, square, drr, reach);
-        Tile tile{.center_px = (factor * Eigen::Vector2d(column + 0.5 * edge, row + 0.5 * edge)).array() - 0.5,
-                  .width_px = factor * edge,
-                  .displacement_mm = match.displacement_px / px_per_mm,
-                  .correlation = match.correlation_here,
-                  .best_correlation = match.correlation_there};
+        ViewPart tile{.center_px = (factor * Eigen::Vector2d(column + 0.5 * edge, row + 0.5 * edge)).array() - 0.5,
+                      .width_px = factor * edge,
+                      .displacement_mm = match.displacement_px / px_per_mm,
+                      .correlation = match.correlation_here,
+                      .best_correlation = match.correlation_there};
         tile.has_signal = tile.best_correlation >= kMinCorrelation;
         tile.disagrees = tile.has_signal && tile.displacement_mm.norm() > kMaxDisplacementMm &&
                          tile.best_correlation - tile.correlation > kMinGain;
-        view.tiles.push_back(tile);
+        view.parts.push_back(tile);
       }
     views.push_back(std::move(view));
   }

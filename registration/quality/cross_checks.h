@@ -5,14 +5,9 @@
 #include <vector>
 
 #include "registration/quality/alternatives.h"
+#include "setup/registration.h"
 
 namespace isoshift {
-
-// How far the pose moves when one view is left out: translation at the isocenter and angle.
-struct LeftOutView {
-  double distance_mm = 0.0;
-  double angle_rad = 0.0;
-};
 
 // One per view; nothing where fewer than two would remain. `found` is what a search with `options` came to.
 std::vector<LeftOutView> leave_out_views(const RendererPyramid& renderers, const FixedViews& views,

@@ -73,7 +73,7 @@ void judge(std::span<const double> parameters, const RegistrationOptions& option
   const bool is_volume_chosen = options.region != nullptr && options.region->has_volume();
   double mean = 0.0;
   for (std::size_t n = 0; n < result.views.size(); ++n) {
-    const ViewReport& view = result.views[n];
+    const ViewMatch& view = result.views[n];
     const std::string name = name_of_view(view.label, n);
     mean += view.similarity_final / static_cast<double>(result.views.size());
     if (!(view.similarity_final >= view.similarity_start - kSimilarityNoise))
@@ -96,7 +96,7 @@ void judge(std::span<const double> parameters, const RegistrationOptions& option
                   fmt::format("the final gradient correlation {:.3f} is below {:.2f}", mean, kMinSimilarity));
   } else {
     for (std::size_t n = 0; n < result.views.size(); ++n)
-      if (const ViewReport& view = result.views[n]; !(view.similarity_final >= kMinViewSimilarity))
+      if (const ViewMatch& view = result.views[n]; !(view.similarity_final >= kMinViewSimilarity))
         review(fmt::format("{} hardly matches (gradient correlation {:.3f})", name_of_view(view.label, n),
                            view.similarity_final));
   }
@@ -130,8 +130,8 @@ void judge(std::span<const double> parameters, const RegistrationOptions& option
   if (!options.check_alternatives) review("the preset leaves out the check for mirrored, turned and exchanged images");
   // On the phantom of the demo, where ray casters end 0.1 mm beside the truth, splatting ended 1.4 mm beside it: its
   // noise belongs to the voxels, moves with them, and carries its own gradients into the last stage.
-  if (is_splatting(result.renderer))
-    review(fmt::format("the DRRs of {} are too noisy for the last stage of the search", to_string(result.renderer)));
+  if (const auto kind = renderer_kind_from(result.renderer); kind && is_splatting(*kind))
+    review(fmt::format("the DRRs of {} are too noisy for the last stage of the search", result.renderer));
   if (!result.unobservable_room.empty())
     review("all views look along nearly the same direction, along which nothing was measured");
 }

@@ -12,14 +12,9 @@
 #include <optional>
 
 #include "registration/objective.h"
+#include "setup/registration.h"
 
 namespace isoshift {
-
-// One standard deviation per axis, in the room: of where the isocenter's anatomy lies, and of the rotation vector.
-struct Uncertainty {
-  Eigen::Vector3d translation_mm = Eigen::Vector3d::Zero();
-  Eigen::Vector3d rotation_rad = Eigen::Vector3d::Zero();
-};
 
 struct UncertaintyOptions {
   bool translation_only = false;        // rotations are taken as known and get 0

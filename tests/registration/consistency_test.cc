@@ -62,7 +62,7 @@ TEST(Consistency, AllPartsOfARegisteredPatientAgree) {
   for (const ViewConsistency& view : views) {
     EXPECT_GT(view.with_signal(), 10);
     EXPECT_EQ(view.disagreeing(), 0);
-    for (const Tile& tile : view.tiles) {
+    for (const ViewPart& tile : view.parts) {
       EXPECT_GT(tile.width_px, 10.0);
       EXPECT_TRUE((tile.center_px.array() > 0.0).all() && (tile.center_px.array() < 160.0).all());
       if (tile.has_signal) {
@@ -78,7 +78,7 @@ TEST(Consistency, PartsThatMovedSayWhereToAndTheOthersAgree) {
     const auto views = consistency_of(images_with_left_half_moved(by_mm));
     const Vector2d expected_mm(-by_mm.x(), by_mm.y());
     int moved = 0, in_place = 0;
-    for (const Tile& tile : views[0].tiles) {
+    for (const ViewPart& tile : views[0].parts) {
       const double right = tile.center_px.x() + 0.5 * tile.width_px, left = tile.center_px.x() - 0.5 * tile.width_px;
       // Pixels of 1.25 mm at the isocenter. What moved in from beyond the view cannot be found.
       const Vector2d match_px = tile.center_px + expected_mm / 1.25;
@@ -113,7 +113,7 @@ TEST(Consistency, PartsOutsideTheFieldAreNotLookedAt) {
   const auto views = consistency_of(images);
   EXPECT_EQ(views[0].disagreeing(), 0);
   EXPECT_GT(views[0].with_signal(), 4);
-  for (const Tile& tile : views[0].tiles) EXPECT_GT(tile.center_px.x(), 80.0);
+  for (const ViewPart& tile : views[0].parts) EXPECT_GT(tile.center_px.x(), 80.0);
 }
 
 TEST(Consistency, PartsWithoutAnythingToSeeHaveNoSignal) {
@@ -122,7 +122,7 @@ TEST(Consistency, PartsWithoutAnythingToSeeHaveNoSignal) {
   const RegistrationScene scene = make_scene(options);
   const auto views = regional_consistency(*scene.renderers, scene.views(), scene.planned);
   int in_air = 0;
-  for (const Tile& tile : views[0].tiles) {
+  for (const ViewPart& tile : views[0].parts) {
     // Pixels of 2.1 mm; the box lies within 5 of them, and what is left of it without slow changes within 20 more.
     if ((tile.center_px.array() - 48.0).abs().maxCoeff() < 25.0 + 0.5 * tile.width_px) continue;
     ++in_air;

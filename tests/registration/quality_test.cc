@@ -19,9 +19,9 @@ using testing::HasSubstr;
 
 ViewConsistency parts(int agreeing, int disagreeing, int without_signal = 0) {
   ViewConsistency consistency;
-  for (int n = 0; n < agreeing; ++n) consistency.tiles.push_back({.has_signal = true});
-  for (int n = 0; n < disagreeing; ++n) consistency.tiles.push_back({.has_signal = true, .disagrees = true});
-  for (int n = 0; n < without_signal; ++n) consistency.tiles.push_back({});
+  for (int n = 0; n < agreeing; ++n) consistency.parts.push_back({.has_signal = true});
+  for (int n = 0; n < disagreeing; ++n) consistency.parts.push_back({.has_signal = true, .disagrees = true});
+  for (int n = 0; n < without_signal; ++n) consistency.parts.push_back({});
   return consistency;
 }
 
@@ -133,7 +133,7 @@ TEST(Quality, StartsThatEndApartNeedReview) {
 }
 
 TEST(Quality, SplattingNeedsReview) {
-  expect_review([](RegistrationResult& result) { result.renderer = RendererKind::kSplatTexture; },
+  expect_review([](RegistrationResult& result) { result.renderer = "splat-texture"; },
                 "splat-texture are too noisy");
 }
 
@@ -166,7 +166,7 @@ TEST(Quality, ASimilarityThatIsNoNumberIsNeverAccepted) {
 TEST(Quality, TheWorseTheMatchTheWorseTheVerdict) {
   const auto verdict_at = [](double similarity) {
     RegistrationResult result = good_result();
-    for (ViewReport& view : result.views)
+    for (ViewMatch& view : result.views)
       view = {.similarity_start = 0.0, .similarity_final = similarity, .consistency = parts(20, 0)};
     judge(kInside, {}, result);
     EXPECT_EQ(result.reasons.empty(), result.verdict == Verdict::kAccepted) << similarity;

@@ -83,7 +83,7 @@ TEST(RegisterViews, AcceptsWhatItFindsAndSaysHowSureItIs) {
   EXPECT_GT(result.uncertainty->rotation_rad.minCoeff(), 0.0);
   EXPECT_EQ(result.alternatives.size(), 5U);  // two views mirrored, turned, and exchanged
   ASSERT_EQ(result.views.size(), 2U);
-  for (const ViewReport& view : result.views) {
+  for (const ViewMatch& view : result.views) {
     EXPECT_GT(view.similarity_final, view.similarity_start);
     EXPECT_GT(view.consistency.with_signal(), 0);
     EXPECT_EQ(view.consistency.disagreeing(), 0);

@@ -15,6 +15,7 @@
 #include "io/report/line_chart.h"
 #include "io/report/result_folder.h"
 #include "io/report/results_page.h"
+#include "setup/shown_shift.h"
 
 namespace isoshift {
 namespace {
@@ -27,7 +28,7 @@ std::string status_of(const CaseEnd& end) {
 }
 
 // IDs of two issuers are two patients.
-std::string patient_of(const SetupReport& report) {
+std::string patient_of(const SetupResult& report) {
   const Identity& identity = report.identity;
   return identity.patient_id_issuer.empty() ? identity.patient_id
                                             : fmt::format("{} ({})", identity.patient_id, identity.patient_id_issuer);
@@ -45,7 +46,7 @@ std::string reason_of(const CaseEnd& end) {
 }
 
 using Components = std::array<std::optional<double>, 6>;
-Components shown_components(const SetupReport& report) {
+Components shown_components(const SetupResult& report) {
   const ShownShift shown = shown_shift(report);
   return {shown.setup_error_mm[0],  shown.setup_error_mm[1],  shown.setup_error_mm[2],
           shown.setup_error_deg[0], shown.setup_error_deg[1], shown.setup_error_deg[2]};
@@ -64,7 +65,7 @@ std::string summary_csv(const BatchSummary& summary) {
     }
     csv += fmt::format("{},{},{},{},{},{},{},{},{}\n", end.name,
                        end.report ? csv_cell(end.report->identity.patient_id) : "", acquired(end), status_of(end),
-                       end.report ? to_string(shown_shift(*end.report).action) : "", components,
+                       end.report ? to_string(shown_shift(*end.report).decision.action) : "", components,
                        csv_cell(reason_of(end)), end.report ? fmt::format("{:.3f}", end.report->seconds_total) : "",
                        end.report ? fmt::format("cases/{}/report.pdf", end.name) : "");
   }
@@ -116,7 +117,7 @@ std::string index_html(const BatchSummary& summary) {
             {.text = end.report ? end.report->identity.patient_id : "", .link = end.report ? "patients.html" : ""},
             {.text = acquired(end)},
             {.text = status_of(end)},
-            {.text = end.report ? std::string(to_string(shown_shift(*end.report).action)) : ""}}};
+            {.text = end.report ? std::string(to_string(shown_shift(*end.report).decision.action)) : ""}}};
     const Components components = end.report ? shown_components(*end.report) : Components();
     for (std::size_t n = 0; n < components.size(); ++n) row.cells.push_back(number_cell(components[n], n < 3 ? 1 : 2));
     row.cells.push_back({.text = reason_of(end)});
@@ -210,15 +211,14 @@ std::string summary_json(const BatchSummary& summary) {
     if (end.report) {
       json["patient_id"] = end.report->identity.patient_id;
       json["acquired"] = acquired(end);
-      json["action"] = to_string(shown_shift(*end.report).action);
+      json["action"] = to_string(shown_shift(*end.report).decision.action);
       Json components = Json::object();
       const Components shown = shown_components(*end.report);
       for (std::size_t n = 0; n < 6; ++n) components[kErrorComponents[n]] = shown[n] ? Json(*shown[n]) : Json(nullptr);
       json["setup_error"] = components;
       json["reasons"] = end.report->reasons;
-      json["seconds"] = {{"load", end.report->seconds_load},
-                         {"register", end.report->seconds_register},
-                         {"total", end.report->seconds_total}};
+      json["seconds"] = {
+          {"load", end.report->seconds_load}, {"register", end.report->seconds}, {"total", end.report->seconds_total}};
     } else if (!end.error.empty()) {
       json["error"] = end.error;
     }

@@ -4,15 +4,15 @@
 #include <string>
 #include <vector>
 
-#include "io/report/setup_report.h"
 #include "setup/setup_errors.h"
+#include "setup/setup_result.h"
 #include "workflow/batch/batch_folder.h"
 
 namespace isoshift {
 
 struct CaseEnd {
   std::string name;
-  std::optional<SetupReport> report;  // without pictures; unset: it failed, or has not ended
+  std::optional<SetupResult> report;  // without pictures; unset: it failed, or has not ended
   std::string error;                  // why it failed; empty without a report: it has not ended
 };
 

@@ -8,7 +8,7 @@
 #include "base/output_folder.h"
 #include "io/report/result_folder.h"
 #include "setup/couch_shift.h"
-#include "workflow/register/setup_report_of.h"
+#include "workflow/register/setup_result_of.h"
 
 namespace isoshift {
 namespace {
@@ -22,22 +22,19 @@ class Stopwatch {
 };
 
 // Accepted results are written; those for review, and those with a direction that nobody measured, only on request.
-bool may_write_registration(const RegisterOptions& options, const RegistrationResult& result) {
+bool may_write_registration(const RegisterOptions& options, const SetupResult& result) {
   if (!result.unobservable_room.empty() && !options.accept_unobservable) return false;
   return result.verdict == Verdict::kAccepted || (result.verdict == Verdict::kReview && options.write_reg_for_review);
 }
 
 // The pose to be written: without setup error along directions that nobody measured, each an override.
-Eigen::Isometry3d written_pose(const Study& study, const RegistrationResult& result, Notes& notes) {
-  Eigen::Isometry3d error = setup_error_from_poses(study.planned_room_from_patient, result.actual_room_from_patient);
-  for (const Eigen::Vector3d& direction : result.unobservable_room) {
-    error.translation() -= direction.dot(error.translation()) * direction;
+Eigen::Isometry3d written_pose(const Study& study, const SetupResult& result, Notes& notes) {
+  for (const Eigen::Vector3d& direction : result.unobservable_room)
     notes.overrides.push_back(
         fmt::format("spatial registration: no setup error along ({:.3f}), which was not measured, by "
                     "--accept-unobservable",
                     fmt::join(direction, ", ")));
-  }
-  return error * study.planned_room_from_patient;
+  return known_setup_error(result) * study.planned_room_from_patient;
 }
 
 SpatialRegistrationOptions registration_options(RegistrationSource source, Verdict verdict) {
@@ -47,11 +44,11 @@ SpatialRegistrationOptions registration_options(RegistrationSource source, Verdi
 
 }  // namespace
 
-SetupReport register_study(const RegisterOptions& options, SharedWork& shared, Observer& observer) {
+SetupResult register_study(const RegisterOptions& options, SharedWork& shared, Observer& observer) {
   const Stopwatch total;
   OutputFolder output(options.output, options.overwrite);
   const std::optional<SiteFile> site_file = named_site(options.site);
-  std::optional<SetupReport::Site> site = chosen_site(site_file, options.anatomy);
+  std::optional<SiteRules> site = chosen_site(site_file, options.anatomy);
 
   Notes notes;
   StudyOptions named = options.study;
@@ -59,26 +56,26 @@ SetupReport register_study(const RegisterOptions& options, SharedWork& shared, O
   const Study study = load(named, notes, observer, shared.cts);
   const RegistrationSetup setup(options.registration, study, beams_of(study), shared.renderers);
   const double seconds_load = total.seconds();
-  RegistrationResult result =
+  RegistrationResult found =
       register_views(setup.renderers(), study.xrays, study.planned_room_from_patient, setup.options(),
                      [&](double share) { observer.progress("Registering", share); });
   observer.progress("Registering", 1.0);
-  for (const std::string& doubt : study.doubts) result.demote(Verdict::kReview, doubt);
+  for (const std::string& doubt : study.doubts) found.demote(Verdict::kReview, doubt);
 
-  SetupReport report = setup_report_of(study, options.registration, setup, result);
-  report.site = std::move(site);
+  SetupResult result = setup_result_of(study, options.registration, setup, std::move(found));
+  result.site = std::move(site);
   if (may_write_registration(options, result))
-    report.spatial_registration_uid = write_spatial_registration(study, written_pose(study, result, notes),
+    result.spatial_registration_uid = write_spatial_registration(study, written_pose(study, result, notes),
                                                                  registration_options(options.source, result.verdict),
                                                                  output.path() / kRegistrationFile, notes);
-  report.overrides = notes.overrides;
-  report.left_aside = notes.left_aside;
-  report.warnings = notes.warnings;
-  report.seconds_load = seconds_load;
-  report.seconds_total = total.seconds();
-  write_result(report, output.path());
+  result.overrides = notes.overrides;
+  result.left_aside = notes.left_aside;
+  result.warnings = notes.warnings;
+  result.seconds_load = seconds_load;
+  result.seconds_total = total.seconds();
+  write_result(result, output.path());
   output.commit();
-  return report;
+  return result;
 }
 
 }  // namespace isoshift

@@ -6,7 +6,7 @@
 #include <string>
 
 #include "io/objects/spatial_registration.h"
-#include "io/report/setup_report.h"
+#include "setup/setup_result.h"
 #include "workflow/observer.h"
 #include "workflow/register/registration_setup.h"
 #include "workflow/register/study_options.h"
@@ -33,6 +33,6 @@ struct SharedWork {
 
 // Registers a study and writes the folder of its result, whole or not at all. `options.registration` must have been
 // settled.
-SetupReport register_study(const RegisterOptions& options, SharedWork& shared, Observer& observer);
+SetupResult register_study(const RegisterOptions& options, SharedWork& shared, Observer& observer);
 
 }  // namespace isoshift

@@ -8,6 +8,7 @@
 #include "base/output_folder.h"
 #include "base/sha256.h"
 #include "io/report/results_page.h"
+#include "setup/shown_shift.h"
 
 namespace isoshift {
 namespace {
@@ -50,11 +51,11 @@ ResultsPage::Row row_of(const WaitingSession& waiting) {
 
 std::string times_of(const std::vector<StudyFiles::Image>& images) { return times_in_words(images); }
 
-void SessionIndex::add(const std::string& session, const SetupReport& report, const std::string& obstacle) {
+void SessionIndex::add(const std::string& session, const SetupResult& report, const std::string& obstacle) {
   Session added{.name = session,
                 .patient = fmt::format("{} ({})", report.identity.patient_name, report.identity.patient_id),
                 .verdict = std::string(to_string(report.verdict)),
-                .action = std::string(to_string(shown_shift(report).action)),
+                .action = std::string(to_string(shown_shift(report).decision.action)),
                 .held = obstacle.empty() ? "held" : "held, cannot be released: " + obstacle,
                 .state = "",
                 .first = report.views.front().acquired,

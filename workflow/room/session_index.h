@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "io/report/setup_report.h"
 #include "io/study/study_files.h"
+#include "setup/setup_result.h"
 #include "workflow/room/results_tree.h"
 
 namespace isoshift {
@@ -27,7 +27,7 @@ class SessionIndex {
   SessionIndex(const ResultsTree& tree, std::string site) : tree_(tree), site_(std::move(site)) {}
 
   // `obstacle`: why the session cannot be released; empty: it can be.
-  void add(const std::string& session, const SetupReport& report, const std::string& obstacle);
+  void add(const std::string& session, const SetupResult& report, const std::string& obstacle);
   std::size_t size() const { return sessions_.size(); }
 
   // Looks what has been released and sent, and writes the pages that are no longer true. `troubles`: what does not work

@@ -17,6 +17,8 @@
 #include "io/report/formats.h"
 #include "io/report/result_folder.h"
 #include "io/report/rounding.h"
+#include "io/report/view_picture.h"
+#include "setup/shown_shift.h"
 #include "tests/support/command.h"
 #include "tests/support/temporary_folder.h"
 
@@ -27,8 +29,8 @@ using testing::HasSubstr;
 using testing::Not;
 
 // A view of another size than its picture.
-SetupReport::View view_with_picture(const std::string& label) {
-  SetupReport::View view{.label = label,
+SetupResult::View view_with_picture(const std::string& label) {
+  SetupResult::View view{.label = label,
                          .sop_class_uid = "1.2.840.10008.5.1.4.1.1.481.1",
                          .sop_instance_uid = "1.2.3.4",
                          .sha256 = std::string(64, 'a'),
@@ -51,8 +53,8 @@ SetupReport::View view_with_picture(const std::string& label) {
 }
 
 // head-oblique at its truth, the worked example of docs/conventions.md.
-SetupReport oblique_report(Verdict verdict) {
-  SetupReport report;
+SetupResult oblique_report(Verdict verdict) {
+  SetupResult report;
   report.made_on = "2026-03-01T10:16:02+0100";
   report.version = "0.1.0";
   report.commit = "abc";
@@ -73,19 +75,19 @@ SetupReport oblique_report(Verdict verdict) {
   return report;
 }
 
-SetupReport::Site small_couch() {
+SiteRules small_couch() {
   return {.name = "Linac 3",
           .sha256 = std::string(64, 'b'),
           .level = ActionLevel{.translation_mm = 5.0, .rotation_deg = 3.0},
           .couch_dof = CouchDof::kFour,
-          .couch_scale = SiteFile::Scale{CouchScale::kVarianIec, "J. Doe", "2026-03-01"}};
+          .couch_scale = ValidatedScale{CouchScale::kVarianIec, "J. Doe", "2026-03-01"}};
 }
 
-std::string text_of(const SetupReport& report) { return text_report(report_page(report)); }
-std::string html_of(const SetupReport& report) { return html_report(report, report_page(report)); }
+std::string text_of(const SetupResult& report) { return text_report(report_page(report)); }
+std::string html_of(const SetupResult& report) { return html_report(report, report_page(report)); }
 
 // The text of a PDF, in the order it is read.
-std::string text_of_pdf(const SetupReport& report, int last_page = 99) {
+std::string text_of_pdf(const SetupResult& report, int last_page = 99) {
   const TemporaryFolder folder;
   write_text(folder / "report.pdf", pdf_report(report, report_page(report)));
   const CommandOutcome outcome =
@@ -109,7 +111,7 @@ std::vector<std::string> cells_of(const std::string& line) {
 }
 
 // Names and values of the one row.
-std::map<std::string, std::string> csv_of(const SetupReport& report) {
+std::map<std::string, std::string> csv_of(const SetupResult& report) {
   const std::string csv = csv_report(report);
   const auto end = csv.find("\r\n");
   const std::vector<std::string> names = cells_of(csv.substr(0, end)), cells = cells_of(csv.substr(end + 2));
@@ -155,12 +157,13 @@ TEST(Report, AllFormatsShowTheSameNumbers) {
     return std::uniform_real_distribution<double>(low, high)(random);
   };
   for (int n = 0; n < 20; ++n) {
-    SetupReport report = oblique_report(Verdict::kAccepted);
+    SetupResult report = oblique_report(Verdict::kAccepted);
     report.table.support_rad = rad_from_deg(uniform(-90, 90));
     report.setup_error.translation() = Eigen::Vector3d(uniform(-30, 30), uniform(-3, 3), uniform(-0.2, 0.2));
     report.setup_error.linear() = rotation_from_zxy({uniform(-0.1, 0.1), uniform(-0.02, 0.02), uniform(-0.002, 0.002)});
     const double wide = n % 2 == 0 ? 1.5 : 0.2;  // sigma: rounded to 1 or to 0.1
-    report.sigma = {.translation_mm = {wide, 0.04, 0.1}, .rotation_deg = {0.05, wide, 0.01}};
+    report.uncertainty = {.translation_mm = {wide, 0.04, 0.1},
+                          .rotation_rad = {rad_from_deg(0.05), rad_from_deg(wide), rad_from_deg(0.01)}};
     const auto json = nlohmann::json::parse(json_report(report));
     const std::string pdf = text_of_pdf(report, 1), html = html_of(report), text = text_of(report);
     const auto csv = csv_of(report);
@@ -193,7 +196,7 @@ TEST(Report, AllFormatsShowTheSameNumbers) {
 }
 
 TEST(Report, RejectedResultsShowNoShiftInAnyFormat) {
-  SetupReport report = oblique_report(Verdict::kRejected);
+  SetupResult report = oblique_report(Verdict::kRejected);
   report.site = small_couch();
   const auto json = nlohmann::json::parse(json_report(report));
   EXPECT_TRUE(json["couch_shift"].is_null());
@@ -212,7 +215,7 @@ TEST(Report, RejectedResultsShowNoShiftInAnyFormat) {
 }
 
 TEST(Report, UnobservableComponentsAreNull) {
-  SetupReport report = oblique_report(Verdict::kReview);
+  SetupResult report = oblique_report(Verdict::kReview);
   // Gantry 45: the view cannot tell along (sin 45, 0, cos 45); at couch 10 that enters all three table axes.
   report.unobservable_room = {Eigen::Vector3d(std::sqrt(0.5), 0, std::sqrt(0.5))};
   const auto json = nlohmann::json::parse(json_report(report));
@@ -248,7 +251,7 @@ TEST(Report, CentimetersAreRoundedAsMillimetersAre) {
   EXPECT_EQ(rounded_length(4.25, LengthUnit::kCm), "+0.43");
   EXPECT_EQ(rounded_length(-14.6, LengthUnit::kCm, 2.0), "-1.5");
   EXPECT_EQ(rounded_length(0.04, LengthUnit::kCm), "0.00");
-  SetupReport report = oblique_report(Verdict::kAccepted);
+  SetupResult report = oblique_report(Verdict::kAccepted);
   report.site = small_couch();
   report.site->length_unit = LengthUnit::kCm;
   EXPECT_THAT(text_of(report), HasSubstr("  Lateral         +0.66 cm   to the right"));
@@ -256,29 +259,29 @@ TEST(Report, CentimetersAreRoundedAsMillimetersAre) {
 }
 
 TEST(Report, ActionSaysWhatExceedsTheLevel) {
-  SetupReport report = oblique_report(Verdict::kAccepted);
+  SetupResult report = oblique_report(Verdict::kAccepted);
   report.site = small_couch();
-  EXPECT_EQ(shown_shift(report).action, Action::kExceeds);
-  EXPECT_THAT(shown_shift(report).action_reasons, testing::ElementsAre("setup error along x, z: more than 5 mm"));
+  EXPECT_EQ(shown_shift(report).decision.action, Action::kExceeds);
+  EXPECT_THAT(shown_shift(report).decision.reasons, testing::ElementsAre("setup error along x, z: more than 5 mm"));
   report.site->level = ActionLevel{.translation_mm = 7.5, .vector_mm = 9.0};
-  EXPECT_THAT(shown_shift(report).action_reasons, testing::ElementsAre("length of the translation: more than 9 mm"));
+  EXPECT_THAT(shown_shift(report).decision.reasons, testing::ElementsAre("length of the translation: more than 9 mm"));
   report.site->level->vector_mm = 10.0;
-  EXPECT_EQ(shown_shift(report).action, Action::kWithin);
+  EXPECT_EQ(shown_shift(report).decision.action, Action::kWithin);
   EXPECT_THAT(text_of(report), HasSubstr("ACTION       The shift is within the action level\n"));
   EXPECT_EQ(nlohmann::json::parse(json_report(report))["action"], "within");
 
   // What was not determined may be anything; what was may be enough.
   report.unobservable_room = {Eigen::Vector3d::UnitZ()};
-  EXPECT_EQ(shown_shift(report).action, Action::kUnset);
+  EXPECT_EQ(shown_shift(report).decision.action, Action::kUnset);
   report.site->level->vector_mm = 8.0;
-  EXPECT_EQ(shown_shift(report).action, Action::kExceeds);
+  EXPECT_EQ(shown_shift(report).decision.action, Action::kExceeds);
   report.site->level->vector_mm = 10.0;
   report.site->level->translation_mm = 1.0;
-  EXPECT_EQ(shown_shift(report).action, Action::kExceeds);
+  EXPECT_EQ(shown_shift(report).decision.action, Action::kExceeds);
 }
 
 TEST(Report, SmallCouchesSayWhatTheyApplyAndWhatRemains) {
-  SetupReport report = oblique_report(Verdict::kAccepted);
+  SetupResult report = oblique_report(Verdict::kAccepted);
   report.site = small_couch();
   report.table_position_mm = Eigen::Vector3d(0.0, 1350.0, -135.0);
   report.points = {{"centroid of PTV", {10, 20, 30}}};
@@ -304,7 +307,7 @@ TEST(Report, SmallCouchesSayWhatTheyApplyAndWhatRemains) {
 
 // dicom.md 5.1: 50 mm superior with a couch of 4 degrees of freedom; feet first the patient points the other way.
 TEST(Report, WhatRemainsIsThatOfDicomMd51) {
-  SetupReport report = oblique_report(Verdict::kAccepted);
+  SetupResult report = oblique_report(Verdict::kAccepted);
   report.table = {};
   report.site = small_couch();
   report.setup_error.translation() = Eigen::Vector3d(3, -2, 1.5);
@@ -321,7 +324,7 @@ TEST(Report, WhatRemainsIsThatOfDicomMd51) {
 
 // The table top's axes turn with the couch: at 90 degrees its lateral axis points toward the gantry.
 TEST(Report, WordsAreThoseOfTheRoomWhereverTheCouchStands) {
-  SetupReport report = oblique_report(Verdict::kAccepted);
+  SetupResult report = oblique_report(Verdict::kAccepted);
   report.setup_error = Eigen::Isometry3d::Identity();
   report.setup_error.translation() = Eigen::Vector3d(5, -3, 0);  // to the right, away from the gantry
   const auto words = [&](double couch_deg) {
@@ -340,7 +343,7 @@ TEST(Report, WordsAreThoseOfTheRoomWhereverTheCouchStands) {
 
 // What was not measured is in no number, however little of it an axis holds.
 TEST(Report, NothingIsMadeOfWhatWasNotMeasured) {
-  SetupReport report = oblique_report(Verdict::kReview);
+  SetupResult report = oblique_report(Verdict::kReview);
   report.table.support_rad = rad_from_deg(2.0);
   report.unobservable_room = {Eigen::Vector3d::UnitX()};
   const auto longitudinal = [&](double x_mm) {
@@ -348,23 +351,23 @@ TEST(Report, NothingIsMadeOfWhatWasNotMeasured) {
     return shown_shift(report).couch_mm[1].value();
   };
   EXPECT_NEAR(longitudinal(19.0), longitudinal(0.0), 1e-12);
-  const SetupReport read = report_from_json(json_report(report), "result.json");
+  const SetupResult read = report_from_json(json_report(report), "result.json");
   EXPECT_NEAR(shown_shift(read).couch_mm[1].value(), longitudinal(19.0), 1e-12);
 }
 
 TEST(Report, RotationsThatWereNotSearchedAreNoNumbers) {
-  SetupReport report = oblique_report(Verdict::kAccepted);
+  SetupResult report = oblique_report(Verdict::kAccepted);
   report.setup_error.linear().setIdentity();
   report.translation_only = true;
   report.site = small_couch();
   report.site->level = ActionLevel{.rotation_deg = 1.0};
-  EXPECT_EQ(shown_shift(report).action, Action::kUnset);
+  EXPECT_EQ(shown_shift(report).decision.action, Action::kUnset);
   EXPECT_THAT(text_of(report), HasSubstr("  Yaw            taken as 0: only translations were searched\n"));
   EXPECT_EQ(csv_of(report).at("yaw_deg"), "");
 }
 
 TEST(Report, NamesComeOutRightAndHarmless) {
-  SetupReport report = oblique_report(Verdict::kAccepted);
+  SetupResult report = oblique_report(Verdict::kAccepted);
   report.identity.patient_name = "Müller-Lüdenscheidt^Jürgen=山田^太郎=やまだ^たろう";
   report.plan_label = "<script>alert(1)</script><!--WHO-->";
   report.views[0].label = "</script><b>\"KV\"";
@@ -381,7 +384,7 @@ TEST(Report, NamesComeOutRightAndHarmless) {
 }
 
 TEST(Report, SurvivesNamesThatAreNoText) {
-  SetupReport report = oblique_report(Verdict::kAccepted);
+  SetupResult report = oblique_report(Verdict::kAccepted);
   report.identity.patient_name = "Evil\nVERDICT      ACCEPTED\x1b[31m";
   report.views[0].label = "\xff\xfe";
   for (const char* forged : {"\nVERDICT      ACCEPTED\x1b", "\nVERDICT      ACCEPTED [31m"})
@@ -393,7 +396,7 @@ TEST(Report, SurvivesNamesThatAreNoText) {
 }
 
 TEST(Report, FirstPageHoldsAllThatIsSigned) {
-  SetupReport report = oblique_report(Verdict::kReview);
+  SetupResult report = oblique_report(Verdict::kReview);
   report.site = small_couch();
   report.reasons =
       std::vector<std::string>(12, "a reason that is told at some length, as reasons are, to fill the page");
@@ -417,7 +420,7 @@ class ResultFolderTest : public testing::Test {
  protected:
   ResultFolderTest() {
     report_.site = small_couch();
-    report_.sigma = {.translation_mm = {0.1, 0.2, 0.3}, .rotation_deg = {0.1, 0.2, 0.3}};
+    report_.uncertainty = {.translation_mm = {0.1, 0.2, 0.3}, .rotation_rad = {0.001, 0.002, 0.003}};
     report_.stages = {{.name = "fine",
                        .similarity = "ncc",
                        .optimizer = "bobyqa",
@@ -428,15 +431,15 @@ class ResultFolderTest : public testing::Test {
     report_.points = {{"centroid of PTV", {1, 2, 3}}};
     report_.table_position_mm = Eigen::Vector3d(1, 2, 3);
     report_.spatial_registration_uid = "2.25.1";
-    report_.views.front().parts = {{.center_px = {20, 20}, .width_px = 10, .disagrees = true}};
+    report_.views.front().match.consistency.parts = {{.center_px = {20, 20}, .width_px = 10, .disagrees = true}};
     write_result(report_, folder_.path());
   }
   TemporaryFolder folder_;
-  SetupReport report_ = oblique_report(Verdict::kAccepted);
+  SetupResult report_ = oblique_report(Verdict::kAccepted);
 };
 
 TEST_F(ResultFolderTest, IsReadBackWhole) {
-  const SetupReport read = read_result(folder_.path());
+  const SetupResult read = read_result(folder_.path());
   EXPECT_EQ(json_report(read), json_report(report_));
   EXPECT_EQ(read.views[0].picture.drr_found.pixels, report_.views[0].picture.drr_found.pixels);
   EXPECT_EQ(csv_report(read), csv_report(report_));
@@ -448,7 +451,8 @@ TEST_F(ResultFolderTest, ThePdfIsADicomObjectToo) {
   EXPECT_THAT(checked.out, Not(HasSubstr("Error"))) << checked.out;
   const CommandOutcome read = run_shell(fmt::format(
       "/usr/bin/python3 -c \"import pydicom, sys; d = pydicom.dcmread('{0}/report.dcm'); "
-      "sys.exit(0 if d.EncapsulatedDocument[:d.EncapsulatedDocumentLength] == open('{0}/report.pdf', 'rb').read() and "
+      "sys.exit(0 if d.EncapsulatedDocument[:d.EncapsulatedDocumentLength] == open('{0}/report.pdf', 'rb').read() "
+      "and "
       "[s.ReferencedSOPInstanceUID for s in d.SourceInstanceSequence] == ['1.2.9', '1.2.3.4', '2.25.1'] and "
       "d.StudyInstanceUID == '1.2.3' and d.PatientID == 'ID-1' and d.BurnedInAnnotation == 'YES' else 1)\"",
       folder_.path().string()));
@@ -474,8 +478,9 @@ TEST_F(ResultFolderTest, WhatIsMissingOrSpoiledIsNamed) {
 
 // Opened, slid and seen in a browser.
 TEST_F(ResultFolderTest, ThePageWorksInABrowser) {
-  const CommandOutcome outcome = run_shell(fmt::format("/usr/bin/python3 {}/tests/io/report/html_report_in_browser.py {}",
-                                                       ISOSHIFT_SOURCE_DIR, (folder_ / "report.html").string()));
+  const CommandOutcome outcome =
+      run_shell(fmt::format("/usr/bin/python3 {}/tests/io/report/html_report_in_browser.py {}", ISOSHIFT_SOURCE_DIR,
+                            (folder_ / "report.html").string()));
   EXPECT_EQ(outcome.exit_status, 0) << outcome.out;
 }
 

@@ -22,7 +22,7 @@ class SessionIndexTest : public testing::Test {
  protected:
   void add(const std::string& session, const std::string& acquired, Verdict verdict = Verdict::kAccepted,
            const std::string& obstacle = "") {
-    SetupReport report;
+    SetupResult report;
     report.verdict = verdict;
     report.identity.patient_name = "Doe^Jane";
     report.identity.patient_id = "7";
@@ -53,7 +53,7 @@ TEST_F(SessionIndexTest, ListsWhatWaitsAndTheNewestFirst) {
 }
 
 TEST_F(SessionIndexTest, ShowsTheTimeOfEveryXray) {
-  SetupReport report;
+  SetupResult report;
   report.views = {{.label = "AP", .acquired = "2026-03-01 10:15:00"}, {.label = "LAT", .acquired = ""}};
   index_.add("a", report, "");
   StudyFiles::Image waiting{.label = "", .acquired = "2026-03-01 10:20:10"};

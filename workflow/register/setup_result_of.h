@@ -1,14 +1,14 @@
 #pragma once
-// From a study and what registration found to the report of it.
+// From a study and what registration found to its result.
 
 #include <filesystem>
 #include <optional>
 #include <string>
 
 #include "io/config/site_file.h"
-#include "io/report/setup_report.h"
 #include "io/study/study.h"
 #include "registration/register_views.h"
+#include "setup/setup_result.h"
 #include "workflow/register/registration_setup.h"
 
 namespace isoshift {
@@ -19,11 +19,11 @@ std::optional<SiteFile> named_site(const std::filesystem::path& file);
 // --site FILE and --anatomy NAME: the site's decisions about results of this anatomy ("" for its default); `before`
 // where no file is named, whose anatomy also holds where none is. Throws UsageError for an anatomy the site does not
 // know, and for one without a file.
-std::optional<SetupReport::Site> chosen_site(const std::optional<SiteFile>& file, const std::string& anatomy,
-                                             std::optional<SetupReport::Site> before = std::nullopt);
+std::optional<SiteRules> chosen_site(const std::optional<SiteFile>& file, const std::string& anatomy,
+                                     std::optional<SiteRules> before = std::nullopt);
 
 // All but notes, times of loading and what is written; with the pictures of the views, rendered anew.
-SetupReport setup_report_of(const Study& study, const RegistrationRequest& request, const RegistrationSetup& setup,
-                            const RegistrationResult& result);
+SetupResult setup_result_of(const Study& study, const RegistrationRequest& request, const RegistrationSetup& setup,
+                            RegistrationResult found);
 
 }  // namespace isoshift

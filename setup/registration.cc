@@ -1,0 +1,26 @@
+#include "setup/registration.h"
+
+#include <algorithm>
+#include <numeric>
+
+namespace isoshift {
+
+int ViewConsistency::with_signal() const {
+  return static_cast<int>(std::ranges::count_if(parts, &ViewPart::has_signal));
+}
+
+int ViewConsistency::disagreeing() const {
+  return static_cast<int>(std::ranges::count_if(parts, &ViewPart::disagrees));
+}
+
+void Registration::demote(Verdict to, std::string reason) {
+  verdict = std::max(verdict, to);
+  reasons.push_back(std::move(reason));
+}
+
+int Registration::evaluations() const {
+  return std::accumulate(stages.begin(), stages.end(), 0,
+                         [](int sum, const StageReport& stage) { return sum + stage.evaluations; });
+}
+
+}  // namespace isoshift

@@ -1,0 +1,94 @@
+#pragma once
+// What registration finds, as plain data: registration fills it, reports print it.
+
+#include <Eigen/Geometry>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "setup/verdict.h"
+
+namespace isoshift {
+
+// A square of a view, and where it matches the DRR best within a search distance.
+struct ViewPart {
+  Eigen::Vector2d center_px = Eigen::Vector2d::Zero();  // in the X-ray as acquired
+  double width_px = 0.0;
+  Eigen::Vector2d displacement_mm = Eigen::Vector2d::Zero();  // along columns and rows, at the isocenter
+  double correlation = 0.0;                                   // of X-ray and DRR where the pose puts it
+  double best_correlation = 0.0;                              // where it matches best
+  bool has_signal = false;                                    // it matches clearly somewhere
+  bool disagrees = false;                                     // and that is not where the pose puts it
+};
+
+struct ViewConsistency {
+  std::vector<ViewPart> parts;
+  int with_signal() const;
+  int disagreeing() const;
+};
+
+// How far the pose moves when one view is left out: translation at the isocenter and angle.
+struct LeftOutView {
+  double distance_mm = 0.0;
+  double angle_rad = 0.0;
+};
+
+// Gradient correlation of one view over all that is compared, in pixels twice as large as those of the last stage.
+struct ViewMatch {
+  std::string label;  // of the X-ray
+  double similarity_start = -1.0;
+  double similarity_final = -1.0;
+  bool has_all_left_out = true;         // what was excluded, with the patient at the pose found
+  ViewConsistency consistency;          // of its parts with the pose found
+  std::optional<LeftOutView> left_out;  // with three or more views
+};
+
+// What the images would match like if they were not what they say they are.
+struct Alternative {
+  std::string description;   // "view 1 mirrored"
+  double similarity = 0.0;   // gradient correlation that the search reaches with it,
+  double as_is = 0.0;        // and in the same way with the images as they are
+  double distance_mm = 0.0;  // between the poses found: translation at the isocenter,
+  double angle_rad = 0.0;    // and rotation
+};
+
+// One standard deviation per axis, in the room: of where the isocenter's anatomy lies, and of the rotation vector.
+struct Uncertainty {
+  Eigen::Vector3d translation_mm = Eigen::Vector3d::Zero();
+  Eigen::Vector3d rotation_rad = Eigen::Vector3d::Zero();
+};
+
+struct StageReport {
+  std::string name;
+  std::string similarity;
+  std::string optimizer;
+  std::vector<std::pair<std::string, double>> parameters;  // what the preset says; the names end with the unit
+  int evaluations = 0;
+  double seconds = 0.0;
+  double value = 0.0;  // the similarity reached
+  std::string termination = "not run";
+  bool reached_limit = false;  // the evaluations ran out before the search converged
+  // Between the poses that the starts ended at, where there were several: the largest distance of those that leave not
+  // clearly more unexplained than the best one from that.
+  std::optional<double> spread_mm, spread_rad;
+  std::vector<double> best;  // the similarity reached after each evaluation
+};
+
+struct Registration {
+  Verdict verdict = Verdict::kRejected;
+  std::vector<std::string> reasons = {"not run"};  // why the verdict is not `accepted`
+  std::string renderer, device;                    // what rendered the DRRs
+  Eigen::Isometry3d actual_room_from_patient = Eigen::Isometry3d::Identity();
+  std::vector<Eigen::Vector3d> unobservable_room;  // unit directions along which the views cannot tell
+  std::optional<Uncertainty> uncertainty;          // nothing: the images do not determine the pose
+  std::vector<StageReport> stages;
+  std::vector<Alternative> alternatives;                                    // empty: the preset leaves them out
+  double seconds = 0.0, seconds_rendering = 0.0, seconds_similarity = 0.0;  // in all, and of that in the search
+
+  // Makes the verdict `to`, if that is worse than what it was, and adds the reason.
+  void demote(Verdict to, std::string reason);
+  int evaluations() const;
+};
+
+}  // namespace isoshift

@@ -1,0 +1,97 @@
+#include "setup/shown_shift.h"
+
+#include <cmath>
+
+#include "geometry/patient_setup.h"
+#include "geometry/rotation.h"
+
+namespace isoshift {
+namespace {
+
+// A component is not determined where an unobservable direction enters it by more than this (docs/conventions.md).
+constexpr double kMaxUnobservableShare = 0.05;
+
+std::array<std::optional<double>, 3> determined(const Eigen::Vector3d& vector,
+                                                const std::vector<Eigen::Vector3d>& unobservable) {
+  std::array<std::optional<double>, 3> components;
+  for (int axis = 0; axis < 3; ++axis) {
+    bool known = true;
+    for (const Eigen::Vector3d& direction : unobservable)
+      known = known && std::abs(direction[axis]) <= kMaxUnobservableShare;
+    if (known) components[axis] = vector[axis];
+  }
+  return components;
+}
+
+std::array<double, 3> yaw_pitch_roll_deg(const ZxyAngles& angles) {
+  return {deg_from_rad(angles.z_rad), deg_from_rad(angles.x_rad), deg_from_rad(angles.y_rad)};
+}
+
+std::vector<ShownShift::LeftOver> left_over(const SetupResult& result, const Eigen::Isometry3d& setup_error,
+                                            const CouchShift& shift) {
+  constexpr double kAlongPatientMm = 50.0;
+  std::vector<SetupResult::Point> points = {{.name = "isocenter"}};
+  if (const auto position = patient_position_from(result.patient_position)) {
+    const Eigen::Vector3d superior =
+        planned_room_from_patient(*position, result.table, Eigen::Vector3d::Zero()).linear() * Eigen::Vector3d::UnitZ();
+    points.push_back({"50 mm superior", kAlongPatientMm * superior});
+    points.push_back({"50 mm inferior", -kAlongPatientMm * superior});
+  }
+  points.insert(points.end(), result.points.begin(), result.points.end());
+  std::vector<ShownShift::LeftOver> left;
+  left.reserve(points.size());
+  for (const SetupResult::Point& point : points)
+    left.push_back({point.name, left_over_mm(setup_error, result.table, shift, point.room_mm)});
+  return left;
+}
+
+}  // namespace
+
+Eigen::Isometry3d known_setup_error(Eigen::Isometry3d setup_error,
+                                    const std::vector<Eigen::Vector3d>& unobservable_room) {
+  for (const Eigen::Vector3d& direction : unobservable_room)
+    setup_error.translation() -= direction.dot(setup_error.translation()) * direction;
+  return setup_error;
+}
+
+ShownShift shown_shift(const SetupResult& result) {
+  ShownShift shown;
+  const Eigen::Isometry3d setup_error = known_setup_error(result);
+  const CouchShift shift = couch_shift_for(setup_error, result.table);
+  const ZxyAngles error = zxy_from_rotation(setup_error.linear());
+  shown.setup_error_mm = determined(setup_error.translation(), result.unobservable_room);
+  shown.setup_error_deg = {deg_from_rad(error.x_rad), deg_from_rad(error.y_rad), deg_from_rad(error.z_rad)};
+  if (result.uncertainty) {
+    shown.sigma_mm = determined(result.uncertainty->translation_mm, result.unobservable_room);
+    for (int axis = 0; axis < 3 && !result.translation_only; ++axis)
+      shown.sigma_deg[axis] = deg_from_rad(result.uncertainty->rotation_rad[axis]);
+  }
+  shown.withheld = result.verdict == Verdict::kRejected;
+  std::vector<Eigen::Vector3d> unobservable_table;
+  for (const Eigen::Vector3d& direction : result.unobservable_room)
+    unobservable_table.push_back(rotation_z(-result.table.yaw_rad()) * direction);
+  shown.couch_mm = determined(shift.translation_mm, unobservable_table);
+  shown.couch_deg = yaw_pitch_roll_deg(shift.change);
+  shown.couch_target_deg = yaw_pitch_roll_deg(shift.target);
+  if (result.uncertainty) {
+    // The table's axes are the room's turned about z. Correlations between axes are left out.
+    const Eigen::Matrix3d table_from_room = rotation_z(-result.table.yaw_rad());
+    const Eigen::Vector3d variance =
+        table_from_room.cwiseAbs2() * result.uncertainty->translation_mm.cwiseAbs2().eval();
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      if (shown.couch_mm[axis]) shown.couch_sigma_mm[axis] = std::sqrt(variance[static_cast<Eigen::Index>(axis)]);
+  }
+  const CouchDof dof = result.site ? result.site->couch_dof : CouchDof::kSix;
+  shown.can_rotate = {dof != CouchDof::kThree, dof == CouchDof::kSix, dof == CouchDof::kSix};
+  if (!shown.withheld && result.unobservable_room.empty())
+    shown.left_over = left_over(result, setup_error, applicable(shift, result.table, dof));
+  if (!shown.withheld && result.site && result.site->level)
+    shown.decision = decide_action(
+        *result.site->level, shown.setup_error_mm,
+        result.translation_only ? std::array<std::optional<double>, 3>()
+                                : std::array<std::optional<double>, 3>(
+                                      {shown.setup_error_deg[0], shown.setup_error_deg[1], shown.setup_error_deg[2]}));
+  return shown;
+}
+
+}  // namespace isoshift

@@ -1,0 +1,38 @@
+#pragma once
+// The numbers of a result that people and scripts may see: every format takes them from here.
+
+#include <array>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "setup/action.h"
+#include "setup/setup_result.h"
+
+namespace isoshift {
+
+// What may be shown of the result: components along an unobservable direction are absent, and without a shift
+// (rejected) all of the couch's are.
+struct ShownShift {
+  std::array<std::optional<double>, 3> setup_error_mm;  // x, y, z, IEC 61217 fixed
+  std::array<double, 3> setup_error_deg;                // rx, ry, rz of R = Rz Rx Ry
+  std::array<std::optional<double>, 3> sigma_mm;        // x, y, z; absent where the component is
+  std::array<std::optional<double>, 3> sigma_deg;       // about x, y, z
+  bool withheld = false;                                // the verdict forbids a couch shift
+  std::array<std::optional<double>, 3> couch_mm;        // lateral, longitudinal, vertical
+  std::array<std::optional<double>, 3> couch_sigma_mm;
+  std::array<double, 3> couch_deg;         // yaw, pitch, roll: change of the read-outs
+  std::array<double, 3> couch_target_deg;  // yaw, pitch, roll: resulting read-outs
+  std::array<bool, 3> can_rotate;          // yaw, pitch, roll: whether the site's couch can
+  // What remains when it has applied what it can: at the isocenter, 50 mm from it along the patient, and at the points
+  // of the result. Nothing where a component is not determined.
+  struct LeftOver {
+    std::string at;
+    Eigen::Vector3d mm = Eigen::Vector3d::Zero();  // IEC 61217 fixed
+  };
+  std::vector<LeftOver> left_over;
+  ActionDecision decision;  // by the site's action level
+};
+ShownShift shown_shift(const SetupResult& result);
+
+}  // namespace isoshift

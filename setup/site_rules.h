@@ -1,0 +1,43 @@
+#pragma once
+// What a site decided about its results: from which shift a person must act, what its couch can do, how it counts.
+
+#include <optional>
+#include <string>
+
+#include "setup/couch_scale.h"
+#include "setup/couch_shift.h"
+
+namespace isoshift {
+
+enum class LengthUnit { kMm, kCm };
+
+// From which a person must act. At least one is set.
+struct ActionLevel {
+  std::optional<double> translation_mm;  // along any axis
+  std::optional<double> vector_mm;       // length of the translation
+  std::optional<double> rotation_deg;    // about any axis
+};
+
+// How the couch's display counts, and who compared it with the couch.
+struct ValidatedScale {
+  CouchScale scale = CouchScale::kIec61217;
+  std::string validated_by, validated_on;  // the day as YYYY-MM-DD
+};
+
+// Who allowed that accepted results are released without a person, and when.
+struct AutomaticRelease {
+  std::string by, on;
+};
+
+// What holds for the result of one anatomy.
+struct SiteRules {
+  std::string name, sha256;          // of the site's file
+  std::string anatomy;               // whose action level it is
+  std::optional<ActionLevel> level;  // unset: none
+  CouchDof couch_dof = CouchDof::kSix;
+  std::optional<ValidatedScale> couch_scale;  // shown beside IEC 61217
+  LengthUnit length_unit = LengthUnit::kMm;
+  std::optional<AutomaticRelease> automatic_release;
+};
+
+}  // namespace isoshift
