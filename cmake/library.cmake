@@ -1,5 +1,31 @@
 # isoshift_library(NAME SOURCE...): a static library isoshift_NAME, a box of ARCHITECTURE.md.
+#
+# Headers that most sources include are compiled once for all boxes (bench/results/build-time.md has what that saves).
+# Sources include what they use all the same: with -DISOSHIFT_PCH=OFF, as ./dev lint builds, nothing is precompiled.
+option(ISOSHIFT_PCH "Precompile the headers that most sources include" ON)
+
+set(isoshift_common_headers
+    <algorithm> <array> <chrono> <cmath> <filesystem> <fstream> <functional> <map> <memory> <optional> <set> <span> <string>
+    <string_view> <utility> <vector> <Eigen/Geometry> <fmt/format.h> <fmt/ranges.h> <nlohmann/json.hpp>)
+
+if(ISOSHIFT_PCH)
+  file(WRITE ${PROJECT_BINARY_DIR}/precompiled.cc "")
+  add_library(isoshift_precompiled OBJECT ${PROJECT_BINARY_DIR}/precompiled.cc)
+  target_link_libraries(isoshift_precompiled PUBLIC isoshift_common)
+  target_precompile_headers(isoshift_precompiled PRIVATE ${isoshift_common_headers})
+endif()
+
 function(isoshift_library name)
   add_library(isoshift_${name} STATIC ${ARGN})
   target_link_libraries(isoshift_${name} PUBLIC isoshift_common)
+  if(ISOSHIFT_PCH)
+    target_precompile_headers(isoshift_${name} REUSE_FROM isoshift_precompiled)
+  endif()
+endfunction()
+
+# isoshift_precompile(TARGET HEADER...): for a target with headers of its own beside the common ones.
+function(isoshift_precompile target)
+  if(ISOSHIFT_PCH)
+    target_precompile_headers(${target} PRIVATE ${isoshift_common_headers} ${ARGN})
+  endif()
 endfunction()

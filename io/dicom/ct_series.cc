@@ -155,7 +155,6 @@ std::vector<Slice> read_slices_of(const std::filesystem::path& path) {
   else if (format.frames != 1)
     throw Error(fmt::format("{}: {} is {}, expected 1 for a CT Image", dataset.where(), described(DCM_NumberOfFrames),
                             format.frames));
-  const std::string sha256 = sha256_of_file(path);
   std::vector<Slice> slices;
   for (std::size_t frame = 0; frame < static_cast<std::size_t>(format.frames); ++frame) {
     FrameGeometry geometry{dataset, dataset, dataset, dataset};
@@ -169,7 +168,7 @@ std::vector<Slice> read_slices_of(const std::filesystem::path& path) {
     }
     slices.push_back(slice_at(geometry, dataset, where));
     slices.back().format = format;
-    slices.back().sha256 = sha256;
+    slices.back().sha256 = file.sha256();
     slices.back().hu = hu_from_stored(dataset, geometry.rescale, decode_frame(file, format, static_cast<int>(frame)));
   }
   return slices;

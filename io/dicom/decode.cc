@@ -145,7 +145,7 @@ std::vector<std::int32_t> decode_frame(const DicomFile& file, const PixelFormat&
   std::vector<std::uint8_t> decompressed;
   std::span<const std::uint8_t> bytes;
   if (DcmXfer(dataset.getOriginalXfer()).isEncapsulated()) {
-    decompressed = frame_from_decoder(file.path(), frame, format.bytes_per_frame());
+    decompressed = frame_from_decoder(file, frame, format.bytes_per_frame());
     bytes = decompressed;
   } else {
     bytes = native_frame(dataset, format, frame, file.path().string());

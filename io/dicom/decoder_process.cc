@@ -9,6 +9,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <chrono>
@@ -34,7 +35,8 @@ constexpr rlim_t kMaxMemoryBytes = rlim_t{4} << 30;
 constexpr std::uint64_t kMaxErrorBytes = 4096;
 
 struct Request {
-  std::uint64_t path_bytes = 0;  // the path follows
+  std::uint64_t path_bytes = 0;   // the path follows
+  std::array<char, 64> sha256{};  // of the file's content, hexadecimal
   std::int32_t frame = 0;
 };
 
@@ -119,10 +121,12 @@ class DecoderProcess {
   DecoderProcess(const DecoderProcess&) = delete;
   DecoderProcess& operator=(const DecoderProcess&) = delete;
 
-  std::vector<std::uint8_t> frame(const std::filesystem::path& path, int frame, std::size_t bytes) {
+  std::vector<std::uint8_t> frame(const DicomFile& file, int frame, std::size_t bytes) {
+    const std::filesystem::path& path = file.path();
     const auto until = Clock::now() + kMaxWallTime;
     const std::string name = std::filesystem::absolute(path).string();
-    const Request request{.path_bytes = name.size(), .frame = frame};
+    Request request{.path_bytes = name.size(), .frame = frame};
+    std::ranges::copy(file.sha256(), request.sha256.begin());
     Answer answer;
     is_usable_ = false;  // until all went well
     if (!connection_->send(&request, sizeof request) || !connection_->send(name.data(), name.size()) ||
@@ -205,19 +209,16 @@ IdleDecoders& idle_decoders() {
 // The file that the child read last: frames of one file come one after another.
 class LastFile {
  public:
-  const DicomFile& at(const std::filesystem::path& path) {
-    const std::pair state(std::filesystem::last_write_time(path), std::filesystem::file_size(path));
-    if (!file_ || file_->path() != path || state != state_) {
-      file_.reset();
-      file_ = DicomFile::read(path, DicomFile::Extent::kWhole);
-      state_ = state;
-    }
+  const DicomFile& at(const std::filesystem::path& path, std::string_view sha256) {
+    if (file_ && file_->sha256() == sha256) return *file_;
+    file_.reset();
+    file_ = DicomFile::read(path, DicomFile::Extent::kWhole);
+    if (file_->sha256() != sha256) throw Error(fmt::format("{}: was changed while it was read", path.string()));
     return *file_;
   }
 
  private:
   std::optional<DicomFile> file_;
-  std::pair<std::filesystem::file_time_type, std::uintmax_t> state_;
 };
 
 // Of the child, before it looks at a file. (The address sanitizer needs all addresses there are.)
@@ -244,7 +245,7 @@ void use_decoder(std::filesystem::path program) {
   decoder_program() = std::move(program);
 }
 
-std::vector<std::uint8_t> frame_from_decoder(const std::filesystem::path& path, int frame, std::size_t bytes) {
+std::vector<std::uint8_t> frame_from_decoder(const DicomFile& file, int frame, std::size_t bytes) {
   std::unique_ptr<DecoderProcess> process = idle_decoders().take();
   if (!process) process = std::make_unique<DecoderProcess>();
   struct PutBack {
@@ -253,7 +254,7 @@ std::vector<std::uint8_t> frame_from_decoder(const std::filesystem::path& path, 
       if (process->is_usable()) idle_decoders().put(std::move(process));
     }
   } const put_back{process};
-  return process->frame(path, frame, bytes);
+  return process->frame(file, frame, bytes);
 }
 
 int run_decoder() {
@@ -267,7 +268,7 @@ int run_decoder() {
     std::vector<std::uint8_t> pixels;
     std::string error;
     try {
-      pixels = decompressed_frame(file.at(path), request.frame);
+      pixels = decompressed_frame(file.at(path, {request.sha256.data(), request.sha256.size()}), request.frame);
     } catch (const Error& refused) {
       error = std::string(refused.what()).substr(0, kMaxErrorBytes);
     } catch (const std::exception& failed) {

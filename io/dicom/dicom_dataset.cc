@@ -1,5 +1,6 @@
 #include "io/dicom/dicom_dataset.h"
 
+#include <dcmtk/dcmdata/dcistrmb.h>
 #include <dcmtk/dcmdata/dctk.h>
 #include <fcntl.h>
 #include <fmt/format.h>
@@ -12,8 +13,11 @@
 #include <cstring>
 #include <fstream>
 #include <random>
+#include <sstream>
+#include <utility>
 
 #include "base/error.h"
+#include "base/sha256.h"
 #include "io/dicom/nesting.h"
 
 namespace isoshift {
@@ -228,6 +232,19 @@ void DicomItem::erase(const DcmTagKey& tag) {
   if (item_->tagExists(tag)) check(item_->findAndDeleteElement(tag), where_, described(tag));
 }
 
+namespace {
+
+std::string bytes_of(const std::filesystem::path& path) {
+  std::ifstream stream(path, std::ios::binary);
+  std::ostringstream bytes;
+  bytes << stream.rdbuf();
+  if (!stream || !bytes)
+    throw Error(fmt::format("{}: cannot be read as a DICOM file: {}", path.string(), std::strerror(errno)));
+  return std::move(bytes).str();
+}
+
+}  // namespace
+
 DicomFile::DicomFile() : path_("new DICOM object") {
   configure_dcmtk();
   file_ = std::make_unique<DcmFileFormat>();
@@ -237,13 +254,20 @@ DicomFile& DicomFile::operator=(DicomFile&&) noexcept = default;
 DicomFile::~DicomFile() = default;
 
 DicomFile DicomFile::read(const std::filesystem::path& path, Extent extent) {
+  const std::string bytes = bytes_of(path);
+  check_nesting(bytes, path);
   DicomFile file;
-  check_nesting(path);
   file.path_ = path;
-  const OFCondition loaded = extent == Extent::kWhole
-                                 ? file.file_->loadFile(path.c_str())
-                                 : file.file_->loadFileUntilTag(path.c_str(), EXS_Unknown, EGL_noChange,
-                                                                DCM_MaxReadLength, ERM_autoDetect, DCM_PixelData);
+  if (extent == Extent::kWhole) file.sha256_ = sha256_of(bytes);
+  DcmInputBufferStream stream;
+  stream.setBuffer(bytes.data(), static_cast<offile_off_t>(bytes.size()));
+  stream.setEos();
+  file.file_->transferInit();
+  const OFCondition loaded =
+      extent == Extent::kWhole
+          ? file.file_->read(stream, EXS_Unknown, EGL_noChange, DCM_MaxReadLength)
+          : file.file_->readUntilTag(stream, EXS_Unknown, EGL_noChange, DCM_MaxReadLength, DCM_PixelData);
+  file.file_->transferEnd();
   if (loaded.bad()) throw Error(fmt::format("{}: cannot be read as a DICOM file: {}", path.string(), loaded.text()));
   // Where the character set is unknown to the converter, the bytes stay as they are, together with their set.
   (void)file.file_->getDataset()->convertToUTF8();

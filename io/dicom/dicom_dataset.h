@@ -68,12 +68,14 @@ class DicomFile {
   enum class Extent { kHeader, kWhole };  // kHeader stops before the pixel data
 
   DicomFile();  // a new, empty object
+  // Reads the file once: all that is told of it, its SHA-256 too, is of the same bytes.
   static DicomFile read(const std::filesystem::path& path, Extent extent);
   DicomFile(DicomFile&&) noexcept;
   DicomFile& operator=(DicomFile&&) noexcept;
   ~DicomFile();
 
   const std::filesystem::path& path() const { return path_; }
+  const std::string& sha256() const { return sha256_; }  // of the bytes that were read; of a file that was read whole
   DicomItem dataset() const;
 
   // Explicit little endian, flushed to the disk. The file must not exist.
@@ -82,6 +84,7 @@ class DicomFile {
  private:
   std::unique_ptr<DcmFileFormat> file_;
   std::filesystem::path path_;
+  std::string sha256_;
 };
 
 // Whether the file begins like a DICOM file: 128 bytes, then "DICM" (PS3.10), or, as old exports do, with the first

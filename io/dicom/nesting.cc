@@ -1,12 +1,10 @@
 #include "io/dicom/nesting.h"
 
-#include <dcmtk/dcmdata/dcistrmf.h>
+#include <dcmtk/dcmdata/dcistrmb.h>
 #include <dcmtk/dcmdata/dctk.h>
 #include <fmt/format.h>
 
 #include <cstdint>
-#include <fstream>
-#include <sstream>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -65,8 +63,10 @@ void check_depth(std::string_view bytes, const std::filesystem::path& path) {
 }
 
 // What follows the file meta information, inflated; empty where it is not deflated or DCMTK cannot read it either.
-std::string inflated_dataset(const std::filesystem::path& path) {
-  DcmInputFileStream stream(path.c_str());
+std::string inflated_dataset(std::string_view file, const std::filesystem::path& path) {
+  DcmInputBufferStream stream;
+  stream.setBuffer(file.data(), static_cast<offile_off_t>(file.size()));
+  stream.setEos();
   DcmMetaInfo meta;
   meta.transferInit();
   const bool is_read = meta.read(stream).good();
@@ -88,11 +88,9 @@ std::string inflated_dataset(const std::filesystem::path& path) {
 
 }  // namespace
 
-void check_nesting(const std::filesystem::path& path) {
-  std::ostringstream read;
-  read << std::ifstream(path, std::ios::binary).rdbuf();
-  check_depth(read.view(), path);
-  check_depth(inflated_dataset(path), path);
+void check_nesting(std::string_view bytes, const std::filesystem::path& path) {
+  check_depth(bytes, path);
+  check_depth(inflated_dataset(bytes, path), path);
 }
 
 }  // namespace isoshift

@@ -189,8 +189,8 @@ const std::map<std::string, DcmTagKey, std::less<>> kEquipmentAttributes = {
 
 bool RtImage::is_rt_image() const { return sop_class_uid == UID_RTImageStorage; }
 
-std::vector<RtImage> read_rt_images(const std::filesystem::path& path, Notes& notes) {
-  const DicomFile file = DicomFile::read(path, DicomFile::Extent::kHeader);
+std::vector<RtImage> read_rt_images(const DicomFile& file, Notes& notes) {
+  const std::filesystem::path& path = file.path();
   const DicomItem dataset = file.dataset();
   const PixelFormat format = pixel_format(dataset);
   const Exposures exposures(dataset, format.frames);
@@ -203,6 +203,7 @@ std::vector<RtImage> read_rt_images(const std::filesystem::path& path, Notes& no
     else
       images.push_back(read_frame(path, dataset, format, frame, std::move(of_frame)));
   }
+  for (RtImage& image : images) image.sha256 = file.sha256();
   return images;
 }
 

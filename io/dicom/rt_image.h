@@ -34,7 +34,8 @@ std::string to_string(const PixelIntensity& intensity);
 // lengths in mm.
 struct RtImage {
   std::filesystem::path path;
-  int frame = 0;  // of the file, counted from 0
+  std::string sha256;  // of the file, where it was read whole
+  int frame = 0;       // of the file, counted from 0
   Identity identity;
   std::string sop_class_uid;
   std::string sop_instance_uid;
@@ -80,7 +81,11 @@ extern const std::map<std::string, DcmTagKey, std::less<>> kEquipmentAttributes;
 
 // The frames of a file. Where items of the Exposure Sequence name frames (PS3.3 C.8.8.2.8), one that none names has no
 // geometry: it is left out, with a warning.
-std::vector<RtImage> read_rt_images(const std::filesystem::path& path, Notes& notes);
+std::vector<RtImage> read_rt_images(const DicomFile& file, Notes& notes);
+// The same of a file that is read up to its pixels.
+inline std::vector<RtImage> read_rt_images(const std::filesystem::path& path, Notes& notes) {
+  return read_rt_images(DicomFile::read(path, DicomFile::Extent::kHeader), notes);
+}
 
 // Date and time of acquisition, else of the content.
 void read_acquisition_time(const DicomItem& dataset, RtImage& image);

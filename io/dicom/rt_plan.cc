@@ -38,10 +38,11 @@ RtPlan::Beam read_beam(const DicomItem& beam_item, const DcmTagKey& control_poin
 }  // namespace
 
 RtPlan read_rt_plan(const std::filesystem::path& path) {
-  const DicomFile file = DicomFile::read(path, DicomFile::Extent::kHeader);
+  const DicomFile file = DicomFile::read(path, DicomFile::Extent::kWhole);
   const DicomItem dataset = file.dataset();
   RtPlan plan;
   plan.path = path;
+  plan.sha256 = file.sha256();
   plan.identity = read_identity(dataset);
   plan.sop_class_uid = dataset.required_text(DCM_SOPClassUID);
   plan.sop_instance_uid = dataset.required_text(DCM_SOPInstanceUID);

@@ -24,6 +24,7 @@ struct RtPlan {
   };
 
   std::filesystem::path path;
+  std::string sha256;  // of the file
   Identity identity;
   std::string sop_class_uid;
   std::string sop_instance_uid;

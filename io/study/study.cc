@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <map>
 #include <set>
 #include <tuple>
 
@@ -82,23 +83,43 @@ void check_one_patient_position(const Study& study) {
                               first.patient_position.value_or("missing")));
 }
 
+// The files of the X-rays. Each is read once: header, pixels and SHA-256 are of the same bytes. Of a moving target's
+// many X-rays only the headers are read at first.
+class XrayFiles {
+ public:
+  explicit XrayFiles(bool headers_first) : headers_first_(headers_first) {}
+
+  std::vector<RtImage> images_of(const std::filesystem::path& path, Notes& notes) {
+    return headers_first_ ? read_rt_images(path, notes) : read_rt_images(whole(path), notes);
+  }
+  const DicomFile& whole(const std::filesystem::path& path) {
+    const auto found = files_.find(path);
+    if (found != files_.end()) return found->second;
+    return files_.emplace(path, DicomFile::read(path, DicomFile::Extent::kWhole)).first->second;
+  }
+
+ private:
+  bool headers_first_;
+  std::map<std::filesystem::path, DicomFile> files_;
+};
+
 // Whether two images of one UID show the same from the same place.
-bool is_same_xray(const RtImage& a, const RtImage& b) {
+bool is_same_xray(const RtImage& a, const RtImage& b, XrayFiles& files) {
   const auto geometry = [](const RtImage& image) {
-    return std::tie(image.sad_mm, image.sid_mm, image.gantry_angle_deg, image.table.support_angle_deg,
-                    image.pixel_spacing_mm, image.position_mm, image.orientation, image.receptor_translation_mm,
-                    image.receptor_angle_deg, image.acquisition_time);
+    return std::tie(image.sad_mm, image.sid_mm, image.gantry_angle_deg, image.table, image.pixel_spacing_mm,
+                    image.position_mm, image.orientation, image.receptor_translation_mm, image.receptor_angle_deg,
+                    image.acquisition_time);
   };
   if (geometry(a) != geometry(b)) return false;
-  const auto pixels = [](const RtImage& image) {
-    const DicomFile file = DicomFile::read(image.path, DicomFile::Extent::kWhole);
+  const auto pixels = [&](const RtImage& image) {
+    const DicomFile& file = files.whole(image.path);
     return decode_frame(file, pixel_format(file.dataset()), image.frame);
   };
   return pixels(a) == pixels(b);
 }
 
 // An X-ray that lies there twice is one view (C.12.1: the UID is the instance's own).
-void drop_repeated_images(std::vector<RtImage>& images, Notes& notes) {
+void drop_repeated_images(std::vector<RtImage>& images, XrayFiles& files, Notes& notes) {
   for (auto image = images.begin(); image != images.end();) {
     const auto first = std::find_if(images.begin(), image, [&](const RtImage& other) {
       return other.sop_instance_uid == image->sop_instance_uid && other.frame == image->frame;
@@ -107,7 +128,7 @@ void drop_repeated_images(std::vector<RtImage>& images, Notes& notes) {
       ++image;
       continue;
     }
-    if (!is_same_xray(*first, *image))
+    if (!is_same_xray(*first, *image, files))
       throw Error(fmt::format("{}: has the {} of {}, but shows something else", image->path.string(),
                               described(DCM_SOPInstanceUID), first->path.string()));
     notes.left_aside.push_back(fmt::format("{}: the same X-ray as {}", image->path.string(), first->path.string()));
@@ -191,46 +212,34 @@ void check_isocenter(const Study& study) {
   }
 }
 
-}  // namespace
-
-Study load_study(const StudyRequest& request, Notes& notes, const Progress& progress, CtStore& cts) {
-  NamedParts named = request.parts;
-  named.takes_other_xrays = request.machine.has_value();
-  const StudyParts parts = find_parts(named);
-  Study study;
-  study.machine = request.machine;
-  study.image_files = parts.images;
-  notes.left_aside = parts.left_aside;
-  if (parts.plan) study.plan = read_rt_plan(*parts.plan);
-  if (parts.structures) study.structures = read_rt_structures(*parts.structures);
-  for (const std::filesystem::path& path : parts.images)
-    std::ranges::move(read_rt_images(path, notes), std::back_inserter(study.rt_images));
-  if (study.rt_images.empty()) throw Error("no frame of the X-rays has a geometry");
-  drop_repeated_images(study.rt_images, notes);
-  if (request.one_per_imager) keep_earliest_of_each_imager(study.rt_images);
-  check_labels(request.switches, study.rt_images);
-  for (RtImage& image : study.rt_images) {
+// The X-rays with what a person and a machine profile supply, in order of acquisition.
+std::vector<RtImage> read_images(const std::vector<std::filesystem::path>& paths, const StudyRequest& request,
+                                 XrayFiles& files, Notes& notes) {
+  std::vector<RtImage> images;
+  for (const std::filesystem::path& path : paths)
+    std::ranges::move(files.images_of(path, notes), std::back_inserter(images));
+  if (images.empty()) throw Error("no frame of the X-rays has a geometry");
+  drop_repeated_images(images, files, notes);
+  if (request.one_per_imager) keep_earliest_of_each_imager(images);
+  check_labels(request.switches, images);
+  for (RtImage& image : images) {
     if (request.machine) image = with_machine(image, *request.machine, request.switches, notes);
     image = with_switches(image, request.switches, notes);
   }
-  std::ranges::stable_sort(study.rt_images, {}, [](const RtImage& image) { return acquisition_seconds(image); });
+  std::ranges::stable_sort(images, {}, [](const RtImage& image) { return acquisition_seconds(image); });
+  return images;
+}
 
-  // A patient position that only the plan has.
-  std::vector<RtPlan::Beam> beams;
-  if (study.plan) {
-    beams = imaged_beams(study);
-    const auto planned_position = common_patient_position(*study.plan, beams);
-    for (RtImage& image : study.rt_images)
-      if (!image.patient_position) image.patient_position = planned_position;
-  }
-  std::string refused;
+// What each X-ray must have by itself. What is missing is told together with what is forbidden.
+void check_images(const Study& study, const StudyRequest& request, Notes& notes) {
   std::vector<Finding> findings;
   for (const RtImage& image : study.rt_images)
     std::ranges::move(rt_image_findings(image), std::back_inserter(findings));
+  std::string refused;
   try {
     settle(findings, request.allowed, notes);
   } catch (const Error& error) {
-    refused = error.what();  // said together with all that is missing
+    refused = error.what();
   }
   check_nothing_missing(study.rt_images, refused);
   for (const RtImage& image : study.rt_images)
@@ -241,9 +250,11 @@ Study load_study(const StudyRequest& request, Notes& notes, const Progress& prog
     if (image.is_rt_image() && !image.reported_values_origin)
       notes.warnings.push_back(fmt::format("{}: does not say whether its angles were measured ({} is missing)",
                                            image.label, described(DCM_ReportedValuesOrigin)));
+}
 
-  study.ct = cts.get(parts.ct, request.allowed, notes, progress);
-  findings = patient_findings(study);
+// Whether the parts of the study belong together.
+void check_together(const StudyRequest& request, Study& study, Notes& notes) {
+  std::vector<Finding> findings = patient_findings(study);
   std::ranges::move(plan_findings(study, notes), std::back_inserter(findings));
   std::ranges::move(structure_findings(study, notes), std::back_inserter(findings));
   std::ranges::move(session_findings(study.rt_images, notes), std::back_inserter(findings));
@@ -251,7 +262,10 @@ Study load_study(const StudyRequest& request, Notes& notes, const Progress& prog
   for (const Finding& doubt : not_allowed(session_doubts(study.rt_images, request.max_span_s), request.allowed, notes))
     study.doubts.push_back(fmt::format("{} (--allow {}=REASON)", doubt.message, doubt.key));
   check_one_patient_position(study);
+}
 
+// How the patient was planned to lie: position, table, isocenter. `beams`: those of the plan that were imaged.
+void place_patient(const StudyRequest& request, const std::vector<RtPlan::Beam>& beams, Study& study, Notes& notes) {
   study.patient_position = patient_position_from(study.rt_images.front().patient_position.value()).value();
   study.table = table_angles(study.rt_images, notes);
   if (request.isocenter_patient_mm) {
@@ -280,11 +294,37 @@ Study load_study(const StudyRequest& request, Notes& notes, const Progress& prog
   warn_of_planned_displacement(beams, notes);
   study.planned_room_from_patient =
       planned_room_from_patient(study.patient_position, study.table, study.isocenter_patient_mm);
-  std::optional<DicomFile> file;  // of several frames read once
-  for (const RtImage& image : study.rt_images) {
-    if (!file || file->path() != image.path) file = DicomFile::read(image.path, DicomFile::Extent::kWhole);
-    study.xrays.push_back(read_xray_image(*file, image, xray_view(image, beam_of(image, notes), notes)));
+}
+
+}  // namespace
+
+Study load_study(const StudyRequest& request, Notes& notes, const Progress& progress, CtStore& cts) {
+  NamedParts named = request.parts;
+  named.takes_other_xrays = request.machine.has_value();
+  const StudyParts parts = find_parts(named);
+  notes.left_aside = parts.left_aside;
+  Study study;
+  study.machine = request.machine;
+  study.image_files = parts.images;
+  if (parts.plan) study.plan = read_rt_plan(*parts.plan);
+  if (parts.structures) study.structures = read_rt_structures(*parts.structures);
+  XrayFiles files(request.one_per_imager);
+  study.rt_images = read_images(parts.images, request, files, notes);
+
+  std::vector<RtPlan::Beam> beams;
+  if (study.plan) {
+    beams = imaged_beams(study);
+    const auto planned_position = common_patient_position(*study.plan, beams);
+    for (RtImage& image : study.rt_images)
+      if (!image.patient_position) image.patient_position = planned_position;
   }
+  check_images(study, request, notes);
+  study.ct = cts.get(parts.ct, request.allowed, notes, progress);
+  check_together(request, study, notes);
+  place_patient(request, beams, study, notes);
+  for (const RtImage& image : study.rt_images)
+    study.xrays.push_back(
+        read_xray_image(files.whole(image.path), image, xray_view(image, beam_of(image, notes), notes)));
   check_isocenter(study);
   return study;
 }

@@ -4,7 +4,6 @@
 
 #include "base/error.h"
 #include "base/local_time.h"
-#include "base/sha256.h"
 #include "base/version.h"
 #include "geometry/mask.h"
 #include "geometry/rotation.h"
@@ -92,7 +91,7 @@ SetupResult setup_result_of(const Study& study, const RegistrationRequest& reque
         {.label = study.rt_images[n].label,
          .sop_class_uid = study.rt_images[n].sop_class_uid,
          .sop_instance_uid = study.rt_images[n].sop_instance_uid,
-         .sha256 = sha256_of_file(study.rt_images[n].path),
+         .sha256 = study.rt_images[n].sha256,
          .frame = study.rt_images[n].frame + 1,
          .acquired = acquired(study.rt_images[n]),
          .origin = study.rt_images[n].reported_values_origin.value_or(""),
@@ -121,7 +120,7 @@ SetupResult setup_result_of(const Study& study, const RegistrationRequest& reque
     result.plan_approval = study.plan->approval_status;
     result.plan_uid = study.plan->sop_instance_uid;
     result.plan_class_uid = study.plan->sop_class_uid;
-    result.plan_sha256 = sha256_of_file(study.plan->path);
+    result.plan_sha256 = study.plan->sha256;
   }
   return result;
 }

@@ -125,7 +125,7 @@ class DecoderThatFailsTest : public DecodeTest {
     std::filesystem::permissions(program, std::filesystem::perms::owner_all);
     use_decoder(program);
     try {
-      frame_from_decoder(compressed_, 0, 1);
+      frame_from_decoder(DicomFile::read(compressed_, DicomFile::Extent::kWhole), 0, 1);
     } catch (const Error& error) {
       return error.what();
     }
@@ -134,6 +134,19 @@ class DecoderThatFailsTest : public DecodeTest {
 
   std::filesystem::path compressed_ = compressed_by("dcmcjpls +el");
 };
+
+// What is decoded is what was hashed and whose header was read.
+TEST_F(DecodeTest, AFileThatChangesBeforeItsPixelsAreDecodedIsRefused) {
+  const std::filesystem::path path = compressed_by("dcmcjpls +el");
+  const DicomFile file = DicomFile::read(path, DicomFile::Extent::kWhole);
+  std::fstream(path, std::ios::in | std::ios::out | std::ios::binary).put('x');  // of the preamble
+  try {
+    decode_frame(file, pixel_format(file.dataset()), 0);
+    FAIL() << "decoded";
+  } catch (const Error& error) {
+    EXPECT_THAT(error.what(), testing::HasSubstr("was changed while it was read"));
+  }
+}
 
 TEST_F(DecoderThatFailsTest, OneThatDiesIsAnErrorThatNamesTheFile) {
   EXPECT_THAT(error_with_decoder("kill -SEGV $$"),
