@@ -38,7 +38,7 @@ bool belongs_to(const SessionFiles& session, const StudyFiles::Image& image) {
 std::vector<SessionFiles> sessions_of(const StudyFiles& files, bool other_xrays) {
   std::vector<StudyFiles::Image> images = files.images;
   if (other_xrays) images.insert(images.end(), files.other_xrays.begin(), files.other_xrays.end());
-  std::ranges::stable_sort(images, {}, [](const StudyFiles::Image& image) {
+  std::ranges::sort(images, {}, [](const StudyFiles::Image& image) {
     return std::tuple(image.patient, image.plan_uid, image.at_s, image.file);
   });
   std::set<std::string> seen;

@@ -116,9 +116,15 @@ void drop_repeated_images(std::vector<RtImage>& images, Notes& notes) {
   }
 }
 
+// X-rays of one moment in the order of their files and frames.
+void sort_by_time(std::vector<RtImage>& images) {
+  std::ranges::sort(images, {},
+                    [](const RtImage& image) { return std::tuple(acquisition_seconds(image), image.path, image.frame); });
+}
+
 // Frames of one imager have one label but for the number behind it.
 void keep_earliest_of_each_imager(std::vector<RtImage>& images) {
-  std::ranges::stable_sort(images, {}, &acquisition_seconds);
+  sort_by_time(images);
   std::set<std::string> seen;
   std::erase_if(images, [&](const RtImage& image) { return !seen.insert(imager_label(image)).second; });
   for (RtImage& image : images) image.label = imager_label(image);
@@ -214,7 +220,7 @@ Study load_study(const StudyRequest& request, Notes& notes, const Progress& prog
     if (request.machine) image = with_machine(image, *request.machine, request.switches, notes);
     image = with_switches(image, request.switches, notes);
   }
-  std::ranges::stable_sort(study.rt_images, {}, [](const RtImage& image) { return acquisition_seconds(image); });
+  sort_by_time(study.rt_images);
 
   // A patient position that only the plan has.
   std::vector<RtPlan::Beam> beams;
