@@ -12,20 +12,26 @@ case $release in
 esac
 
 root=
-trap 'rm -rf "$root"' EXIT
+remove_root() {
+  [ -n "$root" ] || return 0
+  umount "$root/proc" 2>/dev/null || true
+  rm -rf --one-file-system "$root"
+}
+trap remove_root EXIT
 fresh_debian() {
-  rm -rf "$root"
+  remove_root
   root=$(mktemp -d /var/tmp/isoshift-root-XXXXXX)
   debootstrap --variant=minbase "$codename" "$root" >"$root.log" 2>&1 || { tail -n 20 "$root.log" >&2; rm "$root.log"; exit 1; }
   rm -f "$root.log"
   cp /etc/resolv.conf "$root/etc/resolv.conf"
+  mount -t proc proc "$root/proc"  # bash in ./dev reads from /dev/fd
 }
-inside() { chroot "$root" env DEBIAN_FRONTEND=noninteractive LC_ALL=C.UTF-8 "$@"; }
+inside() { chroot "$root" env -i PATH="$PATH" HOME=/root DEBIAN_FRONTEND=noninteractive LC_ALL=C.UTF-8 "$@"; }
 
 if [ -z "$package" ]; then
   fresh_debian
   git clone -q . "$root/src"
-  inside sh -c 'cd /src && ./dev demo && apt-get install -y -qq --no-install-recommends dpkg-dev && cd build/demo && cpack'
+  inside bash -c 'cd /src && time ./dev demo && apt-get install -y -qq --no-install-recommends dpkg-dev && cd build/demo && cpack'
   mkdir -p "build/debian-$release"
   cp "$root"/src/build/demo/isoshift_*.deb "build/debian-$release"
   package=$(ls -t "build/debian-$release"/isoshift_*.deb | head -n 1)

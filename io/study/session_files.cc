@@ -132,7 +132,7 @@ std::vector<SessionFiles> sessions_of(const StudyFiles& files, bool other_xrays,
   const auto place_of = [](const StudyFiles::Image& image) {
     return image.at_s ? fs::path() : image.file.parent_path();
   };
-  std::ranges::stable_sort(images, {}, [&](const StudyFiles::Image& image) {
+  std::ranges::sort(images, {}, [&](const StudyFiles::Image& image) {
     return std::tuple(image.patient, image.plan_uid, image.at_s, place_of(image), image.file);
   });
   const auto whose = [&](const StudyFiles::Image& image) {

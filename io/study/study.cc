@@ -136,9 +136,15 @@ void drop_repeated_images(std::vector<RtImage>& images, XrayFiles& files, Notes&
   }
 }
 
+// X-rays of one moment in the order of their files and frames.
+void sort_by_time(std::vector<RtImage>& images) {
+  std::ranges::sort(images, {},
+                    [](const RtImage& image) { return std::tuple(acquisition_seconds(image), image.path, image.frame); });
+}
+
 // Frames of one imager have one label but for the number behind it.
 void keep_earliest_of_each_imager(std::vector<RtImage>& images) {
-  std::ranges::stable_sort(images, {}, &acquisition_seconds);
+  sort_by_time(images);
   std::set<std::string> seen;
   std::erase_if(images, [&](const RtImage& image) { return !seen.insert(imager_label(image)).second; });
   for (RtImage& image : images) image.label = imager_label(image);
@@ -226,7 +232,7 @@ std::vector<RtImage> read_images(const std::vector<std::filesystem::path>& paths
     if (request.machine) image = with_machine(image, *request.machine, request.switches, notes);
     image = with_switches(image, request.switches, notes);
   }
-  std::ranges::stable_sort(images, {}, [](const RtImage& image) { return acquisition_seconds(image); });
+  sort_by_time(images);
   return images;
 }
 

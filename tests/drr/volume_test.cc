@@ -90,7 +90,7 @@ TEST_P(PrecisionTest, CostsWhatTheDocsSay) {
   const auto [kind, precision] = GetParam();
   const Volume<float> ct = phantom_ct();
   const XrayView view = centered_view(35, 96, 3.0);
-  const auto image = [&, kind = kind](VolumePrecision kept) {
+  const auto image = [&](VolumePrecision kept) {
     return rendered(*make_renderer(kind, ct, {}, kBothBeams, {.gl = GlDevice::kSoftware, .precision = kept}), view);
   };
   const double error = relative_error(image(precision), image(VolumePrecision::kF32));

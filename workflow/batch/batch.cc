@@ -4,7 +4,9 @@
 #include <tbb/global_control.h>
 
 #include <algorithm>
+#include <map>
 #include <thread>
+#include <utility>
 
 #include "base/error.h"
 #include "base/graceful_end.h"
@@ -16,7 +18,9 @@ namespace {
 
 // Cases of one CT stay together.
 std::vector<BatchCase> cases_of_shard(const Shard& shard, std::vector<BatchCase> cases) {
-  std::ranges::stable_sort(cases, {}, &BatchCase::ct_key);
+  std::multimap<std::string, BatchCase> by_ct;  // cases of one CT keep their order
+  for (BatchCase& one : cases) by_ct.emplace(one.ct_key(), std::move(one));
+  std::ranges::transform(by_ct, cases.begin(), [](auto& entry) { return std::move(entry.second); });
   const auto begin = [&](int number) {
     return static_cast<std::ptrdiff_t>(cases.size() * static_cast<std::size_t>(number) /
                                        static_cast<std::size_t>(shard.count));

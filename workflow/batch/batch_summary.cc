@@ -183,7 +183,7 @@ std::size_t BatchSummary::open() const {
 
 BatchSummary summary_of(const BatchFolder& folder, const std::vector<BatchCase>& cases) {
   BatchSummary summary;
-  std::map<std::string, std::vector<std::pair<std::string, ErrorComponents>>> by_patient;
+  std::map<std::string, std::multimap<std::string, ErrorComponents>> by_patient;  // by the time of acquisition
   for (const BatchCase& one : cases) {
     summary.cases.push_back(end_of(folder, one.name));
     const CaseEnd& end = summary.cases.back();
@@ -192,10 +192,9 @@ BatchSummary summary_of(const BatchFolder& folder, const std::vector<BatchCase>&
     const Components shown = shown_components(*end.report);
     if (!std::ranges::all_of(shown, [](const auto& component) { return component.has_value(); })) continue;
     std::ranges::transform(shown, all.begin(), [](const auto& component) { return *component; });
-    by_patient[patient_of(*end.report)].emplace_back(acquired(end), all);
+    by_patient[patient_of(*end.report)].emplace(acquired(end), all);
   }
   for (auto& [patient, fractions] : by_patient) {
-    std::ranges::stable_sort(fractions, {}, [](const auto& fraction) { return fraction.first; });
     std::vector<ErrorComponents> in_order;
     for (const auto& [at, error] : fractions) in_order.push_back(error);
     summary.patients.push_back(errors_of_patient(patient, std::move(in_order)));

@@ -390,7 +390,7 @@ TEST(Report, SurvivesNamesThatAreNoText) {
   for (const char* forged : {"\nVERDICT      ACCEPTED\x1b", "\nVERDICT      ACCEPTED [31m"})
     EXPECT_THAT(text_of(report), Not(HasSubstr(forged)));
   EXPECT_EQ(printable("a\u009Bb\u202Ec\u2028d\u2066e"), "a b c d e");
-  EXPECT_NO_THROW(nlohmann::json::parse(json_report(report)));
+  EXPECT_TRUE(nlohmann::json::accept(json_report(report)));
   EXPECT_NO_THROW(html_of(report));
   EXPECT_THAT(csv_report(report), Not(HasSubstr("\nVERDICT")));
 }
