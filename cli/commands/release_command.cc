@@ -38,7 +38,9 @@ void run_release(const std::filesystem::path& file, const std::string& session, 
   if (release.objects.size() == 1) console.out << "the session holds no registration object\n";
   const auto lock = tree.try_lock();
   ConsoleObserver observer(console);
-  if (lock) Deliverer(watch).deliver(std::stop_token(), observer);  // nobody else does
+  SystemClock clock;
+  DicomSender sender;
+  if (lock) Deliverer(watch, sender, clock).deliver(std::stop_token(), observer);  // nobody else does
   if (release.peers.empty()) return;
   if (tree.pending_of(release).empty())
     console.out << "sent\n";
