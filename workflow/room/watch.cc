@@ -206,7 +206,6 @@ void Watch::end_registration() {
     } else {
       tree_.publish(session);
       const Verdict verdict = take_result(session);
-      failures_.erase(session);
       parts_.observer.say(fmt::format("session {}: {}", session, to_string(verdict)));
     }
   } catch (const std::exception& error) {

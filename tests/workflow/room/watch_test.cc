@@ -202,6 +202,14 @@ TEST_F(WatchTest, ADamagedResultHidesNoOtherAndIsNotReplaced) {
   EXPECT_THAT(room_.runs(), ElementsAre(Xrays{"P1", "P2"}, Xrays{"Q1", "Q2"}, Xrays{"P1", "P2"}));
 }
 
+TEST_F(WatchTest, WhatAKilledWatchLeftHalfWrittenIsRemoved) {
+  const std::filesystem::path left = room_.file.results / "sessions" / ".0123456789ab.registering-1";
+  std::filesystem::create_directory(left);
+  write_text(left / kResultFile, "{");
+  room_.start();
+  EXPECT_FALSE(std::filesystem::exists(left));
+}
+
 TEST_F(WatchTest, OneWatchAtATimeWorksOnAResultsTree) {
   FakeSource source(room_.clock);
   try {
