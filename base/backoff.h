@@ -6,24 +6,25 @@
 
 namespace isoshift {
 
+// The caller says what time it is.
 class Backoff {
  public:
-  using Clock = std::chrono::steady_clock;
+  using Time = std::chrono::steady_clock::time_point;
 
   Backoff(std::chrono::seconds first, std::chrono::seconds longest) : first_(first), longest_(longest) {}
 
-  bool is_due() const { return next_ <= Clock::now(); }
+  bool is_due(Time now) const { return next_ <= now; }
 
-  // It failed. How long it now waits: twice as long as before.
-  std::chrono::seconds fail() {
+  // The attempt has failed. Returns the pause until the next attempt: twice the pause before.
+  std::chrono::seconds fail(Time now) {
     length_ = std::clamp(2 * length_, first_, longest_);
-    next_ = Clock::now() + length_;
+    next_ = now + length_;
     return length_;
   }
 
  private:
   std::chrono::seconds first_, longest_, length_{0};
-  Clock::time_point next_;
+  Time next_;
 };
 
 }  // namespace isoshift

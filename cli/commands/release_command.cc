@@ -22,7 +22,7 @@ void run_release(const std::filesystem::path& file, const std::string& session, 
   if (by.find_first_not_of(' ') == std::string::npos) throw UsageError("--by: expected the name of who releases it");
   const WatchFile watch = read_watch_file(file);
   // What another user writes the watch could not read.
-  struct stat of_results {};
+  struct stat of_results{};
   if (::stat(watch.results.c_str(), &of_results) == 0 && of_results.st_uid != ::geteuid())
     throw Error(fmt::format("{}: belongs to another user, who runs isoshift watch: release as that one (sudo -u USER)",
                             watch.results.string()));
@@ -38,7 +38,9 @@ void run_release(const std::filesystem::path& file, const std::string& session, 
   if (release.objects.size() == 1) console.out << "the session holds no registration object\n";
   const auto lock = tree.try_lock();
   ConsoleObserver observer(console);
-  if (lock) Deliverer(watch).deliver(std::stop_token(), observer);  // nobody else does
+  SystemClock clock;
+  DicomSender sender;
+  if (lock) Deliverer(watch, sender, clock).deliver(std::stop_token(), observer);  // nobody else does
   if (release.peers.empty()) return;
   if (tree.pending_of(release).empty())
     console.out << "sent\n";

@@ -35,13 +35,13 @@ auto parsed(const std::string& body, const std::string& url, const char* expecte
 
 }  // namespace
 
-Orthanc::Orthanc(OrthancServer server) : server_(std::move(server)), curl_(curl_easy_init()) {
+RestOrthanc::RestOrthanc(OrthancServer server) : server_(std::move(server)), curl_(curl_easy_init()) {
   if (curl_ == nullptr) throw Error("HTTP is not available");
 }
 
-Orthanc::~Orthanc() { curl_easy_cleanup(curl_); }
+RestOrthanc::~RestOrthanc() { curl_easy_cleanup(curl_); }
 
-Orthanc::Answer Orthanc::get(const std::string& path) const {
+RestOrthanc::Answer RestOrthanc::get(const std::string& path) const {
   Answer answer;
   curl_easy_reset(curl_);
   curl_easy_setopt(curl_, CURLOPT_URL, (server_.url + path).c_str());
@@ -66,7 +66,7 @@ Orthanc::Answer Orthanc::get(const std::string& path) const {
   return answer;
 }
 
-Orthanc::Changes Orthanc::changes_since(std::int64_t last, int limit) const {
+Orthanc::Changes RestOrthanc::changes_since(std::int64_t last, int limit) const {
   const Answer answer = get(fmt::format("/changes?since={}&limit={}", last, limit));
   return parsed(answer.body, server_.url, "a list of changes", [](const nlohmann::json& json) {
     Changes changes{
@@ -79,12 +79,12 @@ Orthanc::Changes Orthanc::changes_since(std::int64_t last, int limit) const {
   });
 }
 
-std::string Orthanc::file_of(const std::string& instance) const {
+std::string RestOrthanc::file_of(const std::string& instance) const {
   Answer answer = get("/instances/" + instance + "/file");
   return answer.status == kNotFound ? "" : std::move(answer.body);
 }
 
-std::vector<std::string> Orthanc::instances_beside(const std::string& instance) const {
+std::vector<std::string> RestOrthanc::instances_beside(const std::string& instance) const {
   const Answer patient = get("/instances/" + instance + "/patient");
   if (patient.status == kNotFound) return {};
   const Answer all = get("/patients/" + parsed(patient.body, server_.url, "a patient", id_of) + "/instances");

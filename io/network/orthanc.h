@@ -1,8 +1,7 @@
 #pragma once
-// An Orthanc server, by its REST interface: which instances have come, and their files.
+// An Orthanc server: which instances have come, and their files. RestOrthanc asks by HTTP; tests answer by themselves.
 
 #include <cstdint>
-#include <memory>
 #include <string>
 #include <vector>
 
@@ -19,10 +18,7 @@ class ServerError : public Error {
 
 class Orthanc {
  public:
-  explicit Orthanc(OrthancServer server);
-  ~Orthanc();
-  Orthanc(const Orthanc&) = delete;
-  Orthanc& operator=(const Orthanc&) = delete;
+  virtual ~Orthanc() = default;
 
   struct Changes {
     std::vector<std::string> instances;  // Orthanc's identifiers of those that are new
@@ -30,15 +26,27 @@ class Orthanc {
     std::int64_t last = 0;               // to ask from next time
     bool done = true;                    // no more for now
   };
-  // Throws ServerError for one that does not answer, Error for one that refuses or answers something else; both name
-  // it.
-  Changes changes_since(std::int64_t last, int limit = 200) const;
+  // All three throw ServerError for a server that does not answer, Error for one that refuses or answers something
+  // else; both name it.
+  virtual Changes changes_since(std::int64_t last, int limit) const = 0;
 
   // The file as it was received; empty for one that has been deleted since.
-  std::string file_of(const std::string& instance) const;
+  virtual std::string file_of(const std::string& instance) const = 0;
 
   // All instances of the patient whose one of them is; none if it has been deleted since.
-  std::vector<std::string> instances_beside(const std::string& instance) const;
+  virtual std::vector<std::string> instances_beside(const std::string& instance) const = 0;
+};
+
+class RestOrthanc : public Orthanc {
+ public:
+  explicit RestOrthanc(OrthancServer server);
+  ~RestOrthanc() override;
+  RestOrthanc(const RestOrthanc&) = delete;
+  RestOrthanc& operator=(const RestOrthanc&) = delete;
+
+  Changes changes_since(std::int64_t last, int limit) const override;
+  std::string file_of(const std::string& instance) const override;
+  std::vector<std::string> instances_beside(const std::string& instance) const override;
 
  private:
   struct Answer {

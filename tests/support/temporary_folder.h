@@ -7,7 +7,7 @@ namespace isoshift {
 
 class TemporaryFolder {
  public:
-  TemporaryFolder();
+  explicit TemporaryFolder(const std::filesystem::path& parent = std::filesystem::temp_directory_path());
   ~TemporaryFolder();
   TemporaryFolder(const TemporaryFolder&) = delete;
   TemporaryFolder& operator=(const TemporaryFolder&) = delete;
@@ -18,5 +18,8 @@ class TemporaryFolder {
  private:
   std::filesystem::path path_;
 };
+
+// A parent in memory, where the system has one: nothing that is written there waits for a disk.
+std::filesystem::path memory_folder();
 
 }  // namespace isoshift

@@ -5,18 +5,16 @@
 #include <algorithm>
 #include <utility>
 
-#include "io/network/dicom_send.h"
-
 namespace isoshift {
 
 bool Deliverer::is_due(const std::string& what) const {
   const auto pause = pauses_.find(what);
-  return pause == pauses_.end() || pause->second.is_due();
+  return pause == pauses_.end() || pause->second.is_due(clock_.now());
 }
 
 std::chrono::seconds Deliverer::put_off(const std::string& what) {
   constexpr std::chrono::seconds kFirst(2), kLongest(300);
-  return pauses_.try_emplace(what, kFirst, kLongest).first->second.fail();
+  return pauses_.try_emplace(what, kFirst, kLongest).first->second.fail(clock_.now());
 }
 
 void Deliverer::refuse(const std::string& session, const std::string& why, Observer& observer) {
@@ -57,7 +55,7 @@ void Deliverer::deliver(const Delivery& delivery, Observer& observer) {
     if (peer == watch_.peers.end()) throw PeerError(fmt::format("peer {}: the watch file does not name it", peer_name));
     const bool may_be_there = tree_.is_in_doubt(delivery);
     tree_.prepare_to_send(delivery);
-    const std::string answer = send_object(file, object.sha256, *peer, may_be_there);
+    const std::string answer = sender_.send(file, object.sha256, *peer, may_be_there);
     tree_.mark_sent(delivery, answer);
     observer.say(fmt::format("session {}: {} sent to {}{}", session, object.file, peer_name,
                              answer.empty() ? "" : ": " + answer));

@@ -9,14 +9,17 @@
 #include "base/backoff.h"
 #include "io/config/watch_file.h"
 #include "workflow/observer.h"
+#include "workflow/room/clock.h"
 #include "workflow/room/results_tree.h"
+#include "workflow/room/sender.h"
 
 namespace isoshift {
 
 // What could not be sent is tried again, after longer and longer times.
 class Deliverer {
  public:
-  explicit Deliverer(const WatchFile& watch) : tree_(watch.results), watch_(watch) {}
+  Deliverer(const WatchFile& watch, Sender& sender, const Clock& clock)
+      : tree_(watch.results), watch_(watch), sender_(sender), clock_(clock) {}
 
   // Tries all that is due, until it is stopped. Only for whoever holds the lock of the tree.
   void deliver(const std::stop_token& stop, Observer& observer);
@@ -30,6 +33,8 @@ class Deliverer {
 
   ResultsTree tree_;
   const WatchFile& watch_;
+  Sender& sender_;
+  const Clock& clock_;
   std::map<std::string, Backoff> pauses_;       // of peers, of objects that a peer refuses, of sessions
   std::map<std::string, std::string> refused_;  // sessions of which nothing is sent, and why
 };

@@ -34,9 +34,9 @@ class OrthancTest : public testing::Test {
                                     folder_.path().string(), port, certificate)},
                        std::chrono::minutes(1));
     wait_for_listener(port);
-    const Orthanc orthanc({.url = fmt::format("https://{}:{}", host, port), .ca = folder_ / "ca.pem"});
+    const RestOrthanc orthanc({.url = fmt::format("https://{}:{}", host, port), .ca = folder_ / "ca.pem"});
     try {
-      (void)orthanc.changes_since(0);
+      (void)orthanc.changes_since(0, 1);
     } catch (const Error& error) {
       return error.what();
     }

@@ -1,4 +1,4 @@
-"""Results that were exchanged, edited or copied, releases that nobody gave, and an audit log that cannot be written: nothing of it leaves.
+"""Results that were exchanged and releases that nobody gave: nothing of it leaves.
 
   watch_and_forgers.py ISOSHIFT WORK
 
@@ -19,7 +19,7 @@ sys.path.insert(0, str(pathlib.Path(__file__).parents[2] / "support"))
 from orthanc_server import free_port
 from room import expect, wait_for
 
-PATIENTS = 4
+PATIENTS = 3
 
 
 class Room:
@@ -57,12 +57,6 @@ class Room:
         return subprocess.run([self.program, "release", session, "--by", "J. Doe", "--watch", self.work / "watch.json"],
                               env=os.environ | environment, capture_output=True, text=True)
 
-    def expect_refused(self, session, reason, what):
-        released, before = self.release(session), len(self.at_peer())
-        expect(released.returncode == 1 and reason in released.stderr, f"{what}: status {released.returncode}, {released.stdout}{released.stderr}")
-        expect(not self.release_file(session).exists(), f"{what}: a release file was written")
-        expect(len(self.at_peer()) == before, f"{what}: the peer received something")
-
     def release_file(self, session):
         return self.results / "released" / f"{session}.json"
 
@@ -77,84 +71,13 @@ def sha256(path):
     return hashlib.sha256(path.read_bytes()).hexdigest()
 
 
-def exchanged_edited_and_added(room, found):
-    """Files of a held session that are not those that were registered."""
-    victim, other = room.session(found["PHANTOM4"]), room.session(found["PHANTOM2"])
-    genuine = (victim / "report.dcm").read_bytes()
-    shutil.copyfile(other / "report.dcm", victim / "report.dcm")
-    room.expect_refused(victim.name, "report.dcm", "another patient's report")
-    (victim / "report.dcm").write_bytes(genuine)
-
-    result = (victim / "result.json").read_text()
-    (victim / "result.json").write_text(result.replace('"lateral_mm"', '"lateral_mm" '))
-    room.expect_refused(victim.name, "result.json", "an edited result")
-    (victim / "result.json").write_text(result)
-
-    (victim / "note.txt").write_text("accepted")
-    room.expect_refused(victim.name, "note.txt", "an added file")
-    (victim / "note.txt").unlink()
-
-    (victim / "report.pdf").rename(room.work / "report.pdf")
-    room.expect_refused(victim.name, "report.pdf", "a file that is missing")
-    (victim / "report.pdf").symlink_to(room.work / "report.pdf")
-    room.expect_refused(victim.name, "report.pdf", "a link")
-    (victim / "report.pdf").unlink()
-    (room.work / "report.pdf").rename(victim / "report.pdf")
-
-    victim.rename(room.work / "aside")
-    other.rename(victim)
-    room.expect_refused(victim.name, "is not what was registered", "two folders that changed their names")
-    victim.rename(other)
-    (room.work / "aside").rename(victim)
-
-
-def copied(room, session):
-    """A folder of a session that was released and sent, under another name."""
-    copy = room.session("0123456789ab")
-    shutil.copytree(room.session(session), copy)
-    room.expect_refused(copy.name, "no record of its registration", "a copied folder")
-    record = room.results / "registered" / f"{session}.json"
-    if record.exists():  # with its record, too
-        (room.results / "registered" / f"{copy.name}.json").write_text(record.read_text().replace(session, copy.name))
-        room.expect_refused(copy.name, "audit.jsonl", "a copied folder with a copied record")
-        (room.results / "registered" / f"{copy.name}.json").unlink()
-    shutil.rmtree(copy)
-
-
 def forged(room, session):
-    """A release file that somebody wrote by hand; watch would send it."""
+    """A release file that somebody wrote by hand, with all that isoshift release would write."""
     folder = room.session(session)
     objects = [{"file": name, "sha256": sha256(folder / name)} for name in ("spatial_registration.dcm", "report.dcm") if (folder / name).exists()]
-    release = {"schema": 1, "session": session, "by": "J. Doe", "user": "root", "on": "2026-03-01T10:00:00+0100", "verdict": "accepted", "objects": objects, "peers": ["record"]}
-    record = room.results / "registered" / f"{session}.json"
-    if record.exists():
-        release["record"] = sha256(record)
-    before = len(room.at_peer())
-    room.release_file(session).write_text(json.dumps(release))
-    copy = room.session("0123456789ab")
-    shutil.copytree(folder, copy)
-    room.start_watch()
-    wait_for(lambda: f"{session}.json" in room.log.read_text() and f"{session}.json" in (room.results / "index.html").read_text(), 20, "the forged release to be told")
-    wait_for(lambda: f"session {copy.name}: there is no record of its registration" in (room.results / "index.html").read_text(), 20, "the copied folder to be told")
-    time.sleep(3)
-    expect(room.log.read_text().count(f"{session}.json") == 1, "the forged release is told more than once")
-    room.end_watch()
-    expect(len(room.at_peer()) == before, "a forged release was sent")
-    expect(all(line.get("session") != session for line in room.audit() if line["event"] in ("released", "sent")), "a forged release entered the audit log")
-    room.release_file(session).unlink()
-    shutil.rmtree(copy)
-
-
-def without_audit_log(room, session):
-    """Tests may run as root: a log that is a folder can be written by nobody."""
-    log = room.results / "audit.jsonl"
-    aside = log.rename(room.work / "audit.jsonl")
-    room.expect_refused(session, "audit.jsonl", "a deleted audit log")
-    log.unlink(missing_ok=True)
-    log.mkdir()
-    room.expect_refused(session, "audit.jsonl", "an audit log that cannot be written")
-    log.rmdir()
-    aside.rename(log)
+    room.release_file(session).write_text(json.dumps({
+        "schema": 1, "session": session, "by": "J. Doe", "user": "root", "on": "2026-03-01T10:00:00+0100", "verdict": "accepted", "objects": objects, "peers": ["record"],
+        "record": sha256(room.results / "registered" / f"{session}.json")}))
 
 
 def main(program, work):
@@ -166,12 +89,16 @@ def main(program, work):
         room.start_watch()
         wait_for(lambda: len(room.by_patient()) == PATIENTS, 180, "all sessions")
         found = room.by_patient()
-        time.sleep(1)
         room.end_watch()
 
-        exchanged_edited_and_added(room, found)
-        without_audit_log(room, found["PHANTOM4"])
-        forged(room, found["PHANTOM3"])
+        # Another patient's report among the files.
+        session, other = found["PHANTOM2"], room.session(found["PHANTOM1"])
+        genuine = (room.session(session) / "report.dcm").read_bytes()
+        shutil.copyfile(other / "report.dcm", room.session(session) / "report.dcm")
+        refused = room.release(session)
+        expect(refused.returncode == 1 and "report.dcm" in refused.stderr, f"another patient's report: status {refused.returncode}, {refused.stdout}{refused.stderr}")
+        expect(not room.release_file(session).exists(), "another patient's report: a release file was written")
+        (room.session(session) / "report.dcm").write_bytes(genuine)
 
         # What nobody touched is released, with the user of the system and of sudo, and sent.
         session = found["PHANTOM1"]
@@ -184,35 +111,21 @@ def main(program, work):
         expect(f"J. Doe (user {user}, sudo of jdoe)" in released.stdout, released.stdout)
         expect(line.get("release") == sha256(room.release_file(session)), "the audit line does not name the release file")
         expect(len(room.at_peer()) == len(list(room.session(session).glob("*.dcm"))), f"the peer received {room.at_peer()}")
-        copied(room, session)
 
-        # Released, and exchanged before it was sent.
-        session = found["PHANTOM4"]
+        # Released while the peer was down, and exchanged before it was sent; and a release that nobody gave.
+        session = found["PHANTOM2"]
         room.peer.kill()
         room.peer.wait()
         released = room.release(session)
         expect(released.returncode == 0 and "not sent yet" in released.stdout, f"release: {released.stdout}{released.stderr}")
-        shutil.copyfile(room.session(found["PHANTOM2"]) / "view1.png", room.session(session) / "view1.png")
-        again = room.release(session)
-        expect(again.returncode == 1 and "has been released by J. Doe (user" in again.stderr, f"released twice: {again.stderr}")
+        shutil.copyfile(other / "view1.png", room.session(session) / "view1.png")
+        forged(room, found["PHANTOM3"])
         room.peer = subprocess.Popen([str(word) for word in room.peer.args])
         before = len(room.at_peer())
         room.start_watch()
-        wait_for(lambda: "view1.png" in room.log.read_text(), 20, "the exchanged picture to be told")
+        wait_for(lambda: "view1.png" in room.log.read_text() and f"{found['PHANTOM3']}.json" in room.log.read_text(), 20, "both to be told")
         time.sleep(3)
-        expect(len(room.at_peer()) == before, "an exchanged result was sent")
-        room.end_watch(signal.SIGTERM)
-
-        # The way out: the X-rays are registered again, and somebody releases that.
-        room.session(session).rename(work / "exchanged")
-        room.start_watch()
-        wait_for(lambda: "PHANTOM4" in room.by_patient(), 60, "the session to be registered again")
-        wait_for(lambda: "releases an earlier registration" in (room.results / "index.html").read_text(), 20, "the index to tell of the earlier release")
-        expect(len(room.at_peer()) == before, "a result was sent with the release of an earlier one")
-        room.release_file(session).unlink()
-        released = room.release(session)
-        expect(released.returncode == 0, f"release: {released.stdout}{released.stderr}")
-        wait_for(lambda: len(room.at_peer()) == before + len(list(room.session(session).glob("*.dcm"))), 30, "the new result at the peer")
+        expect(len(room.at_peer()) == before, "an exchanged or forged result was sent")
         room.end_watch(signal.SIGTERM)
         audit = (room.results / "audit.jsonl").read_text()
         expect("PHANTOM" not in audit and "Phantom" not in audit and "2.25." not in audit, "the audit log names a patient or a UID")

@@ -1,0 +1,221 @@
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <fstream>
+
+#include "base/output_folder.h"
+#include "io/study/session_files.h"
+#include "tests/support/treatment_room.h"
+#include "workflow/room/results_tree.h"
+#include "workflow/room/watch.h"
+
+namespace isoshift {
+namespace {
+
+namespace fs = std::filesystem;
+using namespace std::chrono_literals;
+using testing::Contains;
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+using testing::Not;
+using testing::Pair;
+using testing::SizeIs;
+using testing::UnorderedElementsAre;
+
+// Sessions of patients, each with the X-rays PATIENT1 and PATIENT2.
+class WatchReleases : public testing::Test {
+ protected:
+  void allow_automatic_release() { room_.file.site.automatic_release = {.by = "J. Doe", .on = "2026-03-01"}; }
+  void bring(const std::string& patient) {
+    room_.source.bring(ct_of(patient));
+    room_.source.bring(plan_of(patient));
+    room_.source.bring(xray(patient, patient + "1", "AP", second_of(10, 15)));
+    room_.source.bring(xray(patient, patient + "2", "LAT", second_of(10, 15, 10)));
+  }
+  static std::string session(const std::string& patient) { return session_name({patient + "1", patient + "2"}); }
+  void release(const std::string& patient) {
+    ResultsTree(room_.file.results)
+        .release(session(patient), {.by = "J. Doe", .user = "isoshift", .sudo_user = ""}, room_.file.names_of_peers());
+  }
+  bool is_released(const std::string& patient) const {
+    return ResultsTree(room_.file.results).is_released(session(patient));
+  }
+  auto objects(const std::string& peer, const std::string& patient) const {
+    const std::string key = fmt::format("{} {}/", peer, session(patient));
+    return std::pair(Pair(key + "spatial_registration.dcm", 1), Pair(key + "report.dcm", 1));
+  }
+  // When a peer was tried, after the first time.
+  std::vector<std::chrono::seconds> attempts(const std::string& peer) const {
+    std::vector<Clock::Time> times;
+    for (const FakeSender::Attempt& attempt : room_.sender.attempts())
+      if (attempt.peer == peer) times.push_back(attempt.at);
+    std::vector<std::chrono::seconds> after;
+    for (const Clock::Time time : times)
+      after.push_back(std::chrono::duration_cast<std::chrono::seconds>(time - times.front()));
+    return after;
+  }
+
+  TreatmentRoom room_;
+};
+
+TEST_F(WatchReleases, NothingIsSentBeforeAPersonReleasesIt) {
+  room_.start();
+  bring("P");
+  room_.pass(3600s, 10s);
+  ASSERT_THAT(room_.runs(), SizeIs(1));
+  EXPECT_THAT(room_.sender.attempts(), IsEmpty());
+  EXPECT_THAT(room_.index(), HasSubstr("<td>held</td>"));
+  release("P");
+  room_.pass(10s);
+  const auto [record1, record2] = objects("record", "P");
+  const auto [archive1, archive2] = objects("archive", "P");
+  EXPECT_THAT(room_.sender.stored(), UnorderedElementsAre(record1, record2, archive1, archive2));
+  room_.pass(3600s, 10s);
+  EXPECT_THAT(room_.sender.attempts(), SizeIs(4));
+  EXPECT_THAT(room_.index(), HasSubstr("; sent</td>"));
+}
+
+TEST_F(WatchReleases, OnlyAcceptedResultsAreReleasedWithoutAPerson) {
+  allow_automatic_release();
+  room_.runner.verdict = [](const std::set<std::string>& xrays) {
+    return xrays.contains("P1") ? Verdict::kAccepted : xrays.contains("Q1") ? Verdict::kReview : Verdict::kRejected;
+  };
+  room_.start();
+  for (const char* patient : {"P", "Q", "R"}) bring(patient);
+  room_.pass(60s);
+  ASSERT_THAT(room_.runs(), SizeIs(3));
+  EXPECT_TRUE(is_released("P"));
+  EXPECT_FALSE(is_released("Q"));
+  EXPECT_FALSE(is_released("R"));
+  for (const FakeSender::Attempt& attempt : room_.sender.attempts())
+    EXPECT_THAT(attempt.object, HasSubstr(session("P") + "/"));
+  EXPECT_THAT(room_.sender.stored(), SizeIs(4));
+  EXPECT_THAT(room_.index(), HasSubstr("released by automatic, allowed by J. Doe on 2026-03-01"));
+}
+
+TEST_F(WatchReleases, WhatWasMadeUnderAnotherSiteFileWaitsForAPerson) {
+  allow_automatic_release();
+  room_.runner.site_sha256 = "an earlier site file";
+  room_.start();
+  bring("P");
+  room_.pass(60s);
+  ASSERT_THAT(room_.runs(), SizeIs(1));
+  EXPECT_FALSE(is_released("P"));
+  room_.start();
+  room_.pass(60s);
+  EXPECT_FALSE(is_released("P"));
+  EXPECT_THAT(room_.sender.attempts(), IsEmpty());
+}
+
+TEST_F(WatchReleases, WithoutTheSitesRuleAcceptedResultsAreHeld) {
+  room_.start();
+  bring("P");
+  room_.pass(60s);
+  ASSERT_THAT(room_.runs(), SizeIs(1));
+  // The rule comes later, with another site file.
+  room_.file.site.sha256 = "another site file";
+  allow_automatic_release();
+  room_.start();
+  room_.pass(60s);
+  EXPECT_FALSE(is_released("P"));
+}
+
+TEST_F(WatchReleases, AReleaseThatFailsBlocksNoOther) {
+  allow_automatic_release();
+  room_.start();
+  bring("P");
+  room_.pass(11s);
+  const fs::path held = room_.file.results / "released" / ("." + session("P") + ".json");
+  fs::create_directory(held);  // where the release is written first
+  write_text(held / "x", "");
+  bring("Q");
+  room_.pass(60s);
+  EXPECT_FALSE(is_released("P"));
+  EXPECT_TRUE(is_released("Q"));
+  EXPECT_THAT(room_.index(), HasSubstr("Trouble: releasing: "));
+  fs::remove_all(held);
+  room_.pass(5s);
+  EXPECT_TRUE(is_released("P"));
+  EXPECT_THAT(room_.index(), Not(HasSubstr("Trouble: releasing: ")));
+}
+
+TEST_F(WatchReleases, APeerThatIsDownIsTriedAgainAndKeepsNoOtherWaiting) {
+  room_.start();
+  bring("P");
+  room_.pass(30s);
+  room_.sender.down = {"record"};
+  release("P");
+  room_.pass(1s);
+  EXPECT_THAT(attempts("archive"), ElementsAre(0s, 0s)) << "held up by the peer that is down";
+  room_.pass(1200s);
+  EXPECT_THAT(attempts("record"), ElementsAre(0s, 2s, 6s, 14s, 30s, 62s, 126s, 254s, 510s, 810s, 1110s));
+  EXPECT_THAT(attempts("archive"), SizeIs(2));
+  EXPECT_THAT(room_.sending.lines, Contains(HasSubstr("tried again in 300 s: peer record: no answer")));
+  room_.sender.down.clear();
+  room_.pass(300s);
+  EXPECT_THAT(room_.sender.stored(), SizeIs(4));
+}
+
+TEST_F(WatchReleases, AnObjectWhoseAnswerWasLostIsAskedForBeforeItIsSentAgain) {
+  room_.start();
+  bring("P");
+  room_.pass(30s);
+  int answers_to_lose = 2;
+  room_.sender.loses_answer = [&] { return answers_to_lose-- > 0; };
+  release("P");
+  room_.pass(2s);
+  room_.start();
+  room_.pass(60s);
+  EXPECT_THAT(room_.sender.stored(), SizeIs(4));
+  for (const auto& [object, times] : room_.sender.stored()) EXPECT_EQ(times, 1) << object;
+  EXPECT_THAT(room_.sending.lines, Contains(HasSubstr("sent to record: was there")));
+}
+
+TEST_F(WatchReleases, ForgedAndExchangedResultsAreNotSentAndSaidOnce) {
+  room_.start();
+  bring("P");
+  bring("Q");
+  room_.pass(60s);
+  room_.sender.down = {"record", "archive"};
+  release("P");
+  replace_text(room_.file.results / "sessions" / session("P") / "report.dcm", "another report");
+  write_text(room_.file.results / "released" / (session("Q") + ".json"), R"({"schema": 1})");
+  room_.sender.down.clear();
+  room_.pass(3600s, 10s);
+  EXPECT_THAT(room_.sender.attempts(), IsEmpty());
+  for (const char* patient : {"P", "Q"})
+    EXPECT_EQ(std::ranges::count_if(room_.sending.lines,
+                                    [&](const auto& line) {
+                                      return line.starts_with("warning: session " + session(patient) + ": not sent");
+                                    }),
+              1)
+        << patient;
+  EXPECT_THAT(room_.index(), HasSubstr("audit.jsonl has no line of this release"));
+}
+
+TEST_F(WatchReleases, ASessionThatIsRegisteredAgainNeedsAReleaseOfItsOwn) {
+  room_.start();
+  bring("P");
+  room_.pass(60s);
+  room_.sender.down = {"record", "archive"};
+  release("P");
+  fs::rename(room_.file.results / "sessions" / session("P"), room_.folder / "aside");
+  room_.sender.down.clear();
+  room_.runner.verdict = [](const auto&) { return Verdict::kReview; };
+  room_.start();
+  room_.pass(60s);
+  ASSERT_THAT(room_.runs(), SizeIs(2));
+  EXPECT_THAT(room_.sender.attempts(), IsEmpty());
+  EXPECT_THAT(room_.index(), HasSubstr("releases an earlier registration"));
+  fs::remove(room_.file.results / "released" / (session("P") + ".json"));
+  release("P");
+  room_.pass(300s);
+  EXPECT_THAT(room_.sender.stored(), UnorderedElementsAre(Pair("record " + session("P") + "/report.dcm", 1),
+                                                          Pair("archive " + session("P") + "/report.dcm", 1)));
+}
+
+}  // namespace
+}  // namespace isoshift

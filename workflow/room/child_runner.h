@@ -1,0 +1,32 @@
+#pragma once
+// Registers in a process of its own, so that whatever a registration meets ends that process only.
+
+#include <chrono>
+#include <memory>
+
+#include "base/child_process.h"
+#include "io/config/watch_file.h"
+#include "workflow/room/runner.h"
+
+namespace isoshift {
+
+// isoshift register, with the site file and the flags of a watch file.
+class ChildRunner : public Runner {
+ public:
+  explicit ChildRunner(const WatchFile& watch, std::chrono::milliseconds limit = kLongestRegistration)
+      : watch_(watch), limit_(limit) {}
+
+  void begin(const StudyParts& parts, const std::filesystem::path& folder) override;
+  std::optional<End> end() override;
+  void give_up() override { child_.reset(); }
+
+ private:
+  Failure failure_of(const ChildEnd& end) const;
+
+  const WatchFile& watch_;
+  std::chrono::milliseconds limit_;  // a registration that takes longer hangs
+  std::filesystem::path folder_;
+  std::unique_ptr<Child> child_;
+};
+
+}  // namespace isoshift

@@ -1,0 +1,62 @@
+#pragma once
+// An Orthanc server: its objects are fetched as they come, and kept in a folder of ours until nothing of their patient
+// has come for long.
+
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <set>
+#include <string>
+
+#include "base/backoff.h"
+#include "io/network/orthanc.h"
+#include "workflow/room/patient_files.h"
+
+namespace isoshift {
+
+class OrthancSource : public Source {
+ public:
+  // `server` is at `url`. Goes on from what an earlier run left in the folder `objects`.
+  OrthancSource(const Orthanc& server, std::string url, std::filesystem::path objects, const Clock& clock);
+
+  // Throws ServerError where the server does not answer.
+  void update(Notes& notes) override;
+  const std::map<std::string, Patient>& patients() const override { return files_.patients(); }
+  // Changes that the server has not told. An instance that it does not give counts for a minute: nobody knows whose it
+  // is.
+  bool is_coming(const std::string& patient_id) const override;
+  // The next update asks the server once what else it has of a patient, and again after each object that comes.
+  void ask_for_rest(const std::string& patient_id) override { rest_.emplace(patient_id, Clock::Time()); }
+  void forget_before(std::filesystem::file_time_type time) override;
+
+ private:
+  struct Attempts {
+    int count = 0;
+    Clock::Time since;
+    Backoff again{std::chrono::seconds(1), std::chrono::minutes(10)};
+  };
+  void read_objects(Notes& notes);
+  void check_server(Notes& notes);
+  void fetch(const std::string& instance, Notes& notes);
+  void put_off(const std::string& instance, const Error& error, Notes& notes);
+  void find_rest(const std::string& patient_id, Notes& notes);
+  void save_state();
+  // Returns false if the file cannot be read.
+  bool keep(const std::filesystem::path& object, Notes& notes);
+  std::filesystem::path object_of(const std::string& instance) const;
+
+  const Orthanc& server_;
+  std::string url_;
+  std::filesystem::path objects_;
+  const Clock& clock_;
+  PatientFiles files_;
+  std::int64_t last_change_ = 0;
+  std::string last_mark_;
+  std::map<std::string, Attempts> unfetched_;  // instances
+  std::map<std::string, Clock::Time> rest_;    // patients to be asked for, and when
+  std::set<std::string> useless_;              // instances that are no part of a study
+  bool has_all_changes_ = true, has_read_objects_ = false, has_checked_server_ = false;
+  std::string saved_state_;
+};
+
+}  // namespace isoshift

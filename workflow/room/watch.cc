@@ -1,0 +1,251 @@
+#include "workflow/room/watch.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <regex>
+#include <thread>
+#include <utility>
+
+#include "base/error.h"
+#include "io/report/result_folder.h"
+
+namespace isoshift {
+namespace {
+
+constexpr std::chrono::milliseconds kRound(500);
+constexpr std::chrono::seconds kFirstPause(30), kLongestPause(600);
+constexpr std::chrono::days kKeptFor(60);  // objects of a patient of whom nothing comes any more
+
+FileLock only_watch_of(const ResultsTree& tree) {
+  auto lock = tree.try_lock();
+  if (!lock) throw Error(fmt::format("{}: another isoshift watch is working here", tree.path().string()));
+  return *std::move(lock);
+}
+
+}  // namespace
+
+Watch::Watch(const WatchFile& watch, const Parts& parts)
+    : watch_(watch),
+      parts_(parts),
+      tree_(watch.results),
+      lock_(only_watch_of(tree_)),
+      index_(tree_, watch.site.name),
+      deliverer_(watch, parts.sender, parts.clock),
+      troubles_(parts.observer),
+      sending_troubles_(parts.sending),
+      seen_at_(parts.clock.now()),
+      quiet_from_(seen_at_),
+      next_forgetting_(seen_at_) {
+  tree_.clean();
+  take_results();
+  troubles_.attempt("completing the audit log", [&] { tree_.complete_audit(); });
+  tree_.audit("started", {{"sessions", index_.size()}});
+}
+
+void Watch::round() {
+  troubles_.attempt("receiving", [&] { receive(); });
+  troubles_.attempt("registering", [&] { register_complete(); });
+  troubles_.attempt("releasing", [&] { release_automatically(); });
+  troubles_.attempt("writing the audit log", [&] { tree_.write_kept_audit(); });
+  troubles_.attempt("writing the index", [&] { index_.update(waiting_, troubles_.lines()); });
+}
+
+void Watch::deliver(const std::stop_token& stop) {
+  sending_troubles_.attempt("sending", [&] { deliverer_.deliver(stop, parts_.sending); });
+}
+
+void Watch::run(const std::function<bool()>& is_end_asked_for) {
+  std::jthread sending([this](const std::stop_token& stop) {  // a peer may take its time
+    while (!stop.stop_requested()) {
+      deliver(stop);
+      parts_.clock.wait(kRound);
+    }
+  });
+  while (!is_end_asked_for()) {
+    round();
+    parts_.clock.wait(kRound);
+  }
+  parts_.runner.give_up();
+  sending.request_stop();
+  sending.join();
+  tree_.audit("stopped", nlohmann::ordered_json::object());
+}
+
+// While a server is down nothing is known to be quiet.
+void Watch::receive() {
+  const Clock::Time begin = parts_.clock.now();
+  Notes notes;
+  const auto say_warnings = [&] {
+    for (const std::string& warning : notes.warnings) parts_.observer.say("warning: " + warning);
+  };
+  try {
+    parts_.source.update(notes);
+  } catch (const std::exception&) {
+    say_warnings();
+    quiet_from_ = parts_.clock.now();
+    throw;
+  }
+  say_warnings();
+  seen_at_ = begin;
+  if (parts_.clock.now() < next_forgetting_) return;
+  parts_.source.forget_before(parts_.clock.file_time() - kKeptFor);
+  next_forgetting_ = parts_.clock.now() + std::chrono::days(1);
+}
+
+// A result that cannot be read hides no other.
+void Watch::take_results() {
+  const std::vector<std::string> sessions = tree_.sessions();
+  for (std::size_t n = 0; n < sessions.size(); ++n) {
+    try {
+      take_result(sessions[n]);
+    } catch (const std::exception& error) {
+      parts_.observer.say(fmt::format("warning: session {}: {}", sessions[n], error.what()));
+    }
+    parts_.observer.progress("reading sessions", n + 1, sessions.size());
+  }
+}
+
+Verdict Watch::take_result(const std::string& session) {
+  const SetupResult report = read_report(tree_.session(session));
+  if (report.views.empty()) throw Error(fmt::format("{}: names no views", tree_.session(session).string()));
+  for (const auto& view : report.views) registered_.insert(view.sop_instance_uid);
+  index_.add(session, report, obstacle_to_release(session));
+  // What was made under another site file waits for a person.
+  if (watch_.site.automatic_release && report.verdict == Verdict::kAccepted && report.site &&
+      report.site->sha256 == watch_.site.sha256)
+    accepted_.insert(session);
+  return report.verdict;
+}
+
+// Empty: there is a record of its registration. What the folder holds is checked when it is released.
+std::string Watch::obstacle_to_release(const std::string& session) const {
+  try {
+    (void)tree_.registered(session);
+    return "";
+  } catch (const Error& error) {
+    return error.what();
+  }
+}
+
+// One at a time, those with the newest X-rays first: somebody waits for them.
+void Watch::register_complete() {
+  if (running_) end_registration();
+  const std::vector<Complete> complete = complete_sessions();
+  if (running_ || complete.empty()) return;
+  begin_registration(*std::ranges::min_element(complete, {}, [&](const Complete& one) {
+    return std::pair(failures_.contains(one.session.name), -one.session.images.back().at_s.value_or(0.0));
+  }));
+}
+
+// Those that can be registered now. Lists all that have no result as waiting, with the reason.
+std::vector<Watch::Complete> Watch::complete_sessions() {
+  waiting_.clear();
+  std::vector<Complete> complete;
+  std::set<std::string> found;
+  for (const auto& [patient_id, patient] : parts_.source.patients()) {
+    for (SessionFiles& session : sessions_of(patient.files, parts_.takes_other_xrays, registered_)) {
+      found.insert(session.name);
+      StudyFiles own = files_for(session, patient.files);
+      const bool is_running = running_ && running_->session == session.name;
+      std::string why = is_running ? "is being registered" : reason_to_wait(session, own, patient_id, patient.last);
+      const bool is_complete = why.empty();
+      if (is_complete) why = "has its turn soon";
+      waiting_.push_back({.name = session.name,
+                          .patient_id = patient_id,
+                          .acquired = times_of(session.images),
+                          .why = std::move(why),
+                          .has_failed = failures_.contains(session.name)});
+      if (is_complete) complete.push_back({std::move(session), std::move(own), patient.last});
+    }
+  }
+  std::erase_if(failures_, [&](const auto& failure) { return !found.contains(failure.first); });
+  return complete;
+}
+
+// Empty: it can be registered now.
+std::string Watch::reason_to_wait(const SessionFiles& session, const StudyFiles& own, const std::string& patient_id,
+                                  Clock::Time last) {
+  const SiteFile::Sessions& rule = *watch_.site.sessions;
+  if (static_cast<int>(session.images.size()) < rule.views)
+    return fmt::format("{} of {} X-rays{}{}", session.images.size(), rule.views, session.remarks.empty() ? "" : "; ",
+                       fmt::join(session.remarks, "; "));
+  if (const auto missing = missing_parts(own); !missing.empty()) {
+    parts_.source.ask_for_rest(patient_id);
+    return "waits for " + missing.front();
+  }
+  const std::chrono::duration<double> quiet = seen_at_ - std::max(last, quiet_from_);
+  if (parts_.source.is_coming(patient_id) || quiet.count() < rule.quiet_s) return "more may come";
+  const auto failure = failures_.find(session.name);
+  if (failure == failures_.end() || last != failure->second.news) return "";
+  const auto& [why, news, again] = failure->second;
+  return again && again->is_due(parts_.clock.now()) ? "" : why;
+}
+
+void Watch::begin_registration(const Complete& complete) {
+  const std::string& session = complete.session.name;
+  for (const std::string& remark : complete.session.remarks)
+    parts_.observer.say(fmt::format("session {}: {}", session, remark));
+  try {
+    tree_.check_is_new(session);
+    parts_.runner.begin(choose_parts(complete.files), tree_.registering(session));
+    running_ = Running{.session = session, .news = complete.last};
+  } catch (const std::exception& error) {
+    fail(session, complete.last, {.why = error.what()});
+  }
+}
+
+void Watch::end_registration() {
+  const std::optional<Runner::End> end = parts_.runner.end();
+  if (!end) return;
+  const auto [session, news] = *std::exchange(running_, std::nullopt);
+  try {
+    if (end->failure) {
+      fail(session, news, *end->failure);
+    } else {
+      tree_.publish(session);
+      const Verdict verdict = take_result(session);
+      parts_.observer.say(fmt::format("session {}: {}", session, to_string(verdict)));
+    }
+  } catch (const std::exception& error) {
+    fail(session, news, {.why = error.what()});
+  }
+  tree_.clean();
+}
+
+void Watch::fail(const std::string& session, Clock::Time news, const Runner::Failure& failed) {
+  static const std::regex staging("[.]partial-[A-Za-z0-9]+");  // another name every time
+  const std::string why = std::regex_replace(failed.why, staging, "");
+  Failure& failure = failures_[session];
+  const bool is_new = std::exchange(failure.why, why) != why;
+  if (is_new || !failed.may_be_over_soon) failure.again.reset();
+  if (!failure.again && failed.may_be_over_soon) failure.again.emplace(kFirstPause, kLongestPause);
+  if (failure.again) failure.again->fail(parts_.clock.now());
+  failure.news = news;
+  if (!is_new) return;
+  parts_.observer.say(fmt::format("session {}: {}", session, why));
+  tree_.audit("failed", {{"session", session}});
+}
+
+// A release that fails must not block the others.
+void Watch::release_automatically() {
+  std::string trouble;
+  for (const std::string& session : std::set(accepted_)) {
+    try {
+      if (!tree_.is_released(session))
+        tree_.release(session,
+                      {.by = fmt::format("automatic, allowed by {} on {}", watch_.site.automatic_release->by,
+                                         watch_.site.automatic_release->on),
+                       .user = user_.name,
+                       .sudo_user = user_.sudo_user},
+                      watch_.names_of_peers());
+      accepted_.erase(session);
+    } catch (const std::exception& error) {
+      trouble = error.what();
+    }
+  }
+  if (!trouble.empty()) throw Error(trouble);
+}
+
+}  // namespace isoshift
