@@ -46,8 +46,9 @@ RegisterOptions checked_registration_flags(const WatchFile& watch) {
   return options;
 }
 
+// `server`: of the watch file; null where it follows a folder.
 std::unique_ptr<Source> source_of(const WatchFile& watch, const Orthanc* server, const Clock& clock) {
-  if (server == nullptr) return std::make_unique<FolderSource>(watch.folder, clock);
+  if (!watch.orthanc) return std::make_unique<FolderSource>(watch.folder, clock);
   return std::make_unique<OrthancSource>(*server, watch.orthanc->url, watch.results / "objects", clock);
 }
 
