@@ -26,12 +26,12 @@ fresh_debian() {
   cp /etc/resolv.conf "$root/etc/resolv.conf"
   mount -t proc proc "$root/proc"  # bash in ./dev reads from /dev/fd
 }
-inside() { chroot "$root" env -i PATH="$PATH" HOME=/root DEBIAN_FRONTEND=noninteractive LC_ALL=C.UTF-8 "$@"; }
+inside() { chroot "$root" env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin HOME=/root DEBIAN_FRONTEND=noninteractive LC_ALL=C.UTF-8 "$@"; }
 
 if [ -z "$package" ]; then
   fresh_debian
   git clone -q . "$root/src"
-  inside bash -c 'cd /src && time ./dev demo && apt-get install -y -qq --no-install-recommends dpkg-dev && cd build/demo && cpack'
+  inside bash -c 'cd /src && time ./dev demo && apt-get install -y -qq --no-install-recommends dpkg-dev file && cd build/demo && cpack'
   mkdir -p "build/debian-$release"
   cp "$root"/src/build/demo/isoshift_*.deb "build/debian-$release"
   package=$(ls -t "build/debian-$release"/isoshift_*.deb | head -n 1)
