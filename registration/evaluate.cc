@@ -91,7 +91,7 @@ double median_of(std::vector<double> values) {
 }
 
 template <class Value>
-std::vector<double> values_of(std::span<const EvaluatedRun> runs, Value EvaluatedRun::*field) {
+std::vector<double> values_of(std::span<const EvaluatedRun> runs, Value EvaluatedRun::* field) {
   std::vector<double> values;
   for (const EvaluatedRun& run : runs) values.push_back(static_cast<double>(run.*field));
   return values;

@@ -64,8 +64,17 @@ std::optional<PlannedSetup> planned_setup(const CheckOptions& options) {
   if (!options.patient_position.empty()) position = options.patient_position;
   if (!options.plan.empty()) {
     setup.plan = read_rt_plan(options.plan);
-    if (!isocenter) isocenter = common_isocenter(*setup.plan, setup.plan->beams);
-    if (!position) position = common_patient_position(*setup.plan, setup.plan->beams);
+    const Eigen::Vector3d planned_mm = common_isocenter(*setup.plan, setup.plan->beams);
+    const auto planned_position = common_patient_position(*setup.plan, setup.plan->beams);
+    constexpr double kSamePlaceMm = 0.01;
+    if (isocenter && (*isocenter - planned_mm).norm() > kSamePlaceMm)
+      throw UsageError(fmt::format("--isocenter ({:.3f}) contradicts the plan, whose isocenter is ({:.3f}): give one",
+                                   fmt::join(*isocenter, ", "), fmt::join(planned_mm, ", ")));
+    if (position && planned_position && *position != *planned_position)
+      throw UsageError(fmt::format("--patient-position {} contradicts the plan, which says {}: give one", *position,
+                                   *planned_position));
+    isocenter = planned_mm;
+    if (!position) position = planned_position;
   }
   if (!isocenter && !position) return std::nullopt;
   if (!isocenter) throw UsageError("the shift needs the planned isocenter: --plan FILE or --isocenter X,Y,Z");

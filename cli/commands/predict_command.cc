@@ -43,7 +43,7 @@ struct Scores {
     return all[(trace * kinds.size() + method) * latencies_ms.size() + latency];
   }
   // Over the traces.
-  double mean(double PredictionScore::*figure, std::size_t method, std::size_t latency) const {
+  double mean(double PredictionScore::* figure, std::size_t method, std::size_t latency) const {
     double sum = 0.0;
     for (std::size_t trace = 0; trace < names.size(); ++trace) sum += at(trace, method, latency).*figure;
     return sum / static_cast<double>(names.size());

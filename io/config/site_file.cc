@@ -40,8 +40,8 @@ ValidatedScale scale_from(JsonSection section) {
   const auto scale = couch_scale_from(section.required<std::string>("name", kExpected));
   if (!scale) section.refuse("name", kExpected);
   ValidatedScale result{.scale = *scale,
-                         .validated_by = required_text(section, "validated_by", "who compared it with the couch"),
-                         .validated_on = required_day(section, "validated_on")};
+                        .validated_by = required_text(section, "validated_by", "who compared it with the couch"),
+                        .validated_on = required_day(section, "validated_on")};
   section.end();
   return result;
 }

@@ -5,7 +5,7 @@ namespace {
 
 struct Attribute {
   DcmTagKey tag;
-  std::string Identity::*member;
+  std::string Identity::* member;
 };
 
 const Attribute kAttributes[] = {

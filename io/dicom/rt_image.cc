@@ -89,12 +89,15 @@ void replace(std::optional<T>& value, const T& by, const std::string& what, cons
   value = by;
 }
 
-// Cine module (PS3.3 C.7.6.5): increments in ms, one for all frames or one for each, the first 0.
-double frame_offset_s(const DicomItem& d, int frame) {
+// Cine module (PS3.3 C.7.6.5): increments in ms, one for all frames or one for each, the first 0. Nothing where the
+// file does not say when a later frame was taken.
+std::optional<double> frame_offset_s(const DicomItem& d, int frame) {
   const std::vector<double> increments_ms = d.numbers(DCM_FrameTimeVector);
   if (static_cast<int>(increments_ms.size()) > frame)
     return std::accumulate(increments_ms.begin(), increments_ms.begin() + frame + 1, 0.0) / 1000.0;
-  return frame * d.number(DCM_FrameTime).value_or(0.0) / 1000.0;
+  if (frame == 0) return 0.0;
+  const auto increment_ms = d.number(DCM_FrameTime);
+  return increment_ms ? std::optional(frame * *increment_ms / 1000.0) : std::nullopt;
 }
 
 RtImage read_frame(const std::filesystem::path& path, const DicomItem& d, const PixelFormat& format, int frame,
@@ -117,7 +120,9 @@ RtImage read_frame(const std::filesystem::path& path, const DicomItem& d, const 
     image.plan_sop_instance_uid = plan.text(DCM_ReferencedSOPInstanceUID);
   if (const auto number = d.number(DCM_ReferencedBeamNumber)) image.beam_number = static_cast<int>(*number);
   read_acquisition_time(d, image);
-  image.frame_offset_s = frame_offset_s(d, frame);
+  const std::optional<double> offset_s = frame_offset_s(d, frame);
+  image.frame_offset_s = offset_s.value_or(0.0);
+  image.has_own_time = offset_s.has_value();
   image.kvp = attributes.number(DCM_KVP);
 
   image.plane = d.text(DCM_RTImagePlane);
@@ -206,43 +211,6 @@ std::vector<RtImage> read_rt_images(const DicomFile& file, Notes& notes) {
   for (RtImage& image : images) image.sha256 = file.sha256();
   return images;
 }
-
-void read_acquisition_time(const DicomItem& dataset, RtImage& image) {
-  image.acquisition_date = dataset.text(DCM_AcquisitionDate);
-  if (!image.acquisition_date) image.acquisition_date = dataset.text(DCM_ContentDate);
-  image.acquisition_time = dataset.text(DCM_AcquisitionTime);
-  if (!image.acquisition_time) image.acquisition_time = dataset.text(DCM_ContentTime);
-}
-
-std::optional<double> acquisition_seconds(const RtImage& image) {
-  if (!image.acquisition_date || !image.acquisition_time) return std::nullopt;
-  const auto digits = [](std::string_view text, std::size_t begin, std::size_t count) -> std::optional<int> {
-    int value = 0;
-    if (text.size() < begin + count) return std::nullopt;
-    const auto [end, error] = std::from_chars(text.data() + begin, text.data() + begin + count, value);
-    return error == std::errc() && end == text.data() + begin + count ? std::optional(value) : std::nullopt;
-  };
-  const std::string_view at = *image.acquisition_time;
-  const auto year = digits(*image.acquisition_date, 0, 4), month = digits(*image.acquisition_date, 4, 2),
-             day = digits(*image.acquisition_date, 6, 2), hour = digits(at, 0, 2);
-  if (!year || !month || !day || !hour) return std::nullopt;
-  const std::chrono::year_month_day date(std::chrono::year(*year), std::chrono::month(static_cast<unsigned>(*month)),
-                                         std::chrono::day(static_cast<unsigned>(*day)));
-  const double days = static_cast<double>(std::chrono::sys_days(date).time_since_epoch().count());
-  double fraction = 0.0;
-  if (at.size() > 7 && at[6] == '.') std::from_chars(at.data() + 6, at.data() + at.size(), fraction);
-  return ((days * 24 + *hour) * 60 + digits(at, 2, 2).value_or(0)) * 60 + digits(at, 4, 2).value_or(0) + fraction +
-         image.frame_offset_s;
-}
-
-std::string acquired(const RtImage& image) {
-  const std::string date = image.acquisition_date.value_or(""), time = image.acquisition_time.value_or("");
-  if (date.size() != 8 || time.size() < 4) return "";
-  return fmt::format("{}-{}-{} {}:{}{}", date.substr(0, 4), date.substr(4, 2), date.substr(6, 2), time.substr(0, 2),
-                     time.substr(2, 2), time.size() >= 6 ? ":" + time.substr(4, 2) : "");
-}
-
-std::string imager_label(const RtImage& image) { return image.label.substr(0, image.label.rfind('#')); }
 
 RtImage with_switches(RtImage image, const RtImageSwitches& switches, Notes& notes, const std::string& origin) {
   const auto by = [&](const std::string& flag) { return origin.empty() ? flag : origin + ", as by " + flag; };
@@ -357,7 +325,7 @@ Beam beam_of(const RtImage& image, Notes& notes) {
 }
 
 TableAngles table_angles(std::span<const RtImage> images, Notes& notes) {
-  const auto first_deg = [&](const std::optional<double> TableReadOuts::*angle_deg) -> std::optional<double> {
+  const auto first_deg = [&](const std::optional<double> TableReadOuts::* angle_deg) -> std::optional<double> {
     const auto says =
         std::ranges::find_if(images, [&](const RtImage& image) { return (image.table.*angle_deg).has_value(); });
     return says == images.end() ? std::nullopt : says->table.*angle_deg;

@@ -50,6 +50,7 @@ struct RtImage {
   std::optional<std::string> acquisition_date;
   std::optional<std::string> acquisition_time;  // AcquisitionTime, else ContentTime
   double frame_offset_s = 0.0;                  // of a later frame, from the first one
+  bool has_own_time = true;                     // false: a later frame of a file that does not say when it was taken
   std::optional<double> kvp;
 
   std::optional<std::string> plane;

@@ -28,7 +28,7 @@ TableReadOuts read_table_read_outs(const std::function<std::optional<double>(con
 
 // A read-out with its attribute, for whoever goes through all of them.
 struct TableReadOut {
-  std::optional<double> TableReadOuts::*value;
+  std::optional<double> TableReadOuts::* value;
   DcmTagKey tag;
   bool is_angle;
 };

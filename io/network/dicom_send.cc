@@ -2,10 +2,13 @@
 
 #include <dcmtk/config/osconfig.h>
 // After osconfig.h.
+#include <dcmtk/dcmdata/dcistrmb.h>
 #include <dcmtk/dcmdata/dctk.h>
 #include <dcmtk/dcmnet/scu.h>
 #include <fmt/format.h>
 
+#include <fstream>
+#include <iterator>
 #include <optional>
 
 #include "base/sha256.h"
@@ -103,12 +106,19 @@ std::string send_object(const std::filesystem::path& file, const std::string& sh
   const DicomFile object = DicomFile::read(file, DicomFile::Extent::kHeader);
   if (may_be_there && is_listed(object.dataset(), peer)) return "was there, from an earlier attempt";
   Association association(peer, object.dataset().required_text(DCM_SOPClassUID).c_str());
-  // What is sent is what was read before the hash was taken: a peer may have taken its time until here.
-  DcmFileFormat whole;
-  if (const OFCondition loaded = whole.loadFile(file.c_str()); loaded.bad())
-    throw Error(fmt::format("{}: cannot be read: {}", file.string(), loaded.text()));
-  if (const std::string found = sha256_of_file(file); found != sha256)
+  // The file is read once, into memory: what is sent is what was hashed, however long a peer takes.
+  std::ifstream stream(file, std::ios::binary);
+  const std::string bytes{std::istreambuf_iterator<char>(stream), {}};
+  if (const std::string found = sha256_of(bytes); found != sha256)
     throw Error(fmt::format("{}: was changed: its SHA-256 is {}, expected {}", file.string(), found, sha256));
+  DcmInputBufferStream buffer;
+  buffer.setBuffer(bytes.data(), static_cast<offile_off_t>(bytes.size()));
+  buffer.setEos();
+  DcmFileFormat whole;
+  whole.transferInit();
+  if (const OFCondition loaded = whole.read(buffer); loaded.bad())
+    throw Error(fmt::format("{}: cannot be read: {}", file.string(), loaded.text()));
+  whole.transferEnd();
   Uint16 status = 0xFFFF;
   association.check(association.scu().sendSTORERequest(association.context(), "", whole.getDataset(), status),
                     "the object was not sent whole");

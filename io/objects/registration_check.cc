@@ -91,8 +91,10 @@ class Checker {
         error(
             "item 1: is not the registered frame with an exact identity. Readers that take the second item for the "
             "result, or pair items with series by their order, take the wrong one");
-      if (!is_identity && frame == result_.registered_frame_uid)
+      if (!is_identity && frame == result_.registered_frame_uid) {
         error(fmt::format("{}: moves the registered frame against itself", name));
+        means_one_matrix_ = false;
+      }
       if (is_identity) continue;
       ++others;
       result_.registered_from_source = matrix;
@@ -101,8 +103,14 @@ class Checker {
     }
     if (others > 1) {
       error(fmt::format("{} items are not the identity. SlicerRT multiplies all matrices of a file", others));
-      result_.registered_from_source.reset();
+      means_one_matrix_ = false;
     }
+    if (result_.registered_frame_uid == kIecFixedFrameUid) {
+      error(
+          "dataset: registers the room (IEC 61217 Fixed), which is no CT's frame: the matrix takes the CT to the room");
+      means_one_matrix_ = false;
+    }
+    if (!means_one_matrix_) result_.registered_from_source.reset();
     if (result_.source_frame_uid == kIecFixedFrameUid)
       note(
           "begins in the room's axes (IEC 61217 Fixed): to be chained only with registrations of the same patient "
@@ -129,6 +137,7 @@ class Checker {
   // Its one matrix; composed, the first one applied first (C.20.2.1.1), where there are more.
   std::optional<Eigen::Affine3d> matrix_of(const DicomItem& item, const std::string& name) {
     const std::vector<DicomItem> registrations = item.items(DCM_MatrixRegistrationSequence);
+    means_one_matrix_ = means_one_matrix_ && registrations.size() == 1;
     if (registrations.size() != 1)
       error(fmt::format("{}: {} has {} items, expected 1", name, described(DCM_MatrixRegistrationSequence),
                         registrations.size()));
@@ -136,6 +145,7 @@ class Checker {
     check_code(registrations.front(), name);
     const std::vector<DicomItem> matrices = registrations.front().items(DCM_MatrixSequence);
     if (matrices.empty()) error(fmt::format("{}: {} has no item", name, described(DCM_MatrixSequence)));
+    means_one_matrix_ = means_one_matrix_ && matrices.size() <= 1;
     if (matrices.size() > 1)
       error(fmt::format("{}: {} has {} items. The first one is applied first; SlicerRT multiplies them the other way",
                         name, described(DCM_MatrixSequence), matrices.size()));
@@ -234,6 +244,7 @@ class Checker {
 
   DicomItem dataset_;
   CheckedRegistration result_;
+  bool means_one_matrix_ = true;  // else programs disagree about what the object means
 };
 
 }  // namespace

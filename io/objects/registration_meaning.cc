@@ -21,7 +21,7 @@ bool is_from_room(const CheckedRegistration& checked) { return checked.source_fr
 std::optional<std::string> why_it_begins_at_isocenter(const CheckedRegistration& checked) {
   if (is_from_room(checked))
     return "its source frame is IEC 61217 Fixed, which begins at the machine's isocenter by definition";
-  if (checked.is_by_isoshift && !checked.source_is_that_of_images)
+  if (checked.is_by_isoshift && !checked.source_is_that_of_images && !checked.source_frame_uid.empty())
     return "isoshift wrote it, and its treatment frame begins at the machine's isocenter";
   return std::nullopt;
 }
@@ -89,7 +89,9 @@ bool plan_fits(CheckedRegistration& checked, const RtPlan& plan) {
 bool begins_near_isocenter(CheckedRegistration& checked, const Eigen::Isometry3d& matrix,
                            const Eigen::Isometry3d& inverse, const Eigen::Vector3d& isocenter_patient_mm) {
   const auto off_mm = [&](const Eigen::Isometry3d& pose) { return (pose.translation() - isocenter_patient_mm).norm(); };
-  if (off_mm(matrix) < kMaxSetupErrorMm) return true;
+  constexpr double kFarMm = 20.0, kMuchNearer = 0.25;
+  const bool looks_inverted = off_mm(matrix) > kFarMm && off_mm(inverse) < kMuchNearer * off_mm(matrix);
+  if (off_mm(matrix) < kMaxSetupErrorMm && !looks_inverted) return true;
   checked.error(fmt::format(
       "the couch shift is not known: its origin lies {:.0f} mm from the planned isocenter: {}", off_mm(matrix),
       off_mm(inverse) < kMaxSetupErrorMm

@@ -27,12 +27,57 @@ std::optional<Finding> table_finding(const TableReadOut& read_out, const RtImage
                                             reference.path.string(), described(read_out.tag))};
 }
 
-// Whether both show the same view: one label, and one gantry angle as far as both have it.
+constexpr const char* kNoReadOuts = "without table read-outs in all views nobody knows whether the table moved";
+
+// Whether both show the same view: from one gantry angle, or, where one of them has none, under one label.
 bool is_retake(const RtImage& image, const RtImage& earlier) {
   constexpr double kSameAngleRad = rad_from_deg(1.0);
-  if (image.label != earlier.label) return false;
-  if (!image.gantry_angle_deg || !earlier.gantry_angle_deg) return true;
+  if (!image.gantry_angle_deg || !earlier.gantry_angle_deg) return image.label == earlier.label;
   return std::abs(wrapped_rad(rad_from_deg(*image.gantry_angle_deg - *earlier.gantry_angle_deg))) < kSameAngleRad;
+}
+
+// Views of two machines, and table angles that only some views have: taken for all of them, these may be another setup.
+std::vector<Finding> setting_doubts(std::span<const RtImage> images) {
+  std::vector<Finding> doubts;
+  const auto machine_of = [](const RtImage& image) {
+    const auto name = image.equipment.find("RadiationMachineName");
+    return name == image.equipment.end() ? std::string() : name->second;
+  };
+  for (const RtImage& image : images)
+    if (machine_of(image) != machine_of(images.front()))
+      doubts.push_back({"table-moved", fmt::format("{} is of machine \"{}\", {} of \"{}\" ({})", image.label,
+                                                   machine_of(image), images.front().label, machine_of(images.front()),
+                                                   described(DCM_RadiationMachineName))});
+  for (const TableReadOut& read_out : table_read_outs()) {
+    const auto has_value = [&](const RtImage& image) { return (image.table.*read_out.value).has_value(); };
+    const auto turned = std::ranges::find_if(images, [&](const RtImage& image) {
+      return has_value(image) && std::abs(*(image.table.*read_out.value)) > kMaxTableTurnDeg;
+    });
+    const auto silent = std::ranges::find_if_not(images, has_value);
+    if (read_out.is_angle && turned != images.end() && silent != images.end())
+      doubts.push_back({"table-moved", fmt::format("{} is {} degrees in {} and missing in {}: whether the table turned "
+                                                   "between them is unknown",
+                                                   described(read_out.tag), *(turned->table.*read_out.value),
+                                                   turned->label, silent->label)});
+  }
+  return doubts;
+}
+
+// Views too far apart in time, or of which nobody knows how far apart they are.
+std::optional<Finding> time_doubt(std::span<const RtImage> images, double max_span_s) {
+  const RtImage* earliest = &images.front();
+  const RtImage* latest = &images.front();
+  for (const RtImage& image : images) {
+    if (!image.has_own_time || !acquisition_seconds(image))
+      return Finding{"time-span", fmt::format("{}: when it was taken is unknown ({}), and {}", image.label,
+                                              described(DCM_AcquisitionTime), kNoReadOuts)};
+    if (*acquisition_seconds(image) < *acquisition_seconds(*earliest)) earliest = &image;
+    if (*acquisition_seconds(image) > *acquisition_seconds(*latest)) latest = &image;
+  }
+  const double span_s = *acquisition_seconds(*latest) - *acquisition_seconds(*earliest);
+  if (span_s <= max_span_s) return std::nullopt;
+  return Finding{"time-span", fmt::format("{} was taken {:.0f} s after {}, more than {:.0f} s: {}", latest->label,
+                                          span_s, earliest->label, max_span_s, kNoReadOuts)};
 }
 
 }  // namespace
@@ -40,7 +85,7 @@ bool is_retake(const RtImage& image, const RtImage& earlier) {
 std::vector<Finding> patient_findings(const Identity& reference, const Identity& other, const std::string& where,
                                       const std::string& reference_name) {
   std::vector<Finding> findings;
-  const auto differ = [&](const std::string Identity::*member, const DcmTagKey& tag, bool may_be_empty) {
+  const auto differ = [&](const std::string Identity::* member, const DcmTagKey& tag, bool may_be_empty) {
     const bool is_empty = (other.*member).empty() || (reference.*member).empty();
     if (without_trailing_carets(other.*member) == without_trailing_carets(reference.*member) &&
         (may_be_empty || !is_empty))
@@ -92,27 +137,19 @@ std::vector<Finding> session_findings(std::span<const RtImage> images, Notes& no
 }
 
 std::vector<Finding> session_doubts(std::span<const RtImage> images, double max_span_s) {
-  if (std::ranges::all_of(images, [](const RtImage& image) { return image.table.has_position(); })) return {};
-  constexpr const char* kNoReadOuts = "without table read-outs in all views nobody knows whether the table moved";
-  std::vector<Finding> doubts;
-  const RtImage* earliest = nullptr;
-  const RtImage* latest = nullptr;
-  for (const RtImage& image : images) {
-    const auto at_s = acquisition_seconds(image);
-    if (!at_s) continue;
-    if (earliest == nullptr || *at_s < *acquisition_seconds(*earliest)) earliest = &image;
-    if (latest == nullptr || *at_s > *acquisition_seconds(*latest)) latest = &image;
-  }
-  if (earliest != nullptr)
-    if (const double span_s = *acquisition_seconds(*latest) - *acquisition_seconds(*earliest); span_s > max_span_s)
-      doubts.push_back({"time-span", fmt::format("{} was taken {:.0f} s after {}, more than {:.0f} s: {}",
-                                                 latest->label, span_s, earliest->label, max_span_s, kNoReadOuts)});
+  if (images.size() < 2) return {};
+  std::vector<Finding> doubts = setting_doubts(images);
+  if (std::ranges::all_of(images, [](const RtImage& image) { return image.table.has_position(); })) return doubts;
+  if (auto doubt = time_doubt(images, max_span_s)) doubts.push_back(std::move(*doubt));
   for (std::size_t n = 1; n < images.size(); ++n)
     if (const auto first = std::ranges::find_if(images.first(n),
                                                 [&](const RtImage& earlier) { return is_retake(images[n], earlier); });
         first != images.begin() + static_cast<std::ptrdiff_t>(n))
-      doubts.push_back({"table-moved", fmt::format("{} was taken twice ({} and {}): {}", images[n].label,
-                                                   first->path.string(), images[n].path.string(), kNoReadOuts)});
+      doubts.push_back(
+          {"table-moved",
+           fmt::format("{} and {} show the same view, and {}",
+                       first->label == images[n].label ? first->path.string() : first->label,
+                       first->label == images[n].label ? images[n].path.string() : images[n].label, kNoReadOuts)});
   return doubts;
 }
 

@@ -21,8 +21,10 @@ std::vector<Finding> patient_findings(const Identity& reference, const Identity&
 // not say is warned of where others do.
 std::vector<Finding> session_findings(std::span<const RtImage> images, Notes& notes);
 
-// Why it is not known that the table stood still between the views, which only read-outs of its position in all of them
-// tell: views more than `max_span_s` apart, a view that was taken twice. Results of such views need a person's review.
+// Why it is not known that the views show one setup. Read-outs of the table's position in all views tell that it stood
+// still; without them, views more than `max_span_s` apart or of unknown times, and a view that was taken twice, are in
+// doubt. So are, in any case, views of two machines, and a table angle that only some views have. Results of such views
+// need a person's review.
 std::vector<Finding> session_doubts(std::span<const RtImage> images, double max_span_s);
 
 // Where the table stood otherwise than at `reference`, as far as both say.

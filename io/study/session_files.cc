@@ -47,10 +47,11 @@ struct Timeline {
            });
   }
 
-  // Whether an X-ray lies nearer to the one before than to the one after it, as far as is known without a couch move in
-  // between.
+  // Whether an X-ray may rather belong to the one before than to the one after it: the time before it is not clearly
+  // longer, and no read-outs tell that the couch moved then.
   bool is_nearer_to_earlier(std::size_t n) const {
-    return n > 0 && gap_s(n - 1) < gap_s(n) && !has_table_moved(images[n].table, images[n - 1].table);
+    constexpr double kClearlyLonger = 2.0;
+    return n > 0 && gap_s(n - 1) < kClearlyLonger * gap_s(n) && !has_table_moved(images[n].table, images[n - 1].table);
   }
 
   // Where the session begins that ends with `newest`.
@@ -133,10 +134,10 @@ std::vector<SessionFiles> sessions_of(const StudyFiles& files, bool other_xrays,
     return image.at_s ? fs::path() : image.file.parent_path();
   };
   std::ranges::sort(images, {}, [&](const StudyFiles::Image& image) {
-    return std::tuple(image.patient, image.plan_uid, image.at_s, place_of(image), image.file);
+    return std::tuple(image.patient, image.plan_uid, image.machine, image.at_s, place_of(image), image.file);
   });
   const auto whose = [&](const StudyFiles::Image& image) {
-    return std::tuple(image.patient, image.plan_uid, image.at_s.has_value(), place_of(image));
+    return std::tuple(image.patient, image.plan_uid, image.machine, image.at_s.has_value(), place_of(image));
   };
   std::vector<SessionFiles> sessions;
   for (auto begin = images.begin(); begin != images.end();) {

@@ -9,7 +9,7 @@
 
 namespace isoshift {
 
-// X-rays of one patient, one plan and one position of the table: at most 10 minutes apart, no label twice.
+// X-rays of one patient, one plan, one machine and one position of the table: at most 10 minutes apart, no label twice.
 struct SessionFiles {
   std::string name;  // made from its X-rays' SOPInstanceUIDs; says nothing of the patient
   std::string patient;

@@ -138,8 +138,8 @@ void drop_repeated_images(std::vector<RtImage>& images, XrayFiles& files, Notes&
 
 // X-rays of one moment in the order of their files and frames.
 void sort_by_time(std::vector<RtImage>& images) {
-  std::ranges::sort(images, {},
-                    [](const RtImage& image) { return std::tuple(acquisition_seconds(image), image.path, image.frame); });
+  std::ranges::sort(
+      images, {}, [](const RtImage& image) { return std::tuple(acquisition_seconds(image), image.path, image.frame); });
 }
 
 // Frames of one imager have one label but for the number behind it.
@@ -218,9 +218,10 @@ void check_isocenter(const Study& study) {
   }
 }
 
-// The X-rays with what a person and a machine profile supply, in order of acquisition.
+// The X-rays with what a person and a machine profile supply, in order of acquisition, and what speaks against their
+// being of one session.
 std::vector<RtImage> read_images(const std::vector<std::filesystem::path>& paths, const StudyRequest& request,
-                                 XrayFiles& files, Notes& notes) {
+                                 XrayFiles& files, std::vector<Finding>& findings, Notes& notes) {
   std::vector<RtImage> images;
   for (const std::filesystem::path& path : paths)
     std::ranges::move(files.images_of(path, notes), std::back_inserter(images));
@@ -228,11 +229,12 @@ std::vector<RtImage> read_images(const std::vector<std::filesystem::path>& paths
   drop_repeated_images(images, files, notes);
   if (request.one_per_imager) keep_earliest_of_each_imager(images);
   check_labels(request.switches, images);
+  sort_by_time(images);
+  findings = session_findings(images, notes);  // by what was measured: a switch hides no move of the table
   for (RtImage& image : images) {
     if (request.machine) image = with_machine(image, *request.machine, request.switches, notes);
     image = with_switches(image, request.switches, notes);
   }
-  sort_by_time(images);
   return images;
 }
 
@@ -258,12 +260,12 @@ void check_images(const Study& study, const StudyRequest& request, Notes& notes)
                                            image.label, described(DCM_ReportedValuesOrigin)));
 }
 
-// Whether the parts of the study belong together.
-void check_together(const StudyRequest& request, Study& study, Notes& notes) {
+// Whether the parts of the study belong together. `of_session`: what the X-rays say against each other.
+void check_together(const StudyRequest& request, const std::vector<Finding>& of_session, Study& study, Notes& notes) {
   std::vector<Finding> findings = patient_findings(study);
   std::ranges::move(plan_findings(study, notes), std::back_inserter(findings));
   std::ranges::move(structure_findings(study, notes), std::back_inserter(findings));
-  std::ranges::move(session_findings(study.rt_images, notes), std::back_inserter(findings));
+  std::ranges::copy(of_session, std::back_inserter(findings));
   settle(findings, request.allowed, notes);
   for (const Finding& doubt : not_allowed(session_doubts(study.rt_images, request.max_span_s), request.allowed, notes))
     study.doubts.push_back(fmt::format("{} (--allow {}=REASON)", doubt.message, doubt.key));
@@ -315,7 +317,8 @@ Study load_study(const StudyRequest& request, Notes& notes, const Progress& prog
   if (parts.plan) study.plan = read_rt_plan(*parts.plan);
   if (parts.structures) study.structures = read_rt_structures(*parts.structures);
   XrayFiles files(request.one_per_imager);
-  study.rt_images = read_images(parts.images, request, files, notes);
+  std::vector<Finding> of_session;
+  study.rt_images = read_images(parts.images, request, files, of_session, notes);
 
   std::vector<RtPlan::Beam> beams;
   if (study.plan) {
@@ -326,7 +329,7 @@ Study load_study(const StudyRequest& request, Notes& notes, const Progress& prog
   }
   check_images(study, request, notes);
   study.ct = cts.get(parts.ct, request.allowed, notes, progress);
-  check_together(request, study, notes);
+  check_together(request, of_session, study, notes);
   place_patient(request, beams, study, notes);
   for (const RtImage& image : study.rt_images)
     study.xrays.push_back(

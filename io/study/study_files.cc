@@ -69,6 +69,7 @@ StudyFiles::Image xray(const fs::path& path, const DicomItem& dataset) {
           .sop_instance_uid = dataset.required_text(DCM_SOPInstanceUID),
           .plan_uid = first_reference(dataset, DCM_ReferencedRTPlanSequence),
           .label = dataset.text(DCM_RTImageLabel).value_or(""),
+          .machine = dataset.text(DCM_RadiationMachineName).value_or(""),
           .at_s = acquisition_seconds(timed),
           .acquired = acquired(timed),
           .table = read_table_read_outs([&](const DcmTagKey& tag) { return read_out(dataset, tag); })};

@@ -35,6 +35,7 @@ struct StudyFiles {
     std::string sop_instance_uid;
     std::string plan_uid;        // ReferencedRTPlanSequence
     std::string label;           // RTImageLabel; empty: none
+    std::string machine;         // RadiationMachineName; empty: unknown
     std::optional<double> at_s;  // when it was acquired, since an epoch
     std::string acquired;        // the same for people, "2026-03-01 10:15:00"; empty: unknown
     TableReadOuts table;

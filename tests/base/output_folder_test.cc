@@ -95,7 +95,9 @@ TEST(OutputFolder, DoesNotReplaceWhatAppearedMeanwhile) {
 
 TEST(OutputFolder, TakesTheParentsItMadeAwayAgain) {
   TemporaryFolder folder;
-  { OutputFolder output(folder / "a" / "b" / "out", false); }
+  {
+    OutputFolder output(folder / "a" / "b" / "out", false);
+  }
   EXPECT_EQ(entries(folder.path()), 0);
 }
 

@@ -93,7 +93,7 @@ TEST_F(RegisterCommandTest, ASiteFileDecidesAboutActionAndCouch) {
         {rectangle({-12, 38, -416}, 60, 60), rectangle({-12, 38, -410}, 60, 60), rectangle({-12, 38, -404}, 60, 60)}}});
   const CommandOutcome outcome =
       register_study(study_, {"--site", site.string(), "--anatomy", "head", "--structure", "TARGET"});
-  EXPECT_EQ(outcome.exit_status, 0) << outcome.err;
+  EXPECT_EQ(outcome.exit_status, 3) << outcome.err;
   EXPECT_EQ(result()["site"]["name"], "Linac 3");
   if (result()["verdict"] != "rejected") {
     EXPECT_EQ(result()["action"], "exceeds");
@@ -208,7 +208,35 @@ TEST_F(RegisterCommandTest, AViewTakenTwiceNeedsAReviewWhereTheTableIsUnknown) {
     d.put(DCM_AcquisitionTime, "101530");
   });
   EXPECT_EQ(register_study(study_).exit_status, 3);
-  EXPECT_THAT(result()["reasons"].dump(), HasSubstr("KV_G090 was taken twice"));
+  EXPECT_THAT(result()["reasons"].dump(), HasSubstr("AGAIN.dcm show the same view"));
+}
+
+// What nobody knows is not taken for granted.
+TEST_F(RegisterCommandTest, ViewsThatMayBeOfTwoSetupsNeedAReview) {
+  const auto reasons = [&](const std::function<void(DicomItem)>& change) {
+    const SmallStudy study;
+    edit(study.image(1), change);
+    register_study(study);
+    return nlohmann::json::parse(std::ifstream(study.output() / "result.json"))["reasons"].dump();
+  };
+  EXPECT_THAT(reasons([](DicomItem d) {
+                for (const DcmTagKey& tag : {DCM_AcquisitionTime, DCM_ContentTime}) d.erase(tag);
+              }),
+              HasSubstr("KV_G090: when it was taken is unknown"));
+  EXPECT_THAT(reasons([](DicomItem d) { d.put(DCM_AcquisitionTime, "10 55"); }),
+              HasSubstr("KV_G090: when it was taken is unknown"));
+  EXPECT_THAT(reasons([](DicomItem d) { d.put(DCM_AcquisitionTime, "10:18:00"); }), HasSubstr("was taken 180 s after"));
+  EXPECT_THAT(reasons([](DicomItem d) { d.put(DCM_RadiationMachineName, "LINAC2"); }), HasSubstr("LINAC2"));
+  EXPECT_THAT(reasons([](DicomItem d) { d.put(DCM_TableTopEccentricAngle, 3.0); }),
+              HasSubstr("is 3 degrees in KV_G090 and missing in KV_G000"));
+}
+
+// A switch supplies what is missing; a table that was seen to turn is refused whatever a switch says.
+TEST_F(RegisterCommandTest, ASwitchHidesNoMoveOfTheTable) {
+  edit(study_.image(1), [](DicomItem d) { d.put(DCM_PatientSupportAngle, 3.0); });
+  const CommandOutcome outcome = register_study(study_, {"--couch-angle", "0"});
+  EXPECT_EQ(outcome.exit_status, 1);
+  EXPECT_THAT(outcome.err, HasSubstr("the table turned by 3.0 degrees"));
 }
 
 TEST_F(RegisterCommandTest, LabelsCannotForgeLines) {

@@ -34,9 +34,8 @@ TEST(Gl, SoftwareSaysThatItIs) {
 
 TEST(Gl, ShaderErrorsNameFileLineAndDriver) {
   const GlContext context(GlDevice::kSoftware);
-  const std::string error = error_of([] {
-    Program(ShaderSource{"layout(local_size_x = 1) in;\nvoid main() {\n  nonsense;\n}\n", "drr/test.comp"});
-  });
+  const std::string error = error_of(
+      [] { Program(ShaderSource{"layout(local_size_x = 1) in;\nvoid main() {\n  nonsense;\n}\n", "drr/test.comp"}); });
   EXPECT_THAT(error, HasSubstr("drr/test.comp: does not compile on llvmpipe"));
   EXPECT_THAT(error, HasSubstr("0:3("));  // line 3
   EXPECT_THAT(error, HasSubstr("nonsense"));

@@ -64,10 +64,10 @@ TEST(HeadRegistration, ObjectMeansTheTruthToPydicomAndPassesDciodvfy) {
   ISOSHIFT_NEED_REAL_DATA("head/head-kv-pair");
   TemporaryFolder folder;
   registered("head-kv-pair", folder / "out");
-  const CommandOutcome checked = run_shell(
-      fmt::format("dciodvfy -new {0} | grep '^Error'; /usr/bin/python3 {1}/tests/io/objects/check_registration.py {0} {2} 0.3",
-                  (folder / "out" / "spatial_registration.dcm").string(), ISOSHIFT_SOURCE_DIR,
-                  (kHead / "head-kv-pair" / "truth.json").string()));
+  const CommandOutcome checked = run_shell(fmt::format(
+      "dciodvfy -new {0} | grep '^Error'; /usr/bin/python3 {1}/tests/io/objects/check_registration.py {0} {2} 0.3",
+      (folder / "out" / "spatial_registration.dcm").string(), ISOSHIFT_SOURCE_DIR,
+      (kHead / "head-kv-pair" / "truth.json").string()));
   EXPECT_EQ(checked.exit_status, 0) << checked.out;
   EXPECT_THAT(checked.out, testing::Not(testing::HasSubstr("Error"))) << checked.out;
 }

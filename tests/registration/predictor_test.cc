@@ -175,8 +175,7 @@ TEST(Predictor, FiltersBeatHoldLastOnBreathingSeenAtIrregularMoments) {
   for (const double latency_s : {0.2, 0.4}) {
     const auto error_of = [&](PredictorKind kind) {
       const auto predictor = make_predictor(kind, {.latency_s = latency_s});
-      const double error = rms_error_mm(
-          *predictor, latency_s, [](double t) { return breathing(t); }, 0.1);
+      const double error = rms_error_mm(*predictor, latency_s, [](double t) { return breathing(t); }, 0.1);
       EXPECT_TRUE(predictor->is_warm()) << to_string(kind);
       return error;
     };

@@ -133,8 +133,7 @@ TEST(Quality, StartsThatEndApartNeedReview) {
 }
 
 TEST(Quality, SplattingNeedsReview) {
-  expect_review([](RegistrationResult& result) { result.renderer = "splat-texture"; },
-                "splat-texture are too noisy");
+  expect_review([](RegistrationResult& result) { result.renderer = "splat-texture"; }, "splat-texture are too noisy");
 }
 
 TEST(Quality, AViewThatGotWorseNeedsReview) {

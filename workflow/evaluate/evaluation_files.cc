@@ -30,8 +30,7 @@ std::string line_of(const EvaluatedRun& run) {
   line += run.sigma ? fmt::format("{},", fmt::join(*run.sigma, ",")) : std::string(",,,,,,");
   std::string reasons = run.reasons;
   std::ranges::replace(reasons, '"', '\'');
-  std::ranges::replace_if(
-      reasons, [](unsigned char c) { return c < 0x20; }, ' ');
+  std::ranges::replace_if(reasons, [](unsigned char c) { return c < 0x20; }, ' ');
   line += fmt::format("{},{},{},{},{},\"{}\"\n", run.evaluations, run.seconds, run.seconds_rendering,
                       run.seconds_similarity, to_string(run.verdict), reasons);
   return line;

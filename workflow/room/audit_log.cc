@@ -82,7 +82,7 @@ void AuditLog::write(const std::string& lines) const {
 }
 
 const AuditLog::Proofs& AuditLog::proofs() const {
-  struct stat status {};
+  struct stat status{};
   if (::stat(path_.c_str(), &status) != 0) {
     if (errno != ENOENT) throw Error(fmt::format("{}: cannot be read: {}", path_.string(), std::strerror(errno)));
     read_version_ = {};

@@ -98,6 +98,18 @@ TEST(Sessions, AMovedTableSeparatesThem) {
   EXPECT_THAT(grouped({a, at_table(b, 5.0)}), ElementsAre("ab"));
 }
 
+TEST(Sessions, ARetakeBeforeAMoveIsNotPairedWithWhatFollowsSoonAfter) {
+  // AP was taken again 40 s after the pair, LAT 30 s later: the couch may have moved before or after that AP.
+  EXPECT_THAT(grouped({image("a", "AP", 0), image("b", "LAT", 10), image("c", "AP", 50), image("d", "LAT", 80)}),
+              testing::ElementsAre("ab", "c", "d"));
+}
+
+TEST(Sessions, TwoMachinesAreTwoSessions) {
+  StudyFiles::Image other = image("b", "LAT", 10);
+  other.machine = "LINAC2";
+  EXPECT_THAT(grouped({image("a", "AP", 0), other}), testing::ElementsAre("a", "b"));
+}
+
 TEST(Sessions, ThreeViewsInARowStayTogether) {
   EXPECT_THAT(grouped({image("a", "AP", 0), image("b", "LAT", 10), image("c", "OBL", 60), image("d", "AP", 100),
                        image("e", "LAT", 115), image("f", "OBL", 180)}),

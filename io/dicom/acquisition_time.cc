@@ -1,0 +1,87 @@
+#include <charconv>
+#include <chrono>
+
+#include <fmt/format.h>
+
+#include "io/dicom/rt_image.h"
+
+namespace isoshift {
+namespace {
+
+// The digits of a DA or TM, without the separators that ACR-NEMA wrote ("10:59:00", "2026.03.01", PS3.5 6.2). Nothing
+// for a text that is neither: a time that is half understood would be another time.
+std::optional<std::string> digits_of(std::string_view text, char separator, std::size_t between) {
+  std::string digits;
+  for (std::size_t n = 0; n < text.size(); ++n) {
+    if (text[n] == separator && digits.size() >= between && digits.size() % 2 == 0 && n + 1 < text.size()) continue;
+    if (text[n] < '0' || text[n] > '9') return std::nullopt;
+    digits += text[n];
+  }
+  return digits;
+}
+
+int number_in(const std::string& digits, std::size_t begin, std::size_t count) {
+  int value = 0;
+  std::from_chars(digits.data() + begin, digits.data() + begin + count, value);
+  return value;
+}
+
+// "20260301".
+std::optional<std::string> date_digits(const RtImage& image) {
+  if (!image.acquisition_date) return std::nullopt;
+  auto digits = digits_of(*image.acquisition_date, '.', 4);
+  return digits && digits->size() == 8 ? digits : std::nullopt;
+}
+
+// "101500", without the fraction; minutes and seconds that are not there are 0 (PS3.5 6.2).
+std::optional<std::string> time_digits(const RtImage& image) {
+  if (!image.acquisition_time) return std::nullopt;
+  auto digits = digits_of(image.acquisition_time->substr(0, image.acquisition_time->find('.')), ':', 2);
+  if (!digits || digits->size() > 6 || digits->size() < 2 || digits->size() % 2 != 0) return std::nullopt;
+  digits->resize(6, '0');
+  if (number_in(*digits, 0, 2) > 23 || number_in(*digits, 2, 2) > 59 || number_in(*digits, 4, 2) > 60)
+    return std::nullopt;
+  return digits;
+}
+
+}  // namespace
+
+void read_acquisition_time(const DicomItem& dataset, RtImage& image) {
+  image.acquisition_date = dataset.text(DCM_AcquisitionDate);
+  image.acquisition_time = dataset.text(DCM_AcquisitionTime);
+  if (const auto both = dataset.text(DCM_AcquisitionDateTime); both && both->size() > 8 && !image.acquisition_time) {
+    image.acquisition_date = both->substr(0, 8);
+    image.acquisition_time = both->substr(8, both->find_first_of("+-") - 8);
+  }
+  if (!image.acquisition_date) image.acquisition_date = dataset.text(DCM_ContentDate);
+  if (!image.acquisition_time) image.acquisition_time = dataset.text(DCM_ContentTime);
+}
+
+std::optional<double> acquisition_seconds(const RtImage& image) {
+  const auto date = date_digits(image), time = time_digits(image);
+  if (!date || !time) return std::nullopt;
+  const std::chrono::year_month_day day(std::chrono::year(number_in(*date, 0, 4)),
+                                        std::chrono::month(static_cast<unsigned>(number_in(*date, 4, 2))),
+                                        std::chrono::day(static_cast<unsigned>(number_in(*date, 6, 2))));
+  if (!day.ok()) return std::nullopt;
+  const double days = static_cast<double>(std::chrono::sys_days(day).time_since_epoch().count());
+  double fraction = 0.0;
+  if (const auto point = image.acquisition_time->find('.'); point != std::string::npos) {
+    const char *begin = image.acquisition_time->data() + point,
+               *end = image.acquisition_time->data() + image.acquisition_time->size();
+    if (std::from_chars(begin, end, fraction).ptr != end) return std::nullopt;
+  }
+  return ((days * 24 + number_in(*time, 0, 2)) * 60 + number_in(*time, 2, 2)) * 60 + number_in(*time, 4, 2) + fraction +
+         image.frame_offset_s;
+}
+
+std::string acquired(const RtImage& image) {
+  const auto date = date_digits(image), time = time_digits(image);
+  if (!date || !time) return "";
+  return fmt::format("{}-{}-{} {}:{}:{}", date->substr(0, 4), date->substr(4, 2), date->substr(6, 2),
+                     time->substr(0, 2), time->substr(2, 2), time->substr(4, 2));
+}
+
+std::string imager_label(const RtImage& image) { return image.label.substr(0, image.label.rfind('#')); }
+
+}  // namespace isoshift
