@@ -25,7 +25,7 @@ Image<std::array<std::uint8_t, 3>> in_gray(const Image<std::uint8_t>& picture);
 Image<std::array<std::uint8_t, 3>> overlay(const Image<std::uint8_t>& xray, const Image<std::uint8_t>& drr);
 
 // Letters of PS3.3 C.7.6.1.1.1 (Patient Orientation, for people: H and F, R and L, A and P) for a direction in patient
-// coordinates (LPS), the strongest first; weak ones are left out.
+// coordinates (LPS), the strongest first, without weak ones.
 std::string orientation_letters(const Eigen::Vector3d& direction_patient);
 
 }  // namespace isoshift
