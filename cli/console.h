@@ -19,8 +19,8 @@ struct Console {
   bool err_is_terminal = false;
 };
 
-// Progress of one long piece of work: a bar that redraws itself on a terminal, a line per quarter elsewhere, both
-// with the time left where it is long. Work that ends within half a second shows nothing.
+// Shows the progress of long work: on a terminal a bar that redraws itself, elsewhere a line per quarter. Both show the
+// time left if it is long. Work that ends within half a second shows nothing.
 class ProgressBar {
  public:
   ProgressBar(Console& console, std::string what);
@@ -40,7 +40,7 @@ class ProgressBar {
   int shown_percent_ = -1;
 };
 
-// Shows what work tells: a bar for each of its steps, and its lines.
+// Shows a bar for each step of the work, and the lines that the work reports.
 class ConsoleObserver : public Observer {
  public:
   explicit ConsoleObserver(Console& console) : console_(console) {}

@@ -1,6 +1,6 @@
 #pragma once
-// What long work tells whoever waits for it. A terminal shows it as a bar and lines; a worker process and most tests do
-// not look.
+// Receives progress and messages of long work. A terminal shows them as a bar and as lines; a worker process and most
+// tests ignore them.
 
 #include <string>
 #include <string_view>
@@ -11,13 +11,13 @@ class Observer {
  public:
   virtual ~Observer() = default;
 
-  // How much of a step is done, 0 to 1. The next step, or 1, ends it.
+  // The share of a step that is done, from 0 to 1. A share of 1 ends the step, and so does the next step.
   virtual void progress(std::string_view /*step*/, double /*share*/) {}
   void progress(std::string_view step, std::size_t done, std::size_t total) {
     progress(step, static_cast<double>(done) / static_cast<double>(total));
   }
 
-  // What is the case now; the next line takes its place. Not for a log.
+  // The current state, which the next call replaces. Not for a log.
   virtual void show(std::string_view /*line*/) {}
 
   // One line for a log.

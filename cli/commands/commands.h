@@ -22,10 +22,11 @@ void add_release_command(CLI::App& app, Console& console, int& exit_status);
 void add_evaluate_command(CLI::App& app, Console& console, int& exit_status);
 void add_bench_command(CLI::App& app, Console& console, int& exit_status);
 
-// Manual pages of all commands, into a folder.
+// Writes the manual pages of all commands into a folder.
 void write_manual(const std::filesystem::path& folder);
 
-// The whole program: parses, runs, and turns every exception into a message and an exit status.
+// The whole program: parses the command line, runs the command, and turns every exception into a message and an exit
+// status.
 int run_isoshift(int argc, const char* const* argv, Console& console);
 
 }  // namespace isoshift

@@ -1,5 +1,5 @@
 #pragma once
-// What isoshift register shares with the other commands that write results.
+// Code that isoshift register shares with the other commands that write results.
 
 #include <CLI/CLI.hpp>
 
@@ -7,10 +7,10 @@
 
 namespace isoshift {
 
-// The flags beside those of the study and of registration that decide what is written.
+// Adds the flags that decide which files are written.
 void add_result_options(CLI::App& command, RegisterOptions& options);
 
-// The exit status that a verdict asks for.
+// The exit status of a verdict.
 int exit_status_of(Verdict verdict);
 
 }  // namespace isoshift

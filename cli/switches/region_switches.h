@@ -1,5 +1,5 @@
 #pragma once
-// The flags that say which part of the patient is registered.
+// The flags that choose the region.
 
 #include <CLI/CLI.hpp>
 

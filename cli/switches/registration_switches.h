@@ -1,5 +1,5 @@
 #pragma once
-// The flags of every command that registers: how to search, what of the patient, how to render.
+// The flags of every command that registers: the search, the region, and the rendering.
 
 #include <CLI/CLI.hpp>
 

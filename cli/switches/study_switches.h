@@ -1,6 +1,6 @@
 #pragma once
-// The flags that name a study's parts, supply what its files lack and allow what checks forbid: the same for every
-// command that reads a study.
+// The flags of every command that reads a study: they name its parts, supply values that its files lack, and allow
+// failed checks.
 
 #include <CLI/CLI.hpp>
 
@@ -9,7 +9,7 @@
 namespace isoshift {
 
 void add_study_options(CLI::App& command, StudyOptions& options);
-// Those that do not name its parts.
+// The flags that do not name the parts of a study.
 void add_study_switches(CLI::App& command, StudyOptions& options);
 
 }  // namespace isoshift

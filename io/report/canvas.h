@@ -1,6 +1,6 @@
 #pragma once
-// What report pages (PDF), drawings (SVG) and pictures (PNG) are drawn on. Lengths are points from the upper left
-// corner, y down; those of a PNG are pixels. Text is real text in any script.
+// A surface for report pages (PDF), drawings (SVG) and pictures (PNG). Lengths are points from the upper left corner, y
+// down; for a PNG they are pixels. Text is drawn as text, not as outlines, in any script.
 
 #include <Eigen/Core>
 #include <cstdint>
@@ -29,8 +29,8 @@ struct TextStyle {
   bool bold = false;
   Rgb color = color::kBlack;
   Align align = Align::kLeft;   // within `width`, else about the position
-  std::optional<double> width;  // lines are broken there
-  bool one_line = false;        // or cut off there, with an ellipsis
+  std::optional<double> width;  // longer lines are wrapped
+  bool one_line = false;        // longer lines are cut off with an ellipsis instead
 };
 
 struct LineStyle {
@@ -65,15 +65,15 @@ class Canvas {
   // Draws an image into a rectangle, its pixels averaged where they are smaller than the canvas's.
   void image(double x, double y, double width, double height, const Image<Rgb>& image);
 
-  // What is drawn until end_clip() is cut off at a rectangle.
+  // Everything drawn until end_clip() is cut off at the rectangle.
   void begin_clip(double x, double y, double width, double height);
   void end_clip();
 
-  // Of a PDF.
+  // Only for a PDF.
   void new_page();
   void describe(const std::string& title, const std::string& creator);
 
-  // The bytes of the file. Nothing may be drawn afterwards. Throws Error where drawing has failed.
+  // The bytes of the file. Nothing may be drawn afterwards. Throws Error if drawing has failed.
   std::string finish();
 
  private:
@@ -82,7 +82,7 @@ class Canvas {
   double width_, height_;
 };
 
-// Text from files as it may be shown: valid UTF-8, on one line, without control characters.
+// Makes text from files safe to show: valid UTF-8, on one line, without control characters.
 std::string printable(std::string_view text);
 
 }  // namespace isoshift

@@ -1,5 +1,5 @@
 #pragma once
-// What reports show as pictures: views, the couch with its axes, the course of the search.
+// The pictures of a report: views, the couch with its axes, the course of the search.
 
 #include <array>
 #include <string>
@@ -16,18 +16,19 @@ inline constexpr std::array kViewTiles = {ViewTile::kXray, ViewTile::kDrrPlanned
                                           ViewTile::kDrrFound, ViewTile::kOverlayFound};
 std::string caption_of(ViewTile tile);
 
-// The parts of a view that match elsewhere, in pixels of its picture: squares, and lines to where they match.
+// The parts of a view that match elsewhere, in pixels of its picture: squares, and lines to the places where they
+// match.
 struct MismatchMarks {
   std::vector<Polygon> squares, ways;
 };
 MismatchMarks mismatch_marks(const SetupResult::View& view);
 
-// Draws a tile of that width with its upper left corner at (x, y): the picture with isocenter, field and structures,
-// scale bar and the patient's directions; in the overlay as found also squares where parts match elsewhere. Returns its
-// height.
+// Draws a tile of that width with its upper left corner at (x, y): the picture with isocenter, field, structures, scale
+// bar and the patient's directions. The overlay at the pose found also marks the parts that match elsewhere. Returns
+// the height of the tile.
 double draw_view_tile(Canvas& canvas, double x, double y, double width, const SetupResult::View& view, ViewTile tile);
 
-// All tiles of a view side by side, each below its caption. Returns their height.
+// Draws all tiles of a view side by side, each below its caption. Returns their height.
 double draw_view(Canvas& canvas, double x, double y, double width, const SetupResult::View& view);
 
 // Pictures in rows, each below its caption, as a PNG.
@@ -37,12 +38,12 @@ struct CaptionedPicture {
 };
 std::string captioned_png(const std::vector<CaptionedPicture>& pictures, int per_row);
 
-// Gantry, couch and patient seen by a person who faces the gantry, the axes of IEC 61217, and as arrows the
-// translations to be made.
+// Draws gantry, couch and patient as seen by a person who faces the gantry, with the axes of IEC 61217, and the
+// translations of the couch shift as arrows.
 void draw_couch(Canvas& canvas, double x, double y, double width, double height, const SetupResult& report,
                 const ReportPage& page);
 
-// The similarity reached against the evaluations made, stage by stage.
+// Draws the similarity reached against the number of evaluations, stage by stage.
 void draw_convergence(Canvas& canvas, double x, double y, double width, double height,
                       const std::vector<StageReport>& stages);
 

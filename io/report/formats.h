@@ -1,5 +1,5 @@
 #pragma once
-// The formats of a result. All but JSON are made from the one page, so that they say the same.
+// The formats of a result. All but JSON are made from a ReportPage, so that they show the same texts and numbers.
 
 #include <string>
 
@@ -10,14 +10,14 @@ namespace isoshift {
 // result.json, full precision. docs/result.schema.json describes it.
 std::string json_report(const SetupResult& report);
 
-// The report that such a text was made from, without pictures. Throws Error naming `where` for anything else.
+// The result from which json_report() made this text, without pictures. Throws Error naming `where` for any other text.
 SetupResult report_from_json(const std::string& json, const std::string& where);
 
 // report.txt, for a terminal.
 std::string text_report(const ReportPage& page);
 
-// report.csv: names, then one row (RFC 4180). Texts that a spreadsheet would take for a formula begin with '. Lengths
-// are in mm, whatever the site's unit.
+// report.csv: a line of names, then one row (RFC 4180). Texts that a spreadsheet would take for a formula begin with '.
+// Lengths are always in mm, whatever the site's unit.
 std::string csv_report(const SetupResult& report);
 
 // report.pdf: one sheet of A4 to sign, then the details.

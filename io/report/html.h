@@ -1,5 +1,5 @@
 #pragma once
-// What may stand in HTML.
+// Text and pictures for HTML pages.
 
 #include <string>
 #include <string_view>
@@ -8,11 +8,11 @@ namespace isoshift {
 
 std::string html_escaped(std::string_view text);
 
-// Puts a text in the place of a placeholder, everywhere.
+// Replaces every occurrence of a placeholder by a text.
 void fill(std::string& html, std::string_view placeholder, const std::string& by);
 
-// Bytes as the address of a picture. Drawings of SVG must come in by it too: the names of their parts collide when
-// several lie in one page.
+// A data: URI of a picture. SVG drawings need one, too: the IDs of their elements would collide if several drawings
+// were pasted into one page.
 std::string data_uri(std::string_view type, std::string_view bytes);
 
 }  // namespace isoshift

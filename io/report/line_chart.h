@@ -1,5 +1,5 @@
 #pragma once
-// Curves against a common x as SVG: text and lines, told apart in gray by their dashes.
+// A chart of curves as SVG. The dashes of the curves tell them apart in gray.
 
 #include <string>
 #include <utility>

@@ -1,5 +1,5 @@
 #pragma once
-// Outlines as JSON, to a tenth of a pixel: for result.json and for the page's script.
+// Outlines as JSON, rounded to a tenth of a pixel, for result.json and for the script of report.html.
 
 #include <cmath>
 #include <nlohmann/json.hpp>

@@ -1,5 +1,5 @@
 #pragma once
-// What a person reads, as texts and rounded numbers: made once, so that text, PDF, HTML and CSV say the same.
+// The texts and rounded numbers of a report. They are made once, so that all formats say the same.
 
 #include <array>
 #include <optional>
@@ -11,7 +11,7 @@
 
 namespace isoshift {
 
-// One number with its name, rounded. `value` is "not determined" where it is.
+// One rounded number with its name. `value` is "not determined" if the number is not determined.
 struct Quantity {
   std::string name;        // "Lateral"
   std::string value;       // "-4.3"
@@ -29,7 +29,7 @@ struct ReportPage {
     std::string title;
     std::vector<Row> rows;
   };
-  // How a vendor's display counts the shift.
+  // The shift in the scale of a vendor's display.
   struct Display {
     std::string title;  // "Varian IEC scale, validated by J. Doe on 2026-03-01"
     std::vector<Quantity> rows;
@@ -49,13 +49,13 @@ struct ReportPage {
   std::string action_words;
   std::vector<std::string> action_reasons;
   bool withheld = false;
-  std::vector<Quantity> couch;        // lateral, longitudinal, vertical, yaw, pitch, roll; what this couch can do
-  std::string couch_order;            // "Translate, then rotate ..."
-  std::string couch_target;           // the table angles after the move
+  std::vector<Quantity> couch;  // lateral, longitudinal, vertical, yaw, pitch, roll, as far as this couch can move
+  std::string couch_order;      // "Translate, then rotate ..."
+  std::string couch_target;     // the table angles after the move
   std::vector<Quantity> setup_error;  // x, y, z, about x, y, z
   std::string setup_error_length;
   std::optional<Display> display;
-  std::string left_over_words;  // empty: the couch leaves nothing
+  std::string left_over_words;  // empty: there is no remaining error
   std::vector<LeftOver> left_over;
   std::vector<std::string> conventions;
   std::vector<std::string> warnings, overrides, left_aside;
@@ -65,7 +65,7 @@ ReportPage report_page(const SetupResult& report);
 
 std::string upper_case(std::string_view text);  // of ASCII letters
 
-// A PN for people: "Family Given (ideographic)".
+// A DICOM person name (PN) for people: "Family Given (ideographic)".
 std::string name_for_people(const std::string& person_name);
 
 }  // namespace isoshift

@@ -1,5 +1,5 @@
 #pragma once
-// What writing and reading result.json share.
+// Names that the writer and the reader of result.json share.
 
 #include <array>
 #include <string_view>

@@ -1,6 +1,6 @@
 #pragma once
-// An HTML page of many results: a table that sorts and filters and links each report, with charts above it. It needs no
-// other file and no network.
+// An HTML page of many results: charts, and a table that can be sorted and filtered and that links the reports. The
+// page needs no other file and no network.
 
 #include <optional>
 #include <string>
@@ -11,21 +11,21 @@ namespace isoshift {
 struct ResultsPage {
   struct Cell {
     std::string text;
-    std::optional<double> number;  // what it sorts by; unset: the text
+    std::optional<double> number;  // the key for sorting; unset: the text
     std::string link;              // relative to the page; empty: none
   };
   struct Row {
-    std::string verdict;  // "accepted", "review", "rejected", or what else became of it: a color
+    std::string verdict;  // determines the color: "accepted", "review", "rejected", or another state
     std::vector<Cell> cells;
   };
 
   std::string title;
   std::vector<std::string> summary;     // lines above the table
-  std::vector<std::string> charts_svg;  // below them
+  std::vector<std::string> charts_svg;  // below the summary
   std::vector<std::string> columns;
   std::vector<Row> rows;
-  std::vector<Cell> pages;  // others like this one
-  int refresh_s = 0;        // reload after so long; 0: never
+  std::vector<Cell> pages;  // links to other pages like this one
+  int refresh_s = 0;        // the browser reloads the page after this time; 0: never
 };
 
 std::string results_html(const ResultsPage& page);

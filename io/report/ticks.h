@@ -1,12 +1,12 @@
 #pragma once
-// Where the ticks of a chart's axis stand.
+// The positions of the ticks on a chart's axis.
 
 #include <cmath>
 #include <vector>
 
 namespace isoshift {
 
-// Multiples of 1, 2 or 5 times a power of ten from `low` to `high`: about seven.
+// About seven multiples of 1, 2 or 5 times a power of ten, from `low` to `high`.
 inline std::vector<double> ticks(double low, double high) {
   constexpr double kSteps = 6.0, kRounding = 1e-4;
   const double rough = (high - low) / kSteps, power = std::pow(10.0, std::floor(std::log10(rough)));

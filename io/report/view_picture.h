@@ -1,5 +1,5 @@
 #pragma once
-// What a picture of a view is made of: line integrals as grays and colors, letters for directions of the patient.
+// Makes the pictures of a view: line integrals as grays and colors, and letters for directions of the patient.
 
 #include <Eigen/Core>
 #include <array>
@@ -15,17 +15,17 @@ namespace isoshift {
 void put_grays(ViewPicture& picture, const Image<float>& xray, const Image<float>& drr_planned,
                const Image<float>& drr_found, const Image<std::uint8_t>& field);
 
-// An image of line integrals as radiographs are looked at: dense is bright.
+// Line integrals as a radiograph: dense is bright.
 Image<std::uint8_t> radiograph(const Image<float>& line_integral);
 
 // The same as colors.
 Image<std::array<std::uint8_t, 3>> in_gray(const Image<std::uint8_t>& picture);
 
-// X-ray magenta, DRR green, so that what matches is gray, for color-blind eyes too.
+// X-ray in magenta and DRR in green, so that matching anatomy is gray, for color-blind eyes, too.
 Image<std::array<std::uint8_t, 3>> overlay(const Image<std::uint8_t>& xray, const Image<std::uint8_t>& drr);
 
 // Letters of PS3.3 C.7.6.1.1.1 (Patient Orientation, for people: H and F, R and L, A and P) for a direction in patient
-// coordinates (LPS), the strongest first; weak ones are left out.
+// coordinates (LPS), the strongest first, without weak ones.
 std::string orientation_letters(const Eigen::Vector3d& direction_patient);
 
 }  // namespace isoshift

@@ -1,5 +1,5 @@
 #pragma once
-// The CT that was read last, for studies that share it: thirty fractions are registered to one planning CT.
+// Keeps the CT that was read last, for studies that share it: thirty fractions are registered to one planning CT.
 
 #include <filesystem>
 #include <memory>
@@ -12,7 +12,8 @@ namespace isoshift {
 
 class CtStore {
  public:
-  // As read_ct_series(), notes included, but without reading files that were read last and have not been written since.
+  // Like read_ct_series(), including the notes. If the same files were read last, and have not been written since, they
+  // are not read again.
   std::shared_ptr<const CtSeries> get(const std::vector<std::filesystem::path>& files, const Allowances& allowed,
                                       Notes& notes, const Progress& progress);
 

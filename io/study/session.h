@@ -12,13 +12,13 @@
 
 namespace isoshift {
 
-// One patient: an ID is there and the same, and so are issuer, name and birth date where both files have them. Messages
-// call the two files `where` and `reference_name`.
+// Checks that two files are of one patient: both have the same ID, and issuer, name and birth date agree if both files
+// have them. Messages call the two files `where` and `reference_name`.
 std::vector<Finding> patient_findings(const Identity& reference, const Identity& other, const std::string& where,
                                       const std::string& reference_name = "the CT");
 
-// The views must be of one moment and one table position. Each is compared with the first view that says; one that does
-// not say is warned of where others do.
+// Checks that the views were taken at one time and at one table position. Each view is compared with the first view
+// that has the attribute. If only some views have the attribute, a warning names the others.
 std::vector<Finding> session_findings(std::span<const RtImage> images, Notes& notes);
 
 // Why it is not known that the views show one setup. Read-outs of the table's position in all views tell that it stood
@@ -27,7 +27,7 @@ std::vector<Finding> session_findings(std::span<const RtImage> images, Notes& no
 // need a person's review.
 std::vector<Finding> session_doubts(std::span<const RtImage> images, double max_span_s);
 
-// Where the table stood otherwise than at `reference`, as far as both say.
+// The differences between the table read-outs of `image` and `reference`, as far as both have them.
 std::vector<Finding> table_findings(const RtImage& image, const RtImage& reference);
 
 }  // namespace isoshift

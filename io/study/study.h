@@ -1,5 +1,5 @@
 #pragma once
-// From a folder to everything one registration needs, checked: DICOM ends here.
+// From a folder to the checked input of one registration. The code that uses a Study needs no DICOM.
 
 #include <memory>
 #include <optional>
@@ -18,22 +18,22 @@
 
 namespace isoshift {
 
-// What to register and what a person supplies or allows.
+// What to register, and what the user supplies or allows.
 struct StudyRequest {
   NamedParts parts;
   std::optional<Eigen::Vector3d> isocenter_patient_mm;
   RtImageSwitches switches;
   std::optional<MachineProfile> machine;
   Allowances allowed;
-  double max_span_s = kDefaultUntoldSpanS;  // between views without table read-outs, or the result needs a review
-  bool one_per_imager = false;  // of X-rays with one label only the earliest: those of a moving target come later
+  double max_span_s = kDefaultUntoldSpanS;  // views without table read-outs that are further apart need a review
+  bool one_per_imager = false;  // uses only the earliest X-ray of each label: the others show a moving target later
 };
 
 struct Study {
   std::shared_ptr<const CtSeries> ct;
   std::optional<RtPlan> plan;
   std::optional<RtStructures> structures;
-  std::vector<std::filesystem::path> image_files;  // of all X-rays that belong to it, those left out for others too
+  std::vector<std::filesystem::path> image_files;  // of all X-rays of the study, including those that are not used
   std::vector<RtImage> rt_images;  // headers with machine profile and switches applied, in order of acquisition
   std::vector<XrayImage> xrays;    // the same images, ready for registration
   std::optional<MachineProfile> machine;
@@ -41,11 +41,11 @@ struct Study {
   TableAngles table;  // at imaging, the same for all views
   Eigen::Vector3d isocenter_patient_mm = Eigen::Vector3d::Zero();
   Eigen::Isometry3d planned_room_from_patient = Eigen::Isometry3d::Identity();
-  std::vector<std::string> doubts;  // why a result of this study needs a person's review, whatever registration finds
+  std::vector<std::string> doubts;  // why every result of this study needs a person's review
 };
 
-// Finds, reads and checks the parts. Everything the images lack is reported in one Error, with the switch that supplies
-// it; so is every check that fails without being allowed. The CT is taken from the store if it was the last one.
+// Finds, reads and checks the parts of the study. One Error names every attribute that the images lack, with the switch
+// that supplies it, and every failed check that was not allowed. The CT is taken from the store if it was read last.
 Study load_study(const StudyRequest& request, Notes& notes, const Progress& progress, CtStore& cts);
 inline Study load_study(const StudyRequest& request, Notes& notes, const Progress& progress) {
   CtStore none;

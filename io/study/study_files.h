@@ -1,5 +1,5 @@
 #pragma once
-// What a folder holds, and which of it belongs together.
+// The files of a folder, and which of them belong together.
 
 #include <filesystem>
 #include <map>
@@ -13,7 +13,7 @@
 
 namespace isoshift {
 
-// The files below some paths, sorted by what they are, with what tells which of them belong together.
+// The files below some paths, sorted by kind, with the references that tell which of them belong together.
 struct StudyFiles {
   struct Ct {
     std::string patient;  // PatientID\issuer
@@ -45,37 +45,37 @@ struct StudyFiles {
     std::string patient;
     std::string sop_instance_uid;
     std::set<std::string> ct_series_uids;           // of the images it was drawn on
-    std::set<std::string> ct_sop_instance_uids;     // those images
+    std::set<std::string> ct_sop_instance_uids;     // of these images
     std::set<std::string> frame_of_reference_uids;  // of its structures
   };
 
   std::vector<Ct> cts;
   std::vector<Plan> plans;
   std::vector<Image> images;       // RT Images
-  std::vector<Image> other_xrays;  // DX, CR, XA: their geometry is not in them
+  std::vector<Image> other_xrays;  // DX, CR, XA: their files do not contain the geometry
   std::vector<Structures> structures;
   std::vector<std::string> left_aside;  // "FILE: reason"
-  std::vector<std::string> unreadable;  // why files that begin as DICOM, or cannot be opened, cannot be read
+  std::vector<std::string> unreadable;  // messages on files that look like DICOM, or cannot be opened
 };
 
-// The PatientID alone of what StudyFiles calls a patient.
+// The PatientID, without the issuer, of a `patient` of StudyFiles.
 std::string patient_id_of(const std::string& patient);
 
-// All files below `paths` (files or folders) but those named and hidden ones (with a leading dot), in the order of
-// their names. Throws Error for a path that is not there or cannot be searched.
-// With `unsearchable` folders below them that cannot be searched are left out, and told there.
+// All files below `paths` (files or folders), in the order of their names, without the files named in `but` and without
+// hidden files (with a leading dot). Throws Error for a path that does not exist or cannot be searched. If
+// `unsearchable` is given, folders below the paths that cannot be searched are skipped and added to it.
 std::vector<std::filesystem::path> files_below(const std::vector<std::filesystem::path>& paths,
                                                const std::unordered_set<std::string>& but = {},
                                                std::set<std::filesystem::path>* unsearchable = nullptr);
 
-// Reads the headers of all files below `paths` (files or folders), in the order of their names. A file that is no DICOM
-// is left aside.
+// Reads the headers of all files below `paths` (files or folders), in the order of their names. A file that is not
+// DICOM is left aside.
 StudyFiles scan_study(const std::vector<std::filesystem::path>& paths);
 
-// The same of one file. Throws Error for one that cannot be read.
+// Reads the header of one file. Throws Error if the file cannot be read.
 StudyFiles scan_file(const std::filesystem::path& path);
 
-// Adds what was scanned elsewhere.
+// Adds the files of `from` to `files`.
 void merge(StudyFiles from, StudyFiles& files);
 
 // The parts of one registration.
@@ -87,23 +87,27 @@ struct StudyParts {
   std::vector<std::string> left_aside;
 };
 
-// Which parts a person named; the others are searched for in `study`.
+// The parts that the user named; the other parts are searched for in `study`.
 struct NamedParts {
   std::filesystem::path study;
-  bool takes_other_xrays = false;  // a machine profile supplies the geometry of X-rays that are no RT Images
+  bool takes_other_xrays = false;  // a machine profile supplies the geometry of X-rays that are not RT Images
   std::vector<std::filesystem::path> ct;
   std::vector<std::filesystem::path> images;
   std::optional<std::filesystem::path> plan;
   std::optional<std::filesystem::path> structures;
 };
 
-// The plan that the images refer to, the CT in whose frame of reference (and, of several, on whose structure set) it
-// was made, the images of that plan, and the structure set that the plan refers to, else the only one drawn on that CT.
-// All else is left aside, with the reason. Throws Error where CT or images are absent or the files do not tell which of
-// several is meant; nobody has to tell that of structure sets, unless they are wanted.
+// Finds the parts of a study:
+// - the plan to which the images refer;
+// - the CT in the plan's frame of reference, and of several such CTs the one on which the plan's structure set was
+// drawn;
+// - the images of that plan;
+// - the structure set to which the plan refers, or else the only structure set that was drawn on that CT.
+// All other files are left aside, with the reason. Throws Error if there is no CT or no image, or if the files do not
+// tell which of several candidates is meant. Several structure sets are an error only where a structure set is needed.
 StudyParts find_parts(const NamedParts& named);
 
-// The same among files that were scanned, all of them candidates.
+// The same, with all scanned files as candidates.
 StudyParts choose_parts(const StudyFiles& files);
 
 }  // namespace isoshift

@@ -16,33 +16,33 @@ namespace isoshift {
 
 struct BatchOptions {
   RegisterOptions each;                 // for all cases
-  std::filesystem::path cases, output;  // a folder of files or a manifest; the folder of the batch
-  int jobs = 1;                         // cases at the same time, each in a process of its own
-  std::optional<Shard> shard;           // registers only this part; unset: all cases
-  bool takes_earlier_scan = false;      // of a folder of files: registers what an earlier run found in it
-  std::vector<std::string> kept;        // what every run of this batch must say alike, as on the command line
+  std::filesystem::path cases, output;  // `cases`: a folder of files, or a manifest; `output`: the folder of the batch
+  int jobs = 1;                         // cases registered at the same time, each in its own process
+  std::optional<Shard> shard;           // registers only the cases of this shard; unset: all cases
+  bool takes_earlier_scan = false;      // for a folder of files: registers the cases that an earlier run found in it
+  std::vector<std::string> kept;        // flags that must be the same in every run of this batch
 };
 
-// The cases of a manifest; of a folder, those found in it. Tells the observer which X-rays belong to no case.
+// The cases of a manifest, or the cases found in a folder. Tells the observer which X-rays belong to no case, and why.
 std::vector<BatchCase> cases_of(const BatchOptions& options, Observer& observer);
 
 class Batch {
  public:
-  // Makes the folder of the batch, or opens that of one with the same options.
+  // Makes the folder of the batch, or opens the folder of an earlier run with the same options.
   Batch(const BatchOptions& options, Observer& observer);
 
   const BatchFolder& folder() const { return folder_; }
 
-  // Registers the cases that have not ended. False where it was asked to end before all had.
+  // Registers the cases that have not ended. Returns false if it was asked to end before all cases had ended.
   bool run();
 
-  // What a worker process does: registers the cases whose names come on standard input.
+  // The work of a worker process: registers the cases whose names it reads from standard input.
   void serve();
 
-  // Of all cases, or of those of the shard.
+  // The summary of all cases, or of the cases of the shard.
   BatchSummary summary() const { return summary_of(folder_, cases_); }
 
-  // The command line that goes on with this batch, without the program.
+  // The command line that continues this batch, without the program's name.
   std::vector<std::string> arguments() const;
 
  private:

@@ -1,5 +1,5 @@
 #pragma once
-// Which studies a batch registers: a table (CSV) or JSON lines, a case in each (docs/commands/batch.md).
+// The list of studies that a batch registers: a table (CSV) or JSON lines, one case per line (docs/commands/batch.md).
 
 #include <filesystem>
 #include <string>
@@ -11,24 +11,25 @@
 namespace isoshift {
 
 struct BatchCase {
-  std::string name;  // of its folder: letters, digits, ".", "_" and "-"
+  std::string name;  // also the name of its folder: letters, digits, ".", "_" and "-"
   std::filesystem::path study, plan, structures;
   std::vector<std::filesystem::path> ct, images;
-  std::string anatomy;  // empty: that of --anatomy
+  std::string anatomy;  // empty: the anatomy of --anatomy
 
-  // The study's parts, over the switches given for all cases.
+  // `switches`, which are given for all cases, with the parts of this study.
   StudyOptions options(StudyOptions switches) const;
-  // Cases with equal ones share their CT.
+  // Cases with equal keys share their CT.
   std::string ct_key() const;
 };
 
-// Paths in a manifest are relative to its folder. Throws Error naming line and column for anything it cannot hold.
+// Paths in a manifest are relative to its folder. Throws Error naming the line and the column of a mistake.
 std::vector<BatchCase> read_manifest(const std::filesystem::path& path);
 
-// As CSV, with the paths as they are.
+// The manifest as CSV. Paths are not changed.
 std::string manifest_csv(const std::vector<BatchCase>& cases);
 
-// A case for every session of X-rays below a folder; what belongs to none is said in the notes.
+// Makes a case for every session of X-rays below a folder. X-rays that belong to no case are listed in the notes, with
+// the reason.
 std::vector<BatchCase> scan_cases(const std::filesystem::path& folder, bool other_xrays, Notes& notes);
 
 }  // namespace isoshift

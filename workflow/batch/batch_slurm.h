@@ -7,10 +7,10 @@
 
 namespace isoshift {
 
-// Writes slurm.sh (a shard per task) and slurm-merge.sh into the folder of the batch and submits both, the second for
-// when all tasks have ended. `arguments`: of isoshift, without those of the part. Returns what sbatch answered. Throws
-// Error where it refuses or is not there. Partition, time and the like are taken from sbatch's environment
-// (SBATCH_...).
+// Writes slurm.sh (a shard per task) and slurm-merge.sh into the folder of the batch, and submits both. slurm-merge.sh
+// runs when all tasks have ended. `arguments`: the arguments of isoshift, without those that choose a shard. Returns
+// the answer of sbatch. Throws Error if sbatch refuses or is not installed. Partition, time and similar settings come
+// from sbatch's environment (SBATCH_...).
 std::string submit_to_slurm(const std::filesystem::path& folder, const std::vector<std::string>& arguments, int tasks);
 
 }  // namespace isoshift

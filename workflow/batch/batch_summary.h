@@ -1,5 +1,5 @@
 #pragma once
-// What became of a batch: summary.csv, summary.json, index.html, patients.html, and the same in words.
+// The outcome of a batch: summary.csv, summary.json, index.html, patients.html, and the same in words.
 
 #include <string>
 #include <vector>
@@ -12,17 +12,17 @@ namespace isoshift {
 
 struct CaseEnd {
   std::string name;
-  std::optional<SetupResult> report;  // without pictures; unset: it failed, or has not ended
-  std::string error;                  // why it failed; empty without a report: it has not ended
+  std::optional<SetupResult> report;  // without pictures; unset: the case failed, or has not ended
+  std::string error;                  // why the case failed; empty without a report: the case has not ended
 };
 
 struct BatchSummary {
   std::vector<CaseEnd> cases;           // in the manifest's order
-  std::vector<PatientErrors> patients;  // from accepted results with all components
+  std::vector<PatientErrors> patients;  // from accepted results with all six components
   std::optional<PopulationErrors> population;
 
   std::size_t accepted() const;
-  std::size_t open() const;  // have not ended
+  std::size_t open() const;  // cases that have not ended
 };
 BatchSummary summary_of(const BatchFolder& folder, const std::vector<BatchCase>& cases);
 

@@ -14,15 +14,15 @@ namespace isoshift {
 
 struct EvaluateOptions {
   StudyOptions study;
-  RegistrationRequest registration;  // settled
+  RegistrationRequest registration;  // settle() must have been called
   StartProtocol protocol;
-  int jobs = 0;  // registrations at a time, each on one thread; 1: one on all cores; 0: as many as there are cores
-  Eigen::Isometry3d truth = Eigen::Isometry3d::Identity();  // setup error
+  int jobs = 0;  // registrations at a time, each on one thread; 1: one on all cores; 0: as many as the machine's cores
+  Eigen::Isometry3d truth = Eigen::Isometry3d::Identity();  // the true setup error
   std::filesystem::path output;
 };
 
-// Runs what the folder of an earlier call lacks, and writes summary and plots. Throws UsageError for several jobs of a
-// renderer that does one registration at a time.
+// Runs the registrations that are not yet in the folder, and writes summary and plots. Throws UsageError if several
+// jobs are asked of a renderer that can only do one registration at a time.
 EvaluationFolder evaluate_study(const EvaluateOptions& options, Notes& notes, Observer& observer);
 
 }  // namespace isoshift

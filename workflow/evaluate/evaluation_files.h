@@ -1,6 +1,6 @@
 #pragma once
-// The folder of an evaluation: what was evaluated, a line for every run as it ends, then summary and plots. An
-// evaluation that was stopped goes on from its lines.
+// The folder of an evaluation: its configuration, a line for every run that has ended, then summary and plots. An
+// evaluation that was stopped continues after its last line.
 
 #include <filesystem>
 #include <nlohmann/json.hpp>
@@ -14,10 +14,10 @@ namespace isoshift {
 
 class EvaluationFolder {
  public:
-  // Makes the folder, or opens that of the same evaluation. Throws Error if it holds anything else.
+  // Makes the folder, or opens the folder of the same evaluation. Throws Error if it holds anything else.
   EvaluationFolder(std::filesystem::path path, nlohmann::ordered_json configuration);
 
-  // Opens one to read. Throws Error if there is none.
+  // Opens the folder of an evaluation for reading. Throws Error if `path` is not such a folder.
   explicit EvaluationFolder(std::filesystem::path path);
 
   const std::vector<EvaluatedRun>& runs() const { return runs_; }  // ended so far, in the order they ended
@@ -25,7 +25,8 @@ class EvaluationFolder {
 
   void append(const EvaluatedRun& run);
 
-  // summary.json, success.svg (share of successes against the start) and errors.svg (histogram of what was left).
+  // Writes summary.json, success.svg (share of successes against the start) and errors.svg (histogram of the final
+  // errors).
   void write_summary() const;
 
   bool judged_by_mrpd() const { return configuration_.at("success_by") == "mRPD"; }
@@ -38,7 +39,7 @@ class EvaluationFolder {
   std::vector<EvaluatedRun> runs_;
 };
 
-// A row of a table in Markdown: names beside figures.
+// A table in Markdown, with a row per named summary.
 std::string evaluation_table(const std::vector<std::pair<std::string, EvaluationSummary>>& rows);
 
 }  // namespace isoshift

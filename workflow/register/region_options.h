@@ -1,5 +1,5 @@
 #pragma once
-// Which part of the patient is registered.
+// The region, as the user asks for it.
 
 #include <map>
 #include <optional>
@@ -17,16 +17,16 @@ struct RegionOptions {
   std::optional<double> around_isocenter_mm;
   double margin_mm = 5.0;
 
-  // The rectangles by label. Throws UsageError for one that cannot be read or whose label no X-ray has.
+  // The rectangles by label. Throws UsageError for a rectangle that cannot be parsed, or whose label no X-ray has.
   std::map<std::string, PixelRectangle> rectangles_of(const Study& study) const;
 
-  // What was chosen, in words; empty where everything is compared.
+  // The region in words; empty if everything is compared.
   std::vector<std::string> in_words() const;
 };
 
-// The CT as it is rendered, and what of the views is compared.
+// The CT as it is rendered, and the region projected into the views.
 struct RegionOfStudy {
-  // Without what lies outside the volume of interest and without excluded structures; unset: the whole CT.
+  // The CT inside the volume of interest, without excluded structures; unset: the whole CT.
   std::optional<Volume<float>> rendered_ct;
   ProjectedRegion projected;
 };

@@ -1,5 +1,5 @@
 #pragma once
-// From an exported study to the folder of its result: what isoshift register, batch and watch do with each study.
+// From an exported study to the folder of its result. isoshift register, batch and watch use this for each study.
 
 #include <filesystem>
 #include <optional>
@@ -25,14 +25,14 @@ struct RegisterOptions {
   RegistrationSource source = RegistrationSource::kTreatment;
 };
 
-// What registrations of one process share where they can.
+// Work that the registrations of one process can share.
 struct SharedWork {
   CtStore cts;
   RendererStore renderers;
 };
 
-// Registers a study and writes the folder of its result, whole or not at all. `options.registration` must have been
-// settled.
+// Registers a study and writes the folder of its result, whole or not at all. Precondition:
+// `options.registration.settle()` has been called.
 SetupResult register_study(const RegisterOptions& options, SharedWork& shared, Observer& observer);
 
 }  // namespace isoshift

@@ -1,5 +1,5 @@
 #pragma once
-// From what a person asks for and a study to what register_views() takes: the same for every command that registers.
+// Turns a user's request and a study into the input of register_views(), for every command that registers.
 
 #include <memory>
 #include <vector>
@@ -17,12 +17,12 @@ struct RegistrationRequest {
   RegionOptions region;
   RenderingOptions rendering;
 
-  // Settles what the preset says of rendering. Throws UsageError for choices that make no sense together, before
-  // anything is read.
+  // Applies the rendering options that the preset implies. Throws UsageError for options that contradict each other,
+  // before any file is read.
   void settle();
 };
 
-// The renderers of the last whole CT, for registrations that share it.
+// Keeps the renderers of the last whole CT, for registrations that share it.
 class RendererStore {
  public:
   std::shared_ptr<const RendererPyramid> get(const RenderingOptions& rendering,
@@ -34,7 +34,7 @@ class RendererStore {
   std::shared_ptr<const RendererPyramid> last_;
 };
 
-// The options refer to the region: neither can be moved.
+// Cannot be moved: the options point to the region.
 class RegistrationSetup {
  public:
   RegistrationSetup(const RegistrationRequest& request, const Study& study, const std::vector<Beam>& beams,

@@ -1,5 +1,5 @@
 #pragma once
-// From a study and what registration found to its result.
+// Builds the result of a study from what registration found.
 
 #include <filesystem>
 #include <optional>
@@ -13,16 +13,16 @@
 
 namespace isoshift {
 
-// The file of --site; nothing where none is named.
+// The site file of --site; nothing if the user names none.
 std::optional<SiteFile> named_site(const std::filesystem::path& file);
 
-// --site FILE and --anatomy NAME: the site's decisions about results of this anatomy ("" for its default); `before`
-// where no file is named, whose anatomy also holds where none is. Throws UsageError for an anatomy the site does not
-// know, and for one without a file.
+// The site's decisions about results of this anatomy, by --site FILE and --anatomy NAME. Without a site file returns
+// `before`. Without an anatomy ("") takes the anatomy of `before`, or else the site's default. Throws UsageError for an
+// anatomy that the site file does not have, and for an anatomy without a site file.
 std::optional<SiteRules> chosen_site(const std::optional<SiteFile>& file, const std::string& anatomy,
                                      std::optional<SiteRules> before = std::nullopt);
 
-// All but notes, times of loading and what is written; with the pictures of the views, rendered anew.
+// The result without notes, loading times and written files. The pictures of its views are rendered anew.
 SetupResult setup_result_of(const Study& study, const RegistrationRequest& request, const RegistrationSetup& setup,
                             RegistrationResult found);
 

@@ -1,5 +1,5 @@
 #pragma once
-// Which study a person means, and what a person supplies for it: the same for every command that reads one.
+// Which study the user means, and which values the user supplies for it, for every command that reads a study.
 
 #include <string>
 #include <vector>
@@ -17,23 +17,23 @@ struct StudyOptions {
   std::string patient_position, intensity, beam;
   std::optional<double> couch_angle_deg, couch_pitch_deg, couch_roll_deg, sad_mm, sid_mm;
   bool assume_centered = false;
-  double max_span_s = kDefaultUntoldSpanS;  // of the site, no flag
+  double max_span_s = kDefaultUntoldSpanS;  // from the site file; there is no flag
 
-  // Throws UsageError for a word that is none of those allowed, a number that is not finite, or no study at all.
+  // Throws UsageError for a word that is not allowed, a number that is not finite, or if no study is named.
   StudyRequest request() const;
 
  private:
   void check_finite() const;
 };
 
-// Loads the study and tells the observer what was left aside.
+// Loads the study and tells the observer which files were left aside.
 Study load(const StudyOptions& options, Notes& notes, Observer& observer, CtStore& cts);
 inline Study load(const StudyOptions& options, Notes& notes, Observer& observer) {
   CtStore none;
   return load(options, notes, observer, none);
 }
 
-// The beam qualities of its X-rays.
+// The beam qualities of the study's X-rays.
 std::vector<Beam> beams_of(const Study& study);
 
 }  // namespace isoshift

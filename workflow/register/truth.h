@@ -1,5 +1,5 @@
 #pragma once
-// Setup errors from files, and how far a result lies from the known one of a phantom study.
+// Setup errors from files, and the difference between a result and the known setup error of a phantom study.
 
 #include <Eigen/Geometry>
 #include <filesystem>
@@ -7,8 +7,8 @@
 
 namespace isoshift {
 
-// The setup error of a result.json, or of a truth.json as `isoshift phantom` writes it. Throws Error naming what is
-// missing, also for a result that is not fully determined.
+// The setup error of a result.json, or of a truth.json as `isoshift phantom` writes it. Throws Error naming a missing
+// value, and for a result in which a component is not determined.
 Eigen::Isometry3d read_setup_error(const std::filesystem::path& path);
 
 // A table for a person: found, true and difference per axis, and the mean target registration error.

@@ -1,5 +1,5 @@
 #pragma once
-// The pictures of a result's views: X-ray, DRR as planned and as found, and what is marked in them.
+// The pictures of a result's views: X-ray, DRR at the planned pose and at the pose found, and their marks.
 
 #include <vector>
 
@@ -14,7 +14,7 @@ struct MarkedStructure {
   Volume<std::uint8_t> mask;  // in the CT's voxels
 };
 
-// One per view, reduced to at most 640 pixels along an edge.
+// One picture per view, reduced to at most 640 pixels along an edge.
 std::vector<ViewPicture> view_pictures(const Study& study, Renderer& renderer,
                                        const std::vector<MarkedStructure>& structures,
                                        const Eigen::Isometry3d& actual_room_from_patient);

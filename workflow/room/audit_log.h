@@ -1,6 +1,7 @@
 #pragma once
-// The audit log of a results tree: one JSON object per line, lines are only ever added. It holds no names of patients
-// and no UIDs. It also proves which registrations and releases took place: their lines name the SHA-256 of their files.
+// The audit log of a results tree: one JSON object per line. Lines are only added. The log holds no names of patients
+// and no UIDs. It also proves which registrations and releases took place: their lines contain the SHA-256 of their
+// files.
 
 #include <sys/types.h>
 
@@ -20,21 +21,21 @@ class AuditLog {
  public:
   explicit AuditLog(std::filesystem::path path) : path_(std::move(path)) {}
 
-  // Adds a line for something that is about to take effect. On return the line is on the disk. Throws Error where it
-  // cannot be: then the step must not be taken.
+  // Adds a line for a step that is about to take effect. On return the line is on the disk. Throws Error if the line
+  // cannot be written: then the step must not be taken.
   void append(const std::string& event, const nlohmann::ordered_json& details);
-  // Adds a line for something that has happened. A line that cannot be written now is kept for later.
+  // Adds a line for a step that has taken effect. If the line cannot be written now, it is kept for later.
   void note(const std::string& event, const nlohmann::ordered_json& details);
   // Writes the lines that were kept. Throws Error if they still cannot be written.
   void write_kept();
 
-  // What the lines prove. All throw Error for a log that is there and cannot be read.
-  // The newest registration of the session has this record.
+  // The following say what the lines prove. They throw Error if the log exists and cannot be read.
+  // True if the newest registration of the session has this record.
   bool has_registration(const std::string& session, const std::string& record_sha256) const;
-  // A release of the session has this file.
+  // True if a release of the session has this file.
   bool has_release(const std::string& session, const std::string& release_sha256) const;
   bool has_sending(const std::string& session, const std::string& peer, const std::string& object_sha256) const;
-  // The session with which an object was released, if it was.
+  // The session with which an object was released; nothing if the object was not released.
   std::optional<std::string> session_releasing(const std::string& object_sha256) const;
 
  private:

@@ -1,5 +1,5 @@
 #pragma once
-// Registers in a process of its own, so that whatever a registration meets ends that process only.
+// Registers in a child process, so that a crash of a registration does not end the program.
 
 #include <chrono>
 #include <memory>
@@ -10,7 +10,7 @@
 
 namespace isoshift {
 
-// isoshift register, with the site file and the flags of a watch file.
+// Runs isoshift register with the site file and the flags of a watch file.
 class ChildRunner : public Runner {
  public:
   explicit ChildRunner(const WatchFile& watch, std::chrono::milliseconds limit = kLongestRegistration)
@@ -24,7 +24,7 @@ class ChildRunner : public Runner {
   Failure failure_of(const ChildEnd& end) const;
 
   const WatchFile& watch_;
-  std::chrono::milliseconds limit_;  // a registration that takes longer hangs
+  std::chrono::milliseconds limit_;  // a registration that takes longer is ended
   std::filesystem::path folder_;
   std::unique_ptr<Child> child_;
 };

@@ -1,5 +1,5 @@
 #pragma once
-// The time in a treatment room. Whatever waits there asks a Clock, so that a test can let hours pass at once.
+// The time in a treatment room. All code that waits uses a Clock, so that a test can let hours pass at once.
 
 #include <chrono>
 #include <filesystem>
@@ -13,7 +13,7 @@ class Clock {
 
   virtual ~Clock() = default;
 
-  // For lengths of time while the program runs; nobody sets it.
+  // For durations while the program runs. Nobody can set this time.
   virtual Time now() const = 0;
   // For the ages of files, which outlive the program.
   virtual std::filesystem::file_time_type file_time() const = 0;

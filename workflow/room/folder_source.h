@@ -11,7 +11,7 @@
 
 namespace isoshift {
 
-// A file counts once it has not changed between two updates; what is removed is forgotten.
+// A file is read once it has not changed between two updates. A file that is removed is forgotten.
 class FolderSource : public Source {
  public:
   FolderSource(std::filesystem::path folder, const Clock& clock)
@@ -19,9 +19,10 @@ class FolderSource : public Source {
 
   void update(Notes& notes) override;
   const std::map<std::string, Patient>& patients() const override { return files_.patients(); }
-  // Files that grow. A file of which nobody can tell yet whose it is counts for a minute.
+  // True while a file of this patient grows. A file whose patient is not known yet counts for every patient, for a
+  // minute.
   bool is_coming(const std::string& patient_id) const override;
-  void ask_for_rest(const std::string& /*patient_id*/) override {}          // all is there that there is
+  void ask_for_rest(const std::string& /*patient_id*/) override {}          // the folder has no other files
   void forget_before(std::filesystem::file_time_type /*time*/) override {}  // the folder is not ours
 
  private:

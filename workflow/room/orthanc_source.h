@@ -1,6 +1,6 @@
 #pragma once
-// An Orthanc server: its objects are fetched as they come, and kept in a folder of ours until nothing of their patient
-// has come for long.
+// An Orthanc server. Its objects are fetched as they arrive there, and kept in a folder until no object of their
+// patient has arrived for a long time.
 
 #include <cstdint>
 #include <filesystem>
@@ -16,16 +16,16 @@ namespace isoshift {
 
 class OrthancSource : public Source {
  public:
-  // `server` is at `url`. Goes on from what an earlier run left in the folder `objects`.
+  // `server` is at `url`. Continues with the objects that an earlier run left in the folder `objects`.
   OrthancSource(const Orthanc& server, std::string url, std::filesystem::path objects, const Clock& clock);
 
-  // Throws ServerError where the server does not answer.
+  // Throws ServerError if the server does not answer.
   void update(Notes& notes) override;
   const std::map<std::string, Patient>& patients() const override { return files_.patients(); }
-  // Changes that the server has not told. An instance that it does not give counts for a minute: nobody knows whose it
-  // is.
+  // True while the server has changes that were not read yet. An instance that the server fails to deliver counts for
+  // every patient, for a minute, since its patient is not known.
   bool is_coming(const std::string& patient_id) const override;
-  // The next update asks the server once what else it has of a patient, and again after each object that comes.
+  // The next update asks the server once which other objects it has of a patient, and again after each new object.
   void ask_for_rest(const std::string& patient_id) override { rest_.emplace(patient_id, Clock::Time()); }
   void forget_before(std::filesystem::file_time_type time) override;
 
@@ -53,8 +53,8 @@ class OrthancSource : public Source {
   std::int64_t last_change_ = 0;
   std::string last_mark_;
   std::map<std::string, Attempts> unfetched_;  // instances
-  std::map<std::string, Clock::Time> rest_;    // patients to be asked for, and when
-  std::set<std::string> useless_;              // instances that are no part of a study
+  std::map<std::string, Clock::Time> rest_;    // patients whose other objects are asked for, and when
+  std::set<std::string> useless_;              // instances that belong to no study
   bool has_all_changes_ = true, has_read_objects_ = false, has_checked_server_ = false;
   std::string saved_state_;
 };

@@ -1,5 +1,5 @@
 #pragma once
-// Which files there are, of which patients: each object (SOPInstanceUID) once.
+// The known files of each patient, with each object (SOPInstanceUID) once.
 
 #include <filesystem>
 #include <map>
@@ -17,7 +17,7 @@ struct KnownFile {
   std::string patient_id, uid;  // SOPInstanceUID
 };
 
-// Of what scan_file() found; nothing for a file that is no part of a study.
+// From the result of scan_file(); nothing for a file that is not a CT image, plan, structure set or X-ray.
 std::optional<KnownFile> known_file_in(const StudyFiles& one);
 
 class PatientFiles {
@@ -29,25 +29,26 @@ class PatientFiles {
 
   struct Taken {
     bool is_readable = true;
-    std::optional<std::filesystem::path> replaced;  // a broken file of the same object: its place is taken
-    std::vector<std::filesystem::path> copies;      // as forget() returns them, of files that were forgotten
+    std::optional<std::filesystem::path> replaced;  // a broken file of the same object, which this file replaces
+    std::vector<std::filesystem::path> copies;      // what forget() returned for files that were forgotten
   };
-  // Reads a file, in place of what was read under this name before. A whole file of an object that is known is left
-  // out; if the contents differ, a warning says so.
+  // Reads a file, and forgets an earlier version of it. If another complete file of the same object is known, the new
+  // file is not used; if the contents differ, a warning says so.
   Taken take(const std::filesystem::path& file, Notes& notes);
 
-  // Returns the files that were left out as copies of this one: take() one of them in its place.
+  // Forgets a file. Returns the files that were not used because they are copies of it: take() one of them in its
+  // place.
   std::vector<std::filesystem::path> forget(const std::filesystem::path& file);
 
-  // A file that was left out is gone.
+  // Forgets a copy that was not used and has been removed.
   void forget_copy(const std::filesystem::path& file);
 
  private:
   const Clock& clock_;
   std::map<std::string, Patient> patients_;
   std::map<std::filesystem::path, KnownFile> known_;
-  std::map<std::string, std::filesystem::path> file_of_uid_;     // of those known
-  std::multimap<std::string, std::filesystem::path> copies_of_;  // of a SOPInstanceUID, left out
+  std::map<std::string, std::filesystem::path> file_of_uid_;     // the known file, by SOPInstanceUID
+  std::multimap<std::string, std::filesystem::path> copies_of_;  // files that are not used, by SOPInstanceUID
 };
 
 }  // namespace isoshift

@@ -1,15 +1,16 @@
 #pragma once
-// The folder in which isoshift watch keeps what it made, and what became of it. Files are its only memory, each written
-// at once, so that whoever is stopped at any moment goes on from them:
+// The folder in which isoshift watch keeps results, releases and deliveries. These files are its only memory. Each is
+// written whole or not at all, so that a process that was stopped at any moment can continue from them:
 //
 //   sessions/NAME/           the result of a session of X-rays
 //   registered/NAME.json     the SHA-256 of every file in that folder when it was registered
-//   released/NAME.json       who released it, and what goes to whom
-//   sent/NAME.PEER.FILE      that peer has answered that it stored this file
-//   audit.jsonl              what happened when, who released what: no names of patients, no UIDs
+//   released/NAME.json       who released the session, and which objects are sent to which peers
+//   sent/NAME.PEER.FILE      the mark that this peer has confirmed this file
+//   audit.jsonl              the audit log, without names of patients and without UIDs
 //
-// Nothing is released or sent unless the folder is what its record says and the audit log has a line for the record and
-// for the release, each with the SHA-256 of its file. A line is on the disk before its step takes effect.
+// A session is released or sent only if its folder is unchanged since its record was written, and if the audit log has
+// a line for the record and for the release, each with the SHA-256 of its file. A line is on the disk before its step
+// takes effect.
 
 #include <filesystem>
 #include <map>
@@ -25,7 +26,7 @@
 
 namespace isoshift {
 
-// Who releases a session: by what name, as which user of the system, and from which user that one came by sudo.
+// Who releases a session: the name given, the user of the system, and the user who became that user by sudo.
 struct Releaser {
   std::string by, user, sudo_user;  // sudo_user: empty without sudo
 };
@@ -42,7 +43,7 @@ struct Release {
   Releaser releaser;
   std::string on;  // local time
   std::string verdict;
-  std::string record;  // SHA-256 of the record of the session as it was released
+  std::string record;  // SHA-256 of the session's record at the time of the release
   std::vector<Object> objects;
   std::vector<std::string> peers;
 };
@@ -54,65 +55,67 @@ struct Delivery {
 
 class ResultsTree {
  public:
-  // Makes what is not there. Throws Error where it cannot.
+  // Makes the folders that do not exist. Throws Error if that fails.
   explicit ResultsTree(std::filesystem::path path);
 
   const std::filesystem::path& path() const { return path_; }
   std::filesystem::path session(const std::string& name) const { return path_ / "sessions" / name; }
-  std::vector<std::string> sessions() const;  // that have a result
+  std::vector<std::string> sessions() const;  // sessions that have a result
 
-  // For whoever registers and sends: nothing where somebody else does.
+  // The lock of the tree, for the process that registers and sends; nothing if another process holds it.
   std::optional<FileLock> try_lock() const;
 
-  // Removes what a killed process left half written. Only for whoever holds the lock of the tree.
+  // Removes files that a killed process left half written. The caller must hold the lock of the tree.
   void clean();
 
-  // The folder in which this process registers a session. publish() makes it the session's folder.
+  // The folder in which this process registers a session. publish() moves it to the session's place.
   std::filesystem::path registering(const std::string& session) const;
   // Throws Error if there is a session of this name already.
   void check_is_new(const std::string& session) const;
-  // Records what was registered, adds its line to the audit log, and moves the folder to its place, in this order: a
-  // session without a record was not registered here. Throws Error where one of the three fails. Only for whoever
-  // holds the lock of the tree.
+  // Writes the record of a session, adds its line to the audit log, and moves the folder to its place, in this order,
+  // so that a session without a record cannot be one that was registered here. Throws Error if one of the three steps
+  // fails. The caller must hold the lock of the tree.
   void publish(const std::string& session);
-  // The record of a session. Throws Error if there is none, or if the audit log does not have it.
+  // The record of a session. Throws Error if there is no record, or if the audit log has no line for it.
   SessionRecord registered(const std::string& session) const;
 
   bool is_released(const std::string& session) const;
-  // Throws Error for a release file that isoshift release did not write, or that was changed.
+  // The release of a session, if there is one. Throws Error for a release file that isoshift release did not write, or
+  // that was changed.
   std::optional<Release> release_of(const std::string& session) const;
-  // Records who releases a session, with the objects that it holds. Throws Error for a session that is not there, that
-  // was rejected, that has been released before, or that is not what was registered, and where the audit log cannot be
-  // written; then it is not released.
+  // Releases a session with its objects. Throws Error, and releases nothing, if the session does not exist, was
+  // rejected, has been released before, or has changed since its registration, or if the audit log cannot be written.
   Release release(const std::string& session, const Releaser& releaser, const std::vector<std::string>& peers);
 
   struct Pending {
     std::vector<Delivery> deliveries;
-    std::map<std::string, std::string> refused;  // why nothing of a session is sent
+    std::map<std::string, std::string> refused;  // reason why a session is not sent, by session
   };
-  // What was released and no peer has answered for. What has been delivered once is not read again.
+  // The released objects that their peers have not confirmed yet. A session whose objects have all been delivered is
+  // not read again.
   Pending pending();
   std::vector<Delivery> pending_of(const Release& release) const;
-  // The file, if it is still released, and its session is what was registered. Throws Error if not.
+  // The file to send. Throws Error if it is no longer released, or if its session has changed since its registration.
   std::filesystem::path checked_file(const Delivery& delivery) const;
-  // Writes what mark_sent() only has to put in place: with a full disk nothing is sent that cannot be marked.
+  // Writes the mark, which mark_sent() then only renames: if the disk is full, the object is not sent, since it could
+  // not be marked.
   void prepare_to_send(const Delivery& delivery);
-  // It was prepared and not marked: the peer may have it.
+  // True if sending was prepared and the object was not marked as sent: the peer may have the object.
   bool is_in_doubt(const Delivery& delivery) const;
   void mark_sent(const Delivery& delivery, const std::string& answer);
 
-  // A line in the audit log for what has happened. What cannot be written now is kept.
+  // Adds a line to the audit log for a step that has taken effect. If the line cannot be written now, it is kept.
   void audit(const std::string& event, const nlohmann::ordered_json& details);
-  // Writes the lines that were kept. Throws Error if they cannot be.
+  // Writes the lines that were kept. Throws Error if they still cannot be written.
   void write_kept_audit();
-  // Adds lines for objects that were sent by somebody who was killed before the line. Only for whoever holds the lock.
+  // Adds the lines of objects whose sender was killed before it wrote the line. The caller must hold the lock.
   void complete_audit();
 
  private:
   std::filesystem::path record_file(const std::string& session) const;
   std::filesystem::path release_file(const std::string& session) const;
   std::vector<std::string> released() const;  // sessions
-  // The record of a session whose folder holds what was registered. Throws Error if not.
+  // The record of a session. Throws Error if the session's folder has changed since its registration.
   SessionRecord checked(const std::string& session) const;
   FileLock lock_releases() const;
   void check_objects_are_new(const Release& release) const;
@@ -123,7 +126,7 @@ class ResultsTree {
 
   std::filesystem::path path_;
   AuditLog audit_;
-  std::set<std::string> delivered_;  // sessions, to all of their peers
+  std::set<std::string> delivered_;  // sessions that all of their peers have confirmed
 };
 
 }  // namespace isoshift

@@ -1,5 +1,5 @@
 #pragma once
-// How a released object gets to a peer.
+// Sends a released object to a peer.
 
 #include <filesystem>
 #include <string>

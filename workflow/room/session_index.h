@@ -1,6 +1,6 @@
 #pragma once
-// The pages that list the sessions of a results tree: index.html with what waits and the newest, and a page per month
-// with all of it.
+// The pages that list the sessions of a results tree: index.html with the sessions that wait and the newest sessions,
+// and a page per month with all sessions of that month.
 
 #include <map>
 #include <string>
@@ -12,10 +12,10 @@
 
 namespace isoshift {
 
-// "KV_AP 2026-03-01 10:15:00; KV_LAT 2026-03-01 10:15:10", of the X-rays of a session.
+// Labels and times of the X-rays of a session: "KV_AP 2026-03-01 10:15:00; KV_LAT 2026-03-01 10:15:10".
 std::string times_of(const std::vector<StudyFiles::Image>& images);
 
-// X-rays without a result, and why.
+// A session without a result, with the reason.
 struct WaitingSession {
   std::string name, patient_id, acquired, why;
   bool has_failed = false;
@@ -26,12 +26,12 @@ class SessionIndex {
  public:
   SessionIndex(const ResultsTree& tree, std::string site) : tree_(tree), site_(std::move(site)) {}
 
-  // `obstacle`: why the session cannot be released; empty: it can be.
+  // `obstacle`: why the session cannot be released; empty if it can be released.
   void add(const std::string& session, const SetupResult& report, const std::string& obstacle);
   std::size_t size() const { return sessions_.size(); }
 
-  // Looks what has been released and sent, and writes the pages that are no longer true. `troubles`: what does not work
-  // now.
+  // Finds out which sessions have been released and sent, and writes the pages that have changed. `troubles`: the
+  // current troubles, such as a full disk.
   void update(const std::vector<WaitingSession>& waiting, const std::vector<std::string>& troubles);
 
  private:
@@ -41,7 +41,7 @@ class SessionIndex {
     std::string state;
     std::string first;     // when the first X-ray was acquired, "2026-03-01 10:15:00"
     std::string times;     // of all X-rays
-    bool is_over = false;  // nothing becomes of it any more
+    bool is_over = false;  // the state cannot change any more
   };
   bool update_states();
   void write(const std::string& page, const std::string& html);
@@ -52,7 +52,7 @@ class SessionIndex {
   std::vector<WaitingSession> waiting_;
   std::vector<std::string> troubles_;
   bool is_written_ = false;
-  std::map<std::string, std::string> written_;  // SHA-256 of pages
+  std::map<std::string, std::string> written_;  // SHA-256 of the written pages, by page
 };
 
 }  // namespace isoshift

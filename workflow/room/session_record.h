@@ -9,17 +9,17 @@ namespace isoshift {
 
 struct SessionRecord {
   std::string session, verdict, on;          // `on`: local time
-  std::map<std::string, std::string> files;  // SHA-256 by name; all files of the folder, result.json among them
-  std::string sha256;                        // of the record's own file; empty until it is one
+  std::map<std::string, std::string> files;  // SHA-256 by name, of all files of the folder, including result.json
+  std::string sha256;                        // of the record's own file; empty until it is written
 };
 
 // The record of a folder that isoshift register has just written. Throws Error if the folder holds anything but plain
-// files, or if the X-rays of its result are not those that give the session its name.
+// files, or if the name of the session does not belong to the X-rays of the result.
 SessionRecord record_of(const std::string& session, const std::filesystem::path& folder);
 
 // The record as a JSON file.
 std::string json_of(const SessionRecord& record);
-// Throws Error naming the file and what is wrong with it.
+// Reads a record. Throws Error naming the file and what is wrong with it.
 SessionRecord read_session_record(const std::filesystem::path& path);
 
 // Throws Error naming a file of the folder that is missing, has been added or differs from what was registered.

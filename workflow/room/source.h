@@ -1,5 +1,5 @@
 #pragma once
-// Where the files of many patients come from: in any order, some twice, some broken.
+// The source of the files of many patients. Files arrive in any order, some twice, some broken.
 
 #include <filesystem>
 #include <map>
@@ -13,27 +13,27 @@ namespace isoshift {
 
 struct Patient {
   StudyFiles files;
-  Clock::Time last;  // when one of them came last
+  Clock::Time last;  // when the last of these files arrived
 };
 
 class Source {
  public:
   virtual ~Source() = default;
 
-  // Takes what has come since the last call. Throws Error for a source that cannot be asked now, or a disk that is
-  // full; the next call goes on.
+  // Takes the files that have arrived since the last call. Throws Error if the source does not answer, or if the disk
+  // is full; the next call continues.
   virtual void update(Notes& notes) = 0;
 
   // By PatientID.
   virtual const std::map<std::string, Patient>& patients() const = 0;
 
-  // Whether something of this patient may be on its way. Files of an unknown patient may be of this one.
+  // Whether a file of this patient may be arriving now. A file whose patient is not known yet may be of this patient.
   virtual bool is_coming(const std::string& patient_id) const = 0;
 
-  // Files of this patient are missing: the next update() looks for those that were forgotten.
+  // Says that files of this patient are missing: the next update() fetches files that were forgotten.
   virtual void ask_for_rest(const std::string& patient_id) = 0;
 
-  // Removes the files kept here of every patient of whom nothing has come since. What another program keeps is not
+  // Removes the kept files of every patient of whom no file has arrived since `time`. Files of other programs are not
   // touched.
   virtual void forget_before(std::filesystem::file_time_type time) = 0;
 };

@@ -1,5 +1,6 @@
 #pragma once
-// What does not work now: a full disk, a server that is down. It ends nothing, and is tried again.
+// The current troubles, such as a full disk or a server that is down. A trouble does not end the program; the work is
+// tried again.
 
 #include <fmt/format.h>
 
@@ -17,7 +18,7 @@ class Troubles {
  public:
   explicit Troubles(Observer& observer) : observer_(observer) {}
 
-  // Does the work. The observer is told of an Error when it is a new one, and when the work goes on.
+  // Does the work. Tells the observer of an Error if it differs from the last one, and when the work succeeds again.
   void attempt(const std::string& what, const std::function<void()>& work) {
     try {
       work();
@@ -36,7 +37,7 @@ class Troubles {
 
  private:
   Observer& observer_;
-  std::map<std::string, std::string> why_;  // by what is tried
+  std::map<std::string, std::string> why_;  // by `what`
 };
 
 }  // namespace isoshift

@@ -1,5 +1,6 @@
 #pragma once
-// A treatment room: what comes is registered, the results are held until they are released, what is released is sent.
+// A treatment room: registers the sessions that arrive, holds the results until they are released, and sends released
+// results.
 
 #include <chrono>
 #include <functional>
@@ -41,32 +42,32 @@ class Watch {
     Sender& sender;
     Clock& clock;
     Observer& observer;
-    Observer& sending;               // is told by deliver()
+    Observer& sending;               // receives the messages of deliver()
     bool takes_other_xrays = false;  // a machine profile supplies the geometry of X-rays that are no RT Images
   };
 
-  // Goes on from what is in the results tree. Throws Error where another watch works there.
+  // Continues from the files in the results tree. Throws Error if another watch uses that tree.
   Watch(const WatchFile& watch, const Parts& parts);
 
-  // Takes what has come, ends and begins registrations, releases what needs no person, and writes the pages. Waits for
-  // nobody, and throws nothing that may be over in the next round.
+  // Takes new files, ends and begins registrations, releases results that need no person, and writes the pages. Never
+  // waits. Does not throw for troubles that may be over in the next round.
   void round();
 
-  // Sends what is released and due. May run in a thread of its own beside round().
+  // Sends the deliveries that are due. May run in its own thread beside round().
   void deliver(const std::stop_token& stop);
 
-  // Rounds, and deliveries in a thread, until the end is asked for. Then gives up the registration under way.
+  // Calls round(), and deliver() in a thread, until the end is asked for. Then gives up the current registration.
   void run(const std::function<bool()>& is_end_asked_for);
 
  private:
   struct Running {
     std::string session;
-    Clock::Time news;  // of the patient, when it began
+    Clock::Time news;  // when the patient's last file had arrived, as the registration began
   };
   struct Failure {
     std::string why;
-    Clock::Time news;              // of the patient, when it began
-    std::optional<Backoff> again;  // unset: when there is news
+    Clock::Time news;              // when the patient's last file had arrived, as the registration began
+    std::optional<Backoff> again;  // unset: tried again only when another file of the patient arrives
   };
   struct Complete {
     SessionFiles session;
@@ -94,13 +95,13 @@ class Watch {
   SessionIndex index_;
   Deliverer deliverer_;
   std::set<std::string> registered_;  // SOPInstanceUIDs of X-rays that have a result
-  std::set<std::string> accepted_;    // sessions to be released without a person
+  std::set<std::string> accepted_;    // sessions that will be released without a person
   std::vector<WaitingSession> waiting_;
   std::optional<Running> running_;
   std::map<std::string, Failure> failures_;  // by session
   Troubles troubles_, sending_troubles_;
-  Clock::Time seen_at_;     // what had come by then has been seen
-  Clock::Time quiet_from_;  // the source could not be asked until then
+  Clock::Time seen_at_;     // all files that had arrived by then have been read
+  Clock::Time quiet_from_;  // until then the source did not answer
   Clock::Time next_forgetting_;
   const SystemUser user_ = system_user();
 };

@@ -1,5 +1,5 @@
 #pragma once
-// Where a 4D CT shows the target in each of its phases.
+// The position of the target in each phase of a 4D CT.
 
 #include <Eigen/Core>
 #include <filesystem>
@@ -9,8 +9,8 @@
 
 namespace isoshift {
 
-// Displacements from the planning CT, mm, IEC 61217 fixed: found as in X-rays, in DRRs of each phase from two sides.
-// Throws Error for a phase of another frame of reference, or in which the target is not found.
+// Displacements of the target from the planning CT, mm, IEC 61217 fixed. DRRs of each phase from two sides are
+// registered like X-rays. Throws Error for a phase in another frame of reference, or in which the target is not found.
 std::vector<Eigen::VectorXd> displacements_of_phases(const std::vector<std::filesystem::path>& folders,
                                                      const Study& study, const RegistrationSetup& setup,
                                                      const RenderingOptions& rendering,

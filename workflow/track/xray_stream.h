@@ -1,5 +1,5 @@
 #pragma once
-// X-rays of a moving target in the order in which they were taken, from files that are there or still arrive.
+// X-rays of a moving target in the order of acquisition, from files that exist or still arrive.
 
 #include <deque>
 #include <filesystem>
@@ -18,34 +18,34 @@ namespace isoshift {
 struct TimedXray {
   RtImage header;
   double time_s = 0.0;            // since an epoch
-  std::optional<XrayImage> xray;  // of files that still arrive: read at once, so that none is half written
+  std::optional<XrayImage> xray;  // set for files that still arrive: their pixels are read at once
 };
 
-// What became of the files that are not followed.
+// Counts of the files that are not used.
 struct StreamCounts {
-  std::size_t repeated = 0;  // an instance that was there before
+  std::size_t repeated = 0;  // the same instance had arrived before
   std::size_t late = 0;      // taken before a moment that was processed already
   std::size_t broken = 0;    // cannot be read, or is of another patient
 };
 
 class XrayStream {
  public:
-  // `reads_pixels`: at once, for files that still arrive.
+  // `reads_pixels`: reads pixels at once, for files that still arrive.
   XrayStream(const StudyRequest& request, const Study& study, bool reads_pixels)
       : request_(request), study_(study), reads_pixels_(reads_pixels) {}
 
-  // Takes what can be read of the files that are not done; those that cannot, yet, are tried again by the next calls
-  // and given up after `tries`. Each warning is said once.
+  // Reads the files that are not done. A file that cannot be read yet is tried again by the next calls, and given up
+  // after `tries` calls. Each warning is given once.
   void offer(const std::vector<std::filesystem::path>& files, int tries, Notes& notes);
 
-  // The X-rays of the earliest moment, those of all imagers within `together_s`; nothing where none waits.
-  // `may_be_incomplete`: also where another imager's X-ray of that moment may still come.
+  // The X-rays of the earliest moment: those of all imagers within `together_s`. Empty if no moment is complete.
+  // `may_be_incomplete`: returns a moment even if another imager's X-ray of that moment may still arrive.
   std::vector<TimedXray> next_moment(double together_s, bool may_be_incomplete);
 
-  // When the first X-ray of all was taken.
+  // When the first of all X-rays was taken.
   std::optional<double> begin_s() const { return begin_s_; }
   const StreamCounts& counts() const { return counts_; }
-  const std::vector<double>& late_s() const { return late_s_; }  // when those were taken
+  const std::vector<double>& late_s() const { return late_s_; }  // acquisition times
   std::size_t waiting() const { return waiting_.size(); }
   std::size_t imagers() const { return imagers_.size(); }
   const std::unordered_set<std::string>& done_files() const { return done_files_; }  // offering them again does nothing
