@@ -145,7 +145,6 @@ class Checker {
     check_code(registrations.front(), name);
     const std::vector<DicomItem> matrices = registrations.front().items(DCM_MatrixSequence);
     if (matrices.empty()) error(fmt::format("{}: {} has no item", name, described(DCM_MatrixSequence)));
-    means_one_matrix_ = means_one_matrix_ && matrices.size() <= 1;
     if (matrices.size() > 1)
       error(fmt::format("{}: {} has {} items. The first one is applied first; SlicerRT multiplies them the other way",
                         name, described(DCM_MatrixSequence), matrices.size()));
