@@ -23,6 +23,7 @@ fresh_debian() {
   root=$(mktemp -d /var/tmp/isoshift-root-XXXXXX)
   debootstrap --variant=minbase "$codename" "$root" >"$root.log" 2>&1 || { tail -n 20 "$root.log" >&2; rm "$root.log"; exit 1; }
   rm -f "$root.log"
+  chmod 755 "$root"  # apt downloads as a user of its own
   cp /etc/resolv.conf "$root/etc/resolv.conf"
   mount -t proc proc "$root/proc"  # bash in ./dev reads from /dev/fd
 }
