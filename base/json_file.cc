@@ -14,6 +14,8 @@
 namespace isoshift {
 
 JsonFile read_json_file(const std::filesystem::path& path) {
+  if (std::filesystem::is_directory(path))
+    throw Error(fmt::format("{}: is a folder, expected a JSON file", path.string()));
   std::ifstream file(path, std::ios::binary);
   const std::string content{std::istreambuf_iterator<char>(file), {}};
   if (!file) throw Error(fmt::format("{}: cannot be read", path.string()));

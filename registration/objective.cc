@@ -87,7 +87,7 @@ Objective::Objective(Renderer& renderer, std::span<const FixedImage> images, con
     if (field.size() < kMinPixels)
       throw Error(
           fmt::format("view {}: only {} of {} pixels lie in the irradiated field and are neither "
-                      "saturated nor otherwise left out, too few to compare",
+                      "saturated nor excluded, too few to compare",
                       views_.size() + 1, field.size(), image.field.pixels.size()));
     if (similarity_ != SimilarityKind::kGradientCorrelation) {
       add_view(image, drawn_pixels(field, options, random));

@@ -93,7 +93,7 @@ ProjectedRegion::ProjectedRegion(const RegionOfInterest& region) {
     return std::ranges::none_of(mask.voxels, [](std::uint8_t in) { return in != 0; });
   };
   if (region.volume) inside_ = renderer_of(*region.volume);
-  for (const Volume<std::uint8_t>& volume : region.left_out)
+  for (const Volume<std::uint8_t>& volume : region.excluded)
     if (!is_empty(volume)) outside_.push_back(renderer_of(volume));
   for (const CutEnds& ends : region.cut_ends) ends_.push_back({renderer_of(ends.columns), ends.along_patient});
 }
@@ -111,7 +111,7 @@ void ProjectedRegion::restrict(FixedImage& image, const Eigen::Isometry3d& room_
     return static_cast<double>(std::ranges::count_if(field.pixels, std::identity()));
   };
   if (inside_) image.field = only_where(*inside_, 1);
-  const auto leave_out = [&](Renderer& outside, double min_left) {
+  const auto exclude = [&](Renderer& outside, double min_left) {
     Image<std::uint8_t> field = only_where(outside, 0);
     if (count(field) < min_left * count(image.field)) return false;
     image.field = std::move(field);
@@ -119,11 +119,11 @@ void ProjectedRegion::restrict(FixedImage& image, const Eigen::Isometry3d& room_
   };
   constexpr double kMinLeft = 0.1, kMinLeftAlong = 0.75;
   for (const auto& outside : outside_)
-    if (!leave_out(*outside, kMinLeft)) image.has_all_left_out = false;
+    if (!exclude(*outside, kMinLeft)) image.has_all_excluded = false;
   const Eigen::Vector3d looking = room_from_patient.linear().transpose() * image.view.central_direction_room();
   for (const Ends& ends : ends_) {
     const bool is_along = std::abs(looking.dot(ends.along_patient)) > 0.5 * std::numbers::sqrt2;
-    leave_out(*ends.renderer, is_along ? kMinLeftAlong : kMinLeft);
+    exclude(*ends.renderer, is_along ? kMinLeftAlong : kMinLeft);
   }
 }
 

@@ -21,7 +21,7 @@ struct CutEnds {
 
 struct RegionOfInterest {
   std::optional<Volume<std::uint8_t>> volume;  // unset: all
-  std::vector<Volume<std::uint8_t>> left_out;  // such as a jaw that moves on its own
+  std::vector<Volume<std::uint8_t>> excluded;  // such as a jaw that moves on its own
   std::vector<CutEnds> cut_ends;
 };
 

@@ -48,7 +48,7 @@ void report_views(const RendererPyramid& renderers, const FixedViews& views, con
     result.views.push_back({.label = level[view].label,
                             .similarity_start = similarity[0][view],
                             .similarity_final = similarity[1][view],
-                            .has_all_left_out = level[view].has_all_left_out,
+                            .has_all_excluded = level[view].has_all_excluded,
                             .consistency = std::move(consistency[view])});
   }
 }

@@ -39,7 +39,7 @@ struct ViewMatch {
   std::string label;  // of the X-ray
   double similarity_start = -1.0;
   double similarity_final = -1.0;
-  bool has_all_left_out = true;         // what was excluded, with the patient at the pose found
+  bool has_all_excluded = true;         // what was excluded, with the patient at the pose found
   ViewConsistency consistency;          // of its parts with the pose found
   std::optional<LeftOutView> left_out;  // with three or more views
 };

@@ -94,7 +94,7 @@ int run_batch(BatchFlags& flags, Console& console) {
   }
   if (flags.merge) return summarize(batch, flags.json, console);
   if (!batch.run()) {
-    observer.say("ended before all cases were registered; the same command goes on");
+    observer.say("ended before all cases were registered; the same command continues the batch");
     return kExitFailed;
   }
   return options.shard && options.shard->count > 1 ? print(batch.summary(), flags.json, console)
@@ -109,10 +109,10 @@ void add_batch_command(CLI::App& app, Console& console, int& exit_status) {
   CLI::App* command = app.add_subcommand("batch", "Register many studies");
   command->footer(
       "\nExample:\n  isoshift batch exported/ -o results            # every session of X-rays below the folder\n"
-      "  isoshift batch --scan exported/ -o cases.csv   # only write down which files would make a case\n"
+      "  isoshift batch --scan exported/ -o cases.csv   # only list the cases and their files\n"
       "  isoshift batch cases.csv -o results --jobs 4\n\n"
-      "Writes a folder per case, index.html, patients.html, summary.csv and summary.json. The same command goes on\n"
-      "where one was stopped.\n"
+      "Writes a folder per case, index.html, patients.html, summary.csv and summary.json. The same command\n"
+      "continues a batch that was stopped.\n"
       "Exit status: 0 all accepted, 1 failed or stopped, 2 usage, 3 some accepted, 4 none.");
   command
       ->add_option("cases", options.cases,
@@ -122,22 +122,23 @@ void add_batch_command(CLI::App& app, Console& console, int& exit_status) {
   command->add_option("-o,--output", options.output, "Folder for the results; with --scan the manifest to write")
       ->required()
       ->type_name("PATH");
-  command->add_flag("--scan", flags->scan, "Only write the manifest of what is in the folder");
-  command->add_option("--jobs", options.jobs, "Cases at the same time, each in a process of its own")
+  command->add_flag("--scan", flags->scan, "Only write a manifest of the cases in the folder");
+  command->add_option("--jobs", options.jobs, "Cases that are registered at the same time, each in its own process")
       ->type_name("N")
       ->check(CLI::Range(1, 256))
       ->capture_default_str();
   const char* parts = "Beyond one machine";
-  command->add_option("--shard", flags->shard, "Only part I of N; --merge makes the summary of all")
+  command->add_option("--shard", flags->shard, "Register only part I of N; --merge then makes the summary of all parts")
       ->type_name("I/N")
       ->group(parts);
-  command->add_flag("--merge", flags->merge, "Only the summary of what has been registered")->group(parts);
+  command->add_flag("--merge", flags->merge, "Only make the summary of the cases that have been registered")
+      ->group(parts);
   command->add_option("--slurm", flags->slurm_tasks, "Submit N shards as a Slurm job array, and the merge after it")
       ->type_name("N")
       ->check(CLI::Range(1, 100000))
       ->group(parts);
   command->add_flag("--worker", flags->worker)->group("");  // not for people
-  command->add_flag("--json", flags->json, "Print summary.json instead of its figures");
+  command->add_flag("--json", flags->json, "Print summary.json instead of a summary in words");
   add_result_options(*command, options.each);
   add_study_switches(*command, options.each.study);
   add_registration_switches(*command, options.each.registration);

@@ -15,6 +15,7 @@
 #include "io/objects/registration_meaning.h"
 #include "io/objects/spatial_registration.h"
 #include "setup/couch_shift.h"
+#include "workflow/register/study_options.h"
 
 namespace isoshift {
 namespace {
@@ -42,15 +43,13 @@ void CheckOptions::check() const {
   const bool asks_for_shift = !plan.empty() || !isocenter.empty() || !patient_position.empty();
   for (const auto& [flag, angle_deg] :
        {std::pair("--couch-angle", couch_angle_deg), std::pair("--couch-pitch", couch_pitch_deg),
-        std::pair("--couch-roll", couch_roll_deg)}) {
-    if (!angle_deg) continue;
-    check_finite(flag, std::array{*angle_deg});
-    if (!asks_for_shift)
+        std::pair("--couch-roll", couch_roll_deg)})
+    if (angle_deg && !asks_for_shift)
       throw UsageError(
           fmt::format("{} belongs to a couch shift: add --plan FILE, or --isocenter X,Y,Z and "
                       "--patient-position HFS",
                       flag));
-  }
+  check_couch_angles(couch_angle_deg, couch_pitch_deg, couch_roll_deg);
 }
 
 // What the switches say, else the plan; nothing where neither says anything.
@@ -153,10 +152,15 @@ Json describe(const RegistrationComparison& comparison, bool same_source_frame, 
                       deg_from_rad(difference.angle_rad));
   if (!same_source_frame)
     text += "  note   their source frames differ: each was moved to begin at the machine's isocenter\n";
+  if (!comparison.has_patient_ids)
+    text +=
+        "  note   a PatientID (0010,0020) is empty: only their common frame of reference says that both are of one "
+        "patient\n";
   if (difference.other_is_inverted) text += "  error  the second one looks inverted: its inverse lies near the first\n";
   return {{"translation_mm", difference.translation_mm},
           {"rotation_deg", deg_from_rad(difference.angle_rad)},
-          {"looks_inverted", difference.other_is_inverted}};
+          {"looks_inverted", difference.other_is_inverted},
+          {"patient_ids_compared", comparison.has_patient_ids}};
 }
 
 int run_check(const CheckOptions& options, Console& console) {
@@ -202,7 +206,7 @@ void add_check_command(CLI::App& app, Console& console, int& exit_status) {
       ->required()
       ->expected(1, 2)
       ->type_name("FILE...");
-  command->add_option("--plan", options->plan, "RT Plan: its isocenter and patient position tell the shift")
+  command->add_option("--plan", options->plan, "RT Plan, whose isocenter and patient position the couch shift needs")
       ->type_name("FILE");
   command->add_option("--isocenter", options->isocenter, "Planned isocenter in patient coordinates of the CT, mm")
       ->expected(3)
@@ -210,8 +214,10 @@ void add_check_command(CLI::App& app, Console& console, int& exit_status) {
       ->type_name("X,Y,Z");
   command->add_option("--patient-position", options->patient_position, "How the patient lies")->type_name("HFS|...");
   command
-      ->add_option("--couch-angle", options->couch_angle_deg,
-                   "Patient support angle at imaging, IEC 61217; needed for objects from the room's axes")
+      ->add_option(
+          "--couch-angle", options->couch_angle_deg,
+          "Patient support angle at imaging, IEC 61217, plus the table top eccentric angle; needed for objects "
+          "from the room's axes")
       ->type_name("DEG");
   command
       ->add_option("--couch-pitch", options->couch_pitch_deg,
@@ -223,7 +229,7 @@ void add_check_command(CLI::App& app, Console& console, int& exit_status) {
       ->type_name("DEG");
   command
       ->add_option("--source-isocenter", options->source_isocenter,
-                   "Machine's isocenter in the frame that an object of another program starts from, mm")
+                   "Machine's isocenter in the source frame of an object of another program, mm")
       ->expected(3)
       ->delimiter(',')
       ->type_name("X,Y,Z");

@@ -71,7 +71,7 @@ void run_drr(const DrrOptions& options, Console& console) {
 
 void add_drr_command(CLI::App& app, Console& console, int&) {
   auto options = std::make_shared<DrrOptions>();
-  CLI::App* command = app.add_subcommand("drr", "Render what the X-rays of a study should have shown");
+  CLI::App* command = app.add_subcommand("drr", "Render DRRs: what the X-rays of a study should show");
   command->footer(
       "\nExample:\n  isoshift drr exported/ -o drr                               # patient as planned\n"
       "  isoshift drr exported/ -o drr --setup-error out/result.json  # patient as found\n\n"

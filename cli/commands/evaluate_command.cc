@@ -64,13 +64,12 @@ void run_evaluate(EvaluateFlags& flags, Console& console) {
 void add_evaluate_command(CLI::App& app, Console& console, int&) {
   auto flags = std::make_shared<EvaluateFlags>();
   EvaluateOptions& options = flags->evaluation;
-  CLI::App* command = app.add_subcommand("evaluate", "Measure how good registration is, from many starts");
+  CLI::App* command = app.add_subcommand("evaluate", "Measure the accuracy of registration from many starting poses");
   command->footer(
       "\nExample:\n  isoshift evaluate exported/ --truth exported/truth.json -o evaluation\n"
       "  isoshift evaluate --table evaluation other_evaluation\n\n"
-      "Writes runs.csv, summary.json, success.svg and errors.svg. Started again on the same folder, it goes on where "
-      "it "
-      "was\nstopped. The protocol is that of van de Kraats et al. (2005): docs/evaluation.md.");
+      "Writes runs.csv, summary.json, success.svg and errors.svg. The same command continues an\n"
+      "evaluation that was stopped. The protocol is that of van de Kraats et al. (2005): docs/evaluation.md.");
   add_study_options(*command, options.study);
   command->add_option("--truth", flags->truth, "truth.json of the study: the true setup error")->type_name("FILE");
   command->add_option("-o,--output", options.output, "Folder for the results")->type_name("FOLDER");
@@ -82,12 +81,13 @@ void add_evaluate_command(CLI::App& app, Console& console, int&) {
   command->add_option("--starts", flags->starts, "How many starts")->type_name("N");
   command->add_option("--distance", flags->distance_mm, "bins: the largest mTRE at the start; paper: the translation")
       ->type_name("MM");
-  command->add_option("--start-seed", flags->start_seed, "Draws the starts")
+  command->add_option("--start-seed", flags->start_seed, "Seed of the random starting poses")
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
   command
       ->add_option("--jobs", options.jobs,
-                   "Registrations at a time, each on one thread; 1: one on all cores, for its time (default: cores)")
+                   "Registrations at the same time, each on one thread; with 1, each uses all cores, as when its time "
+                   "is measured (default: cores)")
       ->check(CLI::PositiveNumber);
   command->add_option("--table", flags->table, "Print a table of evaluations made earlier")->type_name("FOLDER...");
   add_registration_switches(*command, options.registration);

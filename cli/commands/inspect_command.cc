@@ -179,14 +179,14 @@ void add_inspect_command(CLI::App& app, Console& console, int&) {
     bool devices = false;
   };
   auto options = std::make_shared<Options>();
-  CLI::App* command =
-      app.add_subcommand("inspect", "Say what files hold, their geometry as understood, and all that is missing");
+  CLI::App* command = app.add_subcommand(
+      "inspect", "Show what files contain, how their geometry is understood, and every missing attribute");
   command->footer(
       "\nExample:\n  isoshift inspect exported/\n  isoshift inspect RTIMAGE/KV_AP.dcm\n  isoshift inspect --devices");
   auto* paths = command->add_option("path", options->paths, "Files or folders")->type_name("PATH");
-  command->add_option("--machine", options->machine, "Machine profile: what becomes of the X-rays with it")
+  command->add_option("--machine", options->machine, "Machine profile to apply to the X-rays before they are shown")
       ->type_name("FILE");
-  auto* devices = command->add_flag("--devices", options->devices, "Say what there is to render on");
+  auto* devices = command->add_flag("--devices", options->devices, "List the devices that can render");
   command->require_option(1, 0);
   paths->excludes(devices);
   command->callback([options, &console] {

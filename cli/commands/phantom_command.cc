@@ -54,7 +54,7 @@ void add_phantom_command(CLI::App& app, Console& console, int&) {
       "  isoshift phantom -o breathing --anatomy thorax --breathing 30 --image-pixels 256 --voxel-mm 2 --translation "
       "0,0,0 --rotation 0,0,0");
   command->add_option("-o,--output", options->output, "Folder to make")->required()->type_name("FOLDER");
-  command->add_option("--anatomy", options->anatomy, "What the body is")
+  command->add_option("--anatomy", options->anatomy, "Part of the body")
       ->check(CLI::IsMember({"head", "spine", "thorax"}))
       ->capture_default_str();
   command->add_option("--translation", options->translation_mm, "Setup error, mm, IEC 61217 fixed")
@@ -100,7 +100,7 @@ void add_phantom_command(CLI::App& app, Console& console, int&) {
       ->type_name("DEG,...");
   command
       ->add_option("--breathing", options->phantom.breathing.seconds,
-                   "A thorax breathes for so long: X-rays at every moment, 4D CT, truth.csv")
+                   "Let a thorax breathe for this time: an X-ray per moment, a 4D CT and truth.csv")
       ->type_name("S");
   command->add_option("--rate", options->phantom.breathing.rate_hz, "Moments per second")
       ->type_name("HZ")
@@ -118,7 +118,8 @@ void add_phantom_command(CLI::App& app, Console& console, int&) {
                    "Days of treatment, each with X-rays and a random setup error of its own")
       ->type_name("N")
       ->capture_default_str();
-  command->add_option("--seed", options->phantom.seed, "Of anatomy, noise and UIDs")->capture_default_str();
+  command->add_option("--seed", options->phantom.seed, "Seed of the anatomy, the noise and the UIDs")
+      ->capture_default_str();
   command->add_flag("--overwrite", options->overwrite, "Replace an earlier study in that folder");
   command->callback([options, &console] { run_phantom(*options, console); });
 }

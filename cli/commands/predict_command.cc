@@ -164,21 +164,21 @@ void add_predict_command(CLI::App& app, Console& console, int&) {
       "\nExample:\n  isoshift predict traces/*.csv\n  isoshift predict trace.csv --latency 115,450,630 -o "
       "prediction\n\n"
       "A trace is CSV with the columns t_s (or Timestamp, ms) and x, y, z in mm; trace.csv of track is one.\n"
-      "Every sample after the training is predicted from those one latency older.");
+      "Every sample after the training is predicted from the samples that are older than it by one latency.");
   command->add_option("trace", options->traces, "Recorded traces")->required()->type_name("CSV...");
-  command->add_option("--method", options->methods, "Only these; may be repeated")
+  command->add_option("--method", options->methods, "Predictors to measure; may be repeated [all]")
       ->check(CLI::IsMember(predictor_names()));
-  command->add_option("--latency", options->latencies_ms, "Over which to predict")
+  command->add_option("--latency", options->latencies_ms, "Times over which to predict")
       ->delimiter(',')
       ->type_name("MS,...")
       ->capture_default_str();
-  command->add_option("--rate", options->protocol.rate_hz, "Samples are brought to this rate")
+  command->add_option("--rate", options->protocol.rate_hz, "Rate to which the samples are interpolated")
       ->type_name("HZ")
       ->check(CLI::Range(0.5, 100.0))
       ->capture_default_str();
   command
       ->add_option("--train-s", options->protocol.training_s,
-                   "At the beginning, not scored; 40 s where a trace is under 90 s")
+                   "Training time at the beginning, which is not scored; 40 s for traces under 90 s")
       ->type_name("S")
       ->check(CLI::Range(0.0, 3600.0))
       ->capture_default_str();

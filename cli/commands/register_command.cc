@@ -55,18 +55,21 @@ void add_result_options(CLI::App& command, RegisterOptions& options) {
       .add_option("--site", options.site,
                   "Site file: action levels, the couch's degrees of freedom and scale (docs/site-file.md)")
       ->type_name("FILE");
-  command.add_option("--anatomy", options.anatomy, "Whose action level of the site file applies")->type_name("NAME");
+  command.add_option("--anatomy", options.anatomy, "Anatomy of the site file whose action level applies")
+      ->type_name("NAME");
   command.add_flag("--write-reg-for-review", options.write_reg_for_review,
                    "Write the registration object for a result that needs review, too, marked as not accepted");
   command.add_flag("--accept-unobservable", options.accept_unobservable,
-                   "Write it with no setup error along directions that the views cannot measure, too");
+                   "Write the registration object, too, if the views cannot measure a direction; the error along it is "
+                   "then taken as 0");
   command
       .add_option_function<std::string>(
           "--source-for",
           [&options](const std::string& name) {
             options.source = name == "treatment" ? RegistrationSource::kTreatment : RegistrationSource::kIecFixed;
           },
-          "Axes that the registration object takes to the CT: the patient's as planned, or the room's")
+          "Source frame of the registration object: treatment, with the axes of the patient as planned, or the room's, "
+          "IEC 61217 fixed")
       ->check(CLI::IsMember({"treatment", "iec-fixed"}))
       ->default_str("treatment");
 }
@@ -84,7 +87,7 @@ void add_register_command(CLI::App& app, Console& console, int& exit_status) {
   auto as_json = std::make_shared<bool>(false);
   add_study_options(*command, options->study);
   command->add_option("-o,--output", options->output, "Folder for the results")->required()->type_name("FOLDER");
-  command->add_option("--truth", *truth, "truth.json of a phantom study: print the result beside it")
+  command->add_option("--truth", *truth, "truth.json of a phantom study, to print beside the result")
       ->type_name("FILE");
   add_result_options(*command, *options);
   command->add_flag("--overwrite", options->overwrite, "Replace an earlier output in that folder");

@@ -5,7 +5,10 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <memory>
+#include <nlohmann/json.hpp>
+#include <tuple>
 
 #include "base/error.h"
 #include "base/system_user.h"
@@ -17,9 +20,23 @@
 namespace isoshift {
 namespace {
 
+// The name stands in the release, in the audit log and on pages.
+void check_name(const std::string& by) {
+  if (by.find_first_not_of(' ') == std::string::npos)
+    throw UsageError("--by: expected the name of the person who releases the session");
+  const auto is_control = [](unsigned char c) { return c < 0x20 || c == 0x7F; };
+  if (std::ranges::any_of(by, is_control))
+    throw UsageError("--by: the name holds a line break or another control character; expected a name on one line");
+  try {
+    std::ignore = nlohmann::json(by).dump();
+  } catch (const nlohmann::json::exception&) {
+    throw UsageError("--by: the name is not valid UTF-8 text");
+  }
+}
+
 void run_release(const std::filesystem::path& file, const std::string& session, const std::string& by,
                  Console& console) {
-  if (by.find_first_not_of(' ') == std::string::npos) throw UsageError("--by: expected the name of who releases it");
+  check_name(by);
   const WatchFile watch = read_watch_file(file);
   // What another user writes the watch could not read.
   struct stat of_results{};
@@ -58,7 +75,8 @@ void add_release_command(CLI::App& app, Console& console, int& exit_status) {
     std::string session, by;
   };
   auto options = std::make_shared<Options>();
-  CLI::App* command = app.add_subcommand("release", "Send a result of watch to its peers");
+  CLI::App* command =
+      app.add_subcommand("release", "Release a result that watch holds, and send it to the DICOM peers");
   command->footer(
       "\nExample:\n  isoshift release 3fa94c1e02b7 --by \"J. Doe\"\n\n"
       "Checks that the session is what was registered, records who released what, as which user of the system, then\n"

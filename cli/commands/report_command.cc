@@ -38,17 +38,19 @@ void run_report(const ReportOptions& options, Console& console) {
 
 void add_report_command(CLI::App& app, Console& console, int&) {
   auto options = std::make_shared<ReportOptions>();
-  CLI::App* command = app.add_subcommand("report", "Make all formats of a stored result again");
+  CLI::App* command = app.add_subcommand("report", "Write the report of a stored result again, in all formats");
   command->footer(
       "\nExample:\n  isoshift report result/ --overwrite\n  isoshift report result/ --site linac3.json -o "
       "result_linac3\n\n"
       "Reads result.json and the pictures, and writes what register writes. Nothing is registered again.");
   command->add_option("result", options->result, "Folder of a result")->required()->type_name("FOLDER");
-  command->add_option("-o,--output", options->output, "Folder for the formats; else that of the result")
+  command->add_option("-o,--output", options->output, "Folder to write to [the folder of the result]")
       ->type_name("FOLDER");
-  command->add_option("--site", options->site, "Site file to apply instead of the one applied before")
+  command->add_option("--site", options->site, "Site file to apply [the one that was applied before]")
       ->type_name("FILE");
-  command->add_option("--anatomy", options->anatomy, "Whose action level of the site file applies; else that of before")
+  command
+      ->add_option("--anatomy", options->anatomy,
+                   "Anatomy of the site file whose action level applies [that of before]")
       ->type_name("NAME");
   command->add_flag("--overwrite", options->overwrite, "Replace what is there");
   command->callback([options, &console] { run_report(*options, console); });

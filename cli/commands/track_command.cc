@@ -45,7 +45,8 @@ void run_track(TrackFlags& flags, Console& console) {
 void add_track_command(CLI::App& app, Console& console, int&) {
   auto flags = std::make_shared<TrackFlags>();
   TrackOptions& options = flags->track;
-  CLI::App* command = app.add_subcommand("track", "Follow a moving target through X-rays over time, and predict it");
+  CLI::App* command =
+      app.add_subcommand("track", "Track a moving target through a series of X-rays, and predict its motion");
   command->footer(
       "\nExample:\n  isoshift track breathing/ --structure Target -o track --truth breathing/truth.csv\n"
       "  isoshift track --ct CT --plan RTPLAN.dcm --structures RTSTRUCT.dcm --follow incoming/ --structure Target -o "
@@ -57,9 +58,9 @@ void add_track_command(CLI::App& app, Console& console, int&) {
   command->add_option("-o,--output", options.output, "Folder for the results")->required()->type_name("FOLDER");
   command
       ->add_option("--follow", options.follow,
-                   "Folder that is being filled with X-rays; ends when none come any more, or with Ctrl-C")
+                   "Folder into which X-rays arrive; tracking ends when none have come for a while, or with Ctrl-C")
       ->type_name("FOLDER");
-  command->add_option("--idle", options.idle_s, "With --follow: end after so long without an X-ray")
+  command->add_option("--idle", options.idle_s, "With --follow: end after this time without an X-ray")
       ->type_name("S")
       ->check(CLI::Range(0.1, 3600.0))
       ->capture_default_str();
@@ -68,31 +69,34 @@ void add_track_command(CLI::App& app, Console& console, int&) {
       ->capture_default_str();
   command->add_option("--phases", options.phases, "Folders of the phases of a 4D CT, in order, for --predictor model")
       ->type_name("FOLDER...");
-  command->add_option("--latency", flags->latency_ms, "From an X-ray to the beam: over this the target is predicted")
+  command
+      ->add_option("--latency", flags->latency_ms,
+                   "Time from the X-ray to the beam, over which the target is predicted")
       ->type_name("MS")
       ->check(CLI::Range(1.0, 2000.0))
       ->capture_default_str();
-  command->add_option("--together", flags->together_ms, "X-rays of several imagers are of one moment within this")
+  command
+      ->add_option("--together", flags->together_ms, "X-rays of several imagers within this time belong to one moment")
       ->type_name("MS")
       ->check(CLI::Range(0.0, 1000.0))
       ->capture_default_str();
-  command->add_option("--budget", flags->budget_ms, "Moments that take longer are counted")
+  command->add_option("--budget", flags->budget_ms, "Moments whose registration takes longer are counted")
       ->type_name("MS")
       ->capture_default_str();
   command->add_flag("--rigid", flags->six_dof, "Six degrees of freedom instead of the three translations");
-  command->add_option("--box", options.tracking.box_mm, "Search box about the expected position, half its width")
+  command->add_option("--box", options.tracking.box_mm, "Half the width of the search box around the expected position")
       ->type_name("MM")
       ->check(CLI::Range(1.0, 50.0))
       ->capture_default_str();
   command
       ->add_option("--tolerance", options.tolerance_mm,
-                   "Suggest when the beam would wait: the target farther off than this")
+                   "Mark the moments at which the target is farther off than this, so that the beam should wait")
       ->type_name("MM")
       ->check(CLI::PositiveNumber);
-  command->add_option("--truth", options.truth, "True positions (t_s, x, y, z): print the result beside them")
+  command->add_option("--truth", options.truth, "True positions (t_s, x, y, z), to print beside the result")
       ->type_name("CSV");
   command->add_flag("--overwrite", options.overwrite, "Replace an earlier output in that folder");
-  command->add_flag("--json", flags->json, "Print track.json instead of its figures");
+  command->add_flag("--json", flags->json, "Print track.json instead of a summary");
   options.registration.region.margin_mm = 2.0;  // what lies around a moving target does not move with it
   add_region_switches(*command, options.registration.region);
   add_rendering_options(*command, options.registration.rendering);

@@ -79,12 +79,16 @@ void run_watch(const std::filesystem::path& file, Console& console) {
 
 void add_watch_command(CLI::App& app, Console& console, int& exit_status) {
   auto file = std::make_shared<std::filesystem::path>();
-  CLI::App* command = app.add_subcommand("watch", "Register what comes into a treatment room, and hold the results");
+  CLI::App* command =
+      app.add_subcommand("watch", "Register X-rays as they arrive from a treatment room, and hold the results");
   command->footer(
       "\nExample:\n  isoshift watch /etc/isoshift/watch.json\n\n"
       "Follows a folder or an Orthanc server until it is stopped. index.html among the results lists the sessions.\n"
       "Nothing is sent before it is released. The file: docs/commands/watch.md.");
-  command->add_option("file", *file, "Watch file: what is followed, where results go, to whom released ones")
+  command
+      ->add_option(
+          "file", *file,
+          "Watch file: the folder or server to follow, the folder for results, and the peers that receive them")
       ->required()
       ->type_name("FILE");
   command->callback([file, &console, &exit_status] {

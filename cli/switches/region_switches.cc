@@ -20,10 +20,11 @@ void add_region_switches(CLI::App& command, RegionOptions& options) {
       ->type_name("NAME")
       ->group(group);
   command
-      .add_option("--rectangle", options.rectangles, "Compare this part of the X-ray with that label only, in pixels")
+      .add_option("--rectangle", options.rectangles,
+                  "Compare only this rectangle, in pixels, of the X-ray with this label")
       ->type_name("LABEL=C0,R0,C1,R1")
       ->group(group);
-  command.add_option("--margin", options.margin_mm, "Around every structure, mm")
+  command.add_option("--margin", options.margin_mm, "Margin around every structure, mm")
       ->type_name("MM")
       ->check(CLI::Range(0.0, 100.0))
       ->capture_default_str()

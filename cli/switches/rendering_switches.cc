@@ -29,7 +29,7 @@ void add_rendering_options(CLI::App& command, RenderingOptions& options) {
       ->check(CLI::IsMember({"physical", "windowed"}))
       ->capture_default_str()
       ->group(kGroup);
-  command.add_option("--threshold-hu", options.threshold_hu, "Voxels below count as nothing")
+  command.add_option("--threshold-hu", options.threshold_hu, "Voxels below this attenuate nothing")
       ->type_name("HU")
       ->capture_default_str()
       ->group(kGroup);
@@ -38,32 +38,34 @@ void add_rendering_options(CLI::App& command, RenderingOptions& options) {
       ->expected(2)
       ->type_name("LOW,HIGH")
       ->group(kGroup);
-  command.add_option("--precision", options.precision, "How voxels are kept: 8 or 16 bit integers, or floats [u16]")
+  command
+      .add_option("--precision", options.precision, "How voxels are stored: integers of 8 or 16 bits, or floats [u16]")
       ->check(CLI::IsMember(precisions))
       ->group(kGroup);
   command.add_option("--block-edge", options.block_edge, "raycast-cuberille: edge of its blocks, voxels [2]")
       ->check(CLI::IsMember({1, 2, 4, 8}))
       ->group(kGroup);
-  command.add_option("--wobble", options.wobble, "Splatting: what moves a little for every voxel [focus]")
+  command.add_option("--wobble", options.wobble, "Splatting: what is displaced at random for every voxel [focus]")
       ->check(CLI::IsMember({"focus", "voxel"}))
       ->group(kGroup);
   command
       .add_option("--wobble-sigma", options.wobble_sigma_mm,
-                  "Splatting: by how much; 0: not at all [a voxel at the isocenter is blurred by half its edge]")
+                  "Splatting: standard deviation of the displacement, 0 for none [blurs a voxel at the isocenter by "
+                  "half its edge]")
       ->type_name("MM")
       ->group(kGroup);
-  command.add_option("--wobble-seed", options.wobble_seed, "Splatting: the only source of its randomness [1]")
+  command.add_option("--wobble-seed", options.wobble_seed, "Splatting: seed of the displacements [1]")
       ->type_name("N")
       ->group(kGroup);
   command
       .add_option("--deposit", options.deposit,
-                  "Splatting: a voxel falls into one pixel, or is shared by four [nearest]")
+                  "Splatting: a voxel adds to the nearest pixel, or is distributed over four [nearest]")
       ->check(CLI::IsMember({"nearest", "bilinear"}))
       ->group(kGroup);
 }
 
 void add_gl_option(CLI::App& command, std::optional<std::string>& gl) {
-  command.add_option("--gl", gl, "Of renderers on OpenGL: a GPU, or Mesa's llvmpipe on the CPU [hardware]")
+  command.add_option("--gl", gl, "For OpenGL renderers: a GPU, or Mesa's llvmpipe on the CPU [hardware]")
       ->check(CLI::IsMember({"hardware", "software"}))
       ->group(kGroup);
 }

@@ -18,19 +18,22 @@ void add_search_switches(CLI::App& command, SearchRequest& options) {
   command.add_option("--preset", options.preset, "How to search: docs/presets.md says what is in each")
       ->check(CLI::IsMember(std::vector<std::string>(kPresets.begin(), kPresets.end())))
       ->capture_default_str();
-  command.add_option("--similarity", options.similarity, "Of preset paper [src]")
+  command.add_option("--similarity", options.similarity, "With --preset paper: similarity [src]")
       ->check(CLI::IsMember(names_of(kSimilarityKinds)));
-  command.add_option("--optimizer", options.optimizer, "Of preset paper [nelder-mead]")
+  command.add_option("--optimizer", options.optimizer, "With --preset paper: optimizer [nelder-mead]")
       ->check(CLI::IsMember(names_of(kOptimizerKinds)));
   command
-      .add_option("--pixel-fraction", options.pixel_fraction, "Of preset paper: share of the pixels compared [0.05]")
+      .add_option("--pixel-fraction", options.pixel_fraction,
+                  "With --preset paper: share of the pixels that are compared [0.05]")
       ->check(CLI::Range(0.001, 1.0));
   command.add_option("--dof", options.dof, "Degrees of freedom: six, or the three translations")
       ->check(CLI::IsMember({"rigid", "translation"}))
       ->capture_default_str();
   command.add_flag("--check-vertebrae", options.check_vertebrae,
                    "Compare with the patient one vertebra further to the head and to the feet");
-  command.add_option("--seed", options.seed, "Draws the pixels compared; the only randomness")
+  command
+      .add_option("--seed", options.seed,
+                  "Seed of the random choice of the pixels that are compared; nothing else is random")
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
 }

@@ -14,19 +14,19 @@ std::string allow_keys_help() {
 }  // namespace
 
 void add_study_options(CLI::App& command, StudyOptions& options) {
-  command.add_option("study", options.study, "Folder of the exported study; its parts are found by what they are")
+  command.add_option("study", options.study, "Folder of the exported study; files are recognized by their contents")
       ->type_name("FOLDER");
   const char* parts = "Parts of the study";
   command.add_option("--ct", options.ct, "Folder or files of the planning CT")->type_name("PATH")->group(parts);
   command
       .add_option("--image", options.images,
-                  "RT Images (X-rays), files or folders; with --machine X-rays of other classes, too")
+                  "RT Images (X-rays), files or folders; with --machine also X-rays of other SOP classes")
       ->type_name("PATH")
       ->group(parts);
   command.add_option("--plan", options.plan, "RT Plan")->type_name("FILE")->group(parts);
   command
       .add_option("--structures", options.structures,
-                  "RT Structure Set; else the one that the plan refers to, else the only one drawn on the CT")
+                  "RT Structure Set [the one that the plan refers to, or the only one drawn on the CT]")
       ->type_name("FILE")
       ->group(parts);
   add_study_switches(command, options);
@@ -66,11 +66,13 @@ void add_study_switches(CLI::App& command, StudyOptions& options) {
       ->expected(2)
       ->type_name("X,Y")
       ->group(lacking);
-  command.add_flag("--assume-centered", options.assume_centered, "Images without RT Image Position are centered")
+  command
+      .add_flag("--assume-centered", options.assume_centered,
+                "Take images without RT Image Position as centered on the central ray")
       ->group(lacking);
   command
       .add_option("--intensity", options.intensity,
-                  "Pixel intensity relationship, and its sign for stored values: + higher stored value, more X-ray")
+                  "Pixel Intensity Relationship and its sign; with +, a higher stored value means more X-ray intensity")
       ->check(CLI::IsMember({"LIN+", "LIN-", "LOG+", "LOG-"}))
       ->group(lacking);
   command.add_option("--beam", options.beam, "Beam quality of all images")

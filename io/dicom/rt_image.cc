@@ -203,8 +203,8 @@ std::vector<RtImage> read_rt_images(const DicomFile& file, Notes& notes) {
   for (int frame = 0; frame < format.frames; ++frame) {
     std::vector<DicomItem> of_frame = exposures.of(frame);
     if (exposures.name_frames() && of_frame.empty())
-      notes.warnings.push_back(fmt::format("{}: frame {} was left out: no item of {} tells its geometry", path.string(),
-                                           frame + 1, described(DCM_ExposureSequence)));
+      notes.warnings.push_back(fmt::format("{}: frame {} was left aside: no item of {} tells its geometry",
+                                           path.string(), frame + 1, described(DCM_ExposureSequence)));
     else
       images.push_back(read_frame(path, dataset, format, frame, std::move(of_frame)));
   }

@@ -99,14 +99,8 @@ bool is_listed(const DicomItem& object, const DicomPeer& peer) {
   return is_there;
 }
 
-}  // namespace
-
-std::string send_object(const std::filesystem::path& file, const std::string& sha256, const DicomPeer& peer,
-                        bool may_be_there) {
-  const DicomFile object = DicomFile::read(file, DicomFile::Extent::kHeader);
-  if (may_be_there && is_listed(object.dataset(), peer)) return "was there, from an earlier attempt";
-  Association association(peer, object.dataset().required_text(DCM_SOPClassUID).c_str());
-  // The file is read once, into memory: what is sent is what was hashed, however long a peer takes.
+// The file is read once, into memory: what is sent is what was hashed, however long a peer takes.
+DcmFileFormat read_released(const std::filesystem::path& file, const std::string& sha256) {
   std::ifstream stream(file, std::ios::binary);
   const std::string bytes{std::istreambuf_iterator<char>(stream), {}};
   if (const std::string found = sha256_of(bytes); found != sha256)
@@ -114,13 +108,24 @@ std::string send_object(const std::filesystem::path& file, const std::string& sh
   DcmInputBufferStream buffer;
   buffer.setBuffer(bytes.data(), static_cast<offile_off_t>(bytes.size()));
   buffer.setEos();
-  DcmFileFormat whole;
-  whole.transferInit();
-  if (const OFCondition loaded = whole.read(buffer); loaded.bad())
+  DcmFileFormat object;
+  object.transferInit();
+  if (const OFCondition loaded = object.read(buffer); loaded.bad())
     throw Error(fmt::format("{}: cannot be read: {}", file.string(), loaded.text()));
-  whole.transferEnd();
+  object.transferEnd();
+  return object;
+}
+
+}  // namespace
+
+std::string send_object(const std::filesystem::path& file, const std::string& sha256, const DicomPeer& peer,
+                        bool may_be_there) {
+  DcmFileFormat object = read_released(file, sha256);
+  const DicomItem dataset(*object.getDataset(), file.string());
+  if (may_be_there && is_listed(dataset, peer)) return "was there, from an earlier attempt";
+  Association association(peer, dataset.required_text(DCM_SOPClassUID).c_str());
   Uint16 status = 0xFFFF;
-  association.check(association.scu().sendSTORERequest(association.context(), "", whole.getDataset(), status),
+  association.check(association.scu().sendSTORERequest(association.context(), "", object.getDataset(), status),
                     "the object was not sent whole");
   if (status == STATUS_Success) return "";
   if ((status & kWarningMask) == kWarning) return fmt::format("stored with warning 0x{:04X}", status);

@@ -207,10 +207,11 @@ RegistrationComparison compare(const CheckedRegistration& first, const Registrat
         "CT only",
         described(DCM_FrameOfReferenceUID), first.path.string(), first.registered_frame_uid, second.path.string(),
         second.registered_frame_uid));
-  if (!first.identity.patient_id.empty() && !second.identity.patient_id.empty())
-    for (const Finding& finding :
-         patient_findings(first.identity, second.identity, second.path.string(), first.path.string()))
-      return cannot(finding.message + ". Compare registrations of one patient only");
+  Identity patient = first.identity, other_patient = second.identity;
+  const bool has_ids = !patient.patient_id.empty() && !other_patient.patient_id.empty();
+  if (!has_ids) patient.patient_id = other_patient.patient_id = "not compared";
+  for (const Finding& finding : patient_findings(patient, other_patient, second.path.string(), first.path.string()))
+    return cannot(finding.message + ". Compare registrations of one patient only");
   const std::array meanings = {&first_meaning, &second_meaning};
   for (std::size_t n = 0; n < both.size(); ++n)
     if (!meanings[n]->registered_from_isocenter)
@@ -226,7 +227,8 @@ RegistrationComparison compare(const CheckedRegistration& first, const Registrat
   }
   return {.difference =
               difference_between(*first_meaning.registered_from_isocenter, *second_meaning.registered_from_isocenter),
-          .why_not = ""};
+          .why_not = "",
+          .has_patient_ids = has_ids};
 }
 
 }  // namespace isoshift

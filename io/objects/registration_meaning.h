@@ -57,7 +57,8 @@ RegistrationDifference difference_between(const Eigen::Isometry3d& registered_fr
 
 struct RegistrationComparison {
   std::optional<RegistrationDifference> difference;
-  std::string why_not;  // where there is no difference: what stands in the way, and what to do
+  std::string why_not;          // where there is no difference: what stands in the way, and what to do
+  bool has_patient_ids = true;  // false: a PatientID is empty, and only the frame says that both are of one patient
 };
 RegistrationComparison compare(const CheckedRegistration& first, const RegistrationMeaning& first_meaning,
                                const CheckedRegistration& second, const RegistrationMeaning& second_meaning);

@@ -86,9 +86,8 @@ std::vector<MotionSample> read_motion_trace(const std::filesystem::path& path, N
   if (static_cast<double>(wrong) > kMostShare * static_cast<double>(trace.size()))
     throw Error(fmt::format("{}: the times of {} of {} rows do not increase", path.string(), wrong, trace.size()));
   if (wrong > 0)
-    notes.warnings.push_back(
-        fmt::format("{}: {} of {} rows have a time before that of the row above, and were left out", path.string(),
-                    wrong, trace.size()));
+    notes.warnings.push_back(fmt::format("{}: {} of {} rows have a time before that of the row above, and were skipped",
+                                         path.string(), wrong, trace.size()));
   return in_order;
 }
 

@@ -27,7 +27,7 @@ std::optional<Finding> table_finding(const TableReadOut& read_out, const RtImage
                                             reference.path.string(), described(read_out.tag))};
 }
 
-constexpr const char* kNoReadOuts = "without table read-outs in all views nobody knows whether the table moved";
+constexpr const char* kNoReadOuts = "without table positions in all views it is not known whether the table moved";
 
 // Whether both show the same view: from one gantry angle, or, where one of them has none, under one label.
 bool is_retake(const RtImage& image, const RtImage& earlier) {
@@ -63,7 +63,7 @@ std::vector<Finding> setting_doubts(std::span<const RtImage> images) {
   return doubts;
 }
 
-// Views too far apart in time, or of which nobody knows how far apart they are.
+// Views too far apart in time, or views whose distance in time is not known.
 std::optional<Finding> time_doubt(std::span<const RtImage> images, double max_span_s) {
   const RtImage* earliest = &images.front();
   const RtImage* latest = &images.front();

@@ -92,7 +92,7 @@ struct Timeline {
 };
 
 // X-rays without a time, of one patient, plan and folder: one session, unless a label or the table tells that they are
-// several. Then nobody knows which of them belong together.
+// several. Then it is not known which of them belong together.
 std::vector<SessionFiles> untimed_sessions(Images images, const std::set<std::string>& registered) {
   std::vector<SessionFiles> all;
   bool is_one = true;
@@ -105,7 +105,8 @@ std::vector<SessionFiles> untimed_sessions(Images images, const std::set<std::st
     all.back().images.push_back(image);
     if (!is_one)
       all.back().remarks.push_back(fmt::format(
-          "{} is of several sessions, and without acquisition times nobody knows which X-rays belong together",
+          "{} is one of several sessions' X-rays, and without acquisition times it is not known which of them belong "
+          "together",
           image.file.string()));
   }
   return all;

@@ -113,7 +113,7 @@ cv::Rect innermost_field(const cv::Mat& line_integral, const cv::Point2d& isocen
 
 // Takes out of the field where most pixels lie at the least or the largest value: a receptor that saturated, or a
 // display window, has cut them off, and their true values are not known. Single ones are noise, and stay.
-void leave_out_clipped(FixedImage& image) {
+void exclude_clipped(FixedImage& image) {
   const cv::Mat line_integral = mat_of(image.line_integral);
   cv::Mat field = mat_of(image.field);
   double least = 0.0, largest = 0.0;
@@ -233,7 +233,7 @@ FixedImage prepare(const XrayImage& xray) {
   image.label = xray.label;
   image.line_integral = line_integrals(xray);
   image.field = irradiated_field(xray, image.line_integral);
-  leave_out_clipped(image);
+  exclude_clipped(image);
   return image;
 }
 

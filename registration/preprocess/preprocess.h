@@ -30,7 +30,7 @@ struct FixedImage {
   Image<std::uint8_t> field;
   std::string label;             // of the X-ray; may be empty
   int reduced_by = 1;            // pixels of the X-ray along the edge of a pixel
-  bool has_all_left_out = true;  // false: what is excluded would have left next to nothing, and is still in the field
+  bool has_all_excluded = true;  // false: what is excluded would have left next to nothing, and is still in the field
 };
 
 // How view number `index` is called in what a person reads: by its label, else "view 1" and so on.

@@ -82,7 +82,7 @@ void judge(std::span<const double> parameters, const RegistrationOptions& option
     if (view.left_out && (view.left_out->distance_mm > kMaxSpreadMm || view.left_out->angle_rad > kMaxSpreadRad))
       review(fmt::format("without {} the pose lies {:.1f} mm and {:.1f} degrees away", name, view.left_out->distance_mm,
                          deg_from_rad(view.left_out->angle_rad)));
-    if (!view.has_all_left_out)
+    if (!view.has_all_excluded)
       review(fmt::format("what is excluded covers nearly all that {} shows, and was compared nevertheless", name));
     const int with_signal = view.consistency.with_signal(), disagreeing = view.consistency.disagreeing();
     if (disagreeing > parts_that_may_disagree(with_signal, is_volume_chosen))

@@ -346,6 +346,66 @@ TEST_F(CheckCommandTest, TwoThatCannotBeComparedAreAnError) {
   EXPECT_THAT(matrices.out, HasSubstr(without_matrix + ": holds no rigid matrix from one frame to another"));
 }
 
+TEST_F(CheckCommandTest, WithoutAPatientIdTheNameStillTellsPatientsApart) {
+  const std::string nameless = copy_of(ours(), "no_id.dcm", [](DicomItem d) { d.put(DCM_PatientID, ""); });
+  const CommandOutcome same = run_command({"check", ours(), nameless});
+  EXPECT_EQ(same.exit_status, 0) << same.out;
+  EXPECT_THAT(same.out, HasSubstr("note   a PatientID (0010,0020) is empty"));
+  const std::string other = copy_of(nameless, "other.dcm", [](DicomItem d) { d.put(DCM_PatientName, "Other^Person"); });
+  const CommandOutcome outcome = run_command({"check", ours(), other});
+  EXPECT_EQ(outcome.exit_status, 1);
+  EXPECT_THAT(outcome.out, HasSubstr("PatientName (0010,0010) differs"));
+  EXPECT_THAT(outcome.out, HasSubstr("difference: not known"));
+}
+
+TEST_F(CheckCommandTest, WhatContradictsThePlanIsRefused) {
+  const CommandOutcome isocenter = run_command({"check", ours(), "--plan", plan(), "--isocenter", "1,2,3"});
+  EXPECT_EQ(isocenter.exit_status, 2);
+  EXPECT_THAT(isocenter.err, HasSubstr("--isocenter (1.000, 2.000, 3.000) contradicts the plan"));
+  const CommandOutcome position = run_command({"check", ours(), "--plan", plan(), "--patient-position", "FFS"});
+  EXPECT_EQ(position.exit_status, 2);
+  EXPECT_THAT(position.err, HasSubstr("--patient-position FFS contradicts the plan, which says HFS"));
+  EXPECT_EQ(run_command({"check", ours(), "--plan", plan(), "--patient-position", "HFS"}).exit_status, 0);
+}
+
+TEST_F(CheckCommandTest, AnObjectThatMeansSeveralThingsGivesNoNumber) {
+  const std::string ct = read_rt_plan(study_->plan()).frame_of_reference_uid.value();
+  const std::string itself = ours_from(ct, our_matrix(), "itself.dcm", "Somebody");
+  const std::string twice = copy_of(foreign(), "twice.dcm", [](DicomItem d) {
+    d.items(DCM_RegistrationSequence)[1].append_item(DCM_MatrixRegistrationSequence);
+  });
+  const std::string room = copy_of(foreign(), "room.dcm", [](DicomItem d) {
+    d.put(DCM_FrameOfReferenceUID, "1.2.840.10008.1.4.3.1");
+    d.items(DCM_RegistrationSequence)[0].put(DCM_FrameOfReferenceUID, "1.2.840.10008.1.4.3.1");
+  });
+  for (const auto& [file, why] : {std::pair(itself, "moves the registered frame against itself"),
+                                  std::pair(twice, "MatrixRegistrationSequence (0070,0309) has 2 items, expected 1"),
+                                  std::pair(room, "registers the room (IEC 61217 Fixed)")}) {
+    const CommandOutcome outcome = run_command({"check", file, "--source-isocenter", "9,-5,6.9"});
+    EXPECT_EQ(outcome.exit_status, 1) << file;
+    EXPECT_THAT(outcome.out, HasSubstr(why));
+    EXPECT_THAT(outcome.out, Not(HasSubstr("the origin at")));
+    EXPECT_THAT(outcome.out, Not(HasSubstr("the machine's isocenter at (")));
+  }
+}
+
+TEST_F(CheckCommandTest, AnInvertedOneIsFoundNearTheOriginOfTheCtToo) {
+  Eigen::Matrix4d matrix = our_matrix();
+  matrix.topRightCorner<3, 1>() = Eigen::Vector3d(22.0, -20.0, 18.0);
+  const std::string file = ours_from("1.2.3.4", matrix.inverse(), "near.dcm", "isoshift");
+  const CommandOutcome outcome = run_command({"check", file, "--isocenter", "20,-19,17", "--patient-position", "HFS"});
+  EXPECT_EQ(outcome.exit_status, 1);
+  EXPECT_THAT(outcome.out, HasSubstr("the matrix looks inverted"));
+  EXPECT_THAT(outcome.out, Not(HasSubstr("a couch shift of")));
+}
+
+TEST_F(CheckCommandTest, AnglesThatNoCouchHasAreRefused) {
+  const CommandOutcome outcome = run_command({"check", ours(), "--plan", plan(), "--couch-angle", "1000"});
+  EXPECT_EQ(outcome.exit_status, 2);
+  EXPECT_THAT(outcome.err, HasSubstr("--couch-angle: 1000, expected degrees from -360 to 360"));
+  EXPECT_EQ(run_command({"check", ours(), "--plan", plan(), "--couch-roll", "50"}).exit_status, 2);
+}
+
 TEST_F(CheckCommandTest, TheShiftNeedsIsocenterAndPosition) {
   const CommandOutcome outcome = run_command({"check", ours(), "--isocenter", "1,2,3"});
   EXPECT_EQ(outcome.exit_status, 2);

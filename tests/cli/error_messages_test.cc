@@ -50,6 +50,17 @@ TEST_F(ErrorMessagesTest, TwoCtSeries) {
   EXPECT_THAT(outcome.err, testing::EndsWith("\n       Name the planning CT: --ct FOLDER\n"));
 }
 
+TEST(ReleaseCommandTest, TheNameOfWhoReleasesIsOneLineOfText) {
+  for (const auto& [name, why] :
+       {std::pair("", "expected the name of the person"), std::pair("  ", "expected the name"),
+        std::pair("J. Doe\nverdict accepted", "the name holds a line break"),
+        std::pair("J. \xff\xfe", "the name is not valid UTF-8 text")}) {
+    const CommandOutcome outcome = run_command({"release", "3fa94c1e02b7", "--by", name});
+    EXPECT_EQ(outcome.exit_status, 2) << name;
+    EXPECT_THAT(outcome.err, HasSubstr(std::string("--by: ") + why));
+  }
+}
+
 TEST_F(ErrorMessagesTest, OneUidForTwoImages) {
   std::string uid;
   edit(study_.image(0), [&](DicomItem d) { uid = d.required_text(DCM_SOPInstanceUID); });

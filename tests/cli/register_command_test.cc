@@ -184,8 +184,8 @@ TEST_F(RegisterCommandTest, ViewsFarApartWithoutTableReadOutsNeedAReview) {
   EXPECT_EQ(reasons({}), "accepted []");
   take_second_at("101710");
   EXPECT_EQ(reasons({}),
-            "review [\"KV_G090 was taken 130 s after KV_G000, more than 120 s: without table read-outs in all views "
-            "nobody knows whether the table moved (--allow time-span=REASON)\"]");
+            "review [\"KV_G090 was taken 130 s after KV_G000, more than 120 s: without table positions in all views "
+            "it is not known whether the table moved (--allow time-span=REASON)\"]");
   EXPECT_EQ(reasons({"--allow", "time-span=the couch stood still"}), "accepted []");
   EXPECT_THAT(result()["overrides"].dump(), HasSubstr("130 s after KV_G000"));
   const std::filesystem::path site = study_.path().parent_path() / "site.json";
@@ -229,6 +229,42 @@ TEST_F(RegisterCommandTest, ViewsThatMayBeOfTwoSetupsNeedAReview) {
   EXPECT_THAT(reasons([](DicomItem d) { d.put(DCM_RadiationMachineName, "LINAC2"); }), HasSubstr("LINAC2"));
   EXPECT_THAT(reasons([](DicomItem d) { d.put(DCM_TableTopEccentricAngle, 3.0); }),
               HasSubstr("is 3 degrees in KV_G090 and missing in KV_G000"));
+}
+
+// Programs that know no table position write zeros: whether the table moved in the three minutes is not known.
+TEST_F(RegisterCommandTest, ThreeZerosAreNoTablePosition) {
+  const auto reasons = [](double longitudinal_mm) {
+    const SmallStudy study;
+    for (const int n : {0, 1})
+      edit(study.image(n), [&](DicomItem d) {
+        d.put(DCM_TableTopLateralPosition, 0.0);
+        d.put(DCM_TableTopLongitudinalPosition, longitudinal_mm);
+        d.put(DCM_TableTopVerticalPosition, 0.0);
+      });
+    edit(study.image(1), [](DicomItem d) { d.put(DCM_AcquisitionTime, "101800"); });
+    register_study(study);
+    return nlohmann::json::parse(std::ifstream(study.output() / "result.json"))["reasons"].dump();
+  };
+  EXPECT_THAT(reasons(0.0), HasSubstr("without table positions in all views"));
+  EXPECT_THAT(reasons(812.0), testing::Not(HasSubstr("without table positions")));
+}
+
+TEST_F(RegisterCommandTest, ViewsAreInTheOrderOfTheirLabels) {
+  const CommandOutcome outcome =
+      register_study(study_, {"--image", study_.image(1).string(), "--image", study_.image(0).string()});
+  EXPECT_EQ(outcome.exit_status, 0) << outcome.err;
+  EXPECT_EQ(result()["views"][0]["label"], "KV_G000");
+  EXPECT_EQ(result()["views"][1]["label"], "KV_G090");
+}
+
+TEST_F(RegisterCommandTest, AnglesThatNoCouchHasAreRefused) {
+  for (const auto& [flag, angle] : {std::pair("--couch-angle", "400"), std::pair("--couch-pitch", "90"),
+                                    std::pair("--couch-roll", "-60"), std::pair("--couch-roll", "inf")}) {
+    const CommandOutcome outcome = register_study(study_, {flag, angle});
+    EXPECT_EQ(outcome.exit_status, 2) << flag;
+    EXPECT_THAT(outcome.err, HasSubstr(fmt::format("{}: {}, expected degrees from -", flag, angle)));
+  }
+  EXPECT_EQ(register_study(study_, {"--couch-pitch", "359.5"}).exit_status, 0);
 }
 
 // A switch supplies what is missing; a table that was seen to turn is refused whatever a switch says.

@@ -20,16 +20,15 @@ using Json = nlohmann::json;
 TEST(RenderingFlags, WhatARendererDoesNotHaveIsRefused) {
   SmallStudy study;
   const std::vector<std::pair<std::vector<std::string>, std::string>> refused = {
-      {{"--renderer", "cpu", "--wobble", "voxel"},
-       "--wobble means something to splatting only, and the renderer is cpu"},
-      {{"--renderer", "raycast-box", "--wobble-sigma", "1"}, "--wobble-sigma means something to splatting only"},
-      {{"--renderer", "cpu", "--wobble-seed", "2"}, "--wobble-seed means something to splatting only"},
-      {{"--renderer", "raycast-box", "--deposit", "bilinear"}, "--deposit means something to splatting only"},
-      {{"--renderer", "raycast-box", "--block-edge", "4"}, "--block-edge means something to raycast-cuberille only"},
+      {{"--renderer", "cpu", "--wobble", "voxel"}, "--wobble works only with splatting, and the renderer is cpu"},
+      {{"--renderer", "raycast-box", "--wobble-sigma", "1"}, "--wobble-sigma works only with splatting"},
+      {{"--renderer", "cpu", "--wobble-seed", "2"}, "--wobble-seed works only with splatting"},
+      {{"--renderer", "raycast-box", "--deposit", "bilinear"}, "--deposit works only with splatting"},
+      {{"--renderer", "raycast-box", "--block-edge", "4"}, "--block-edge works only with raycast-cuberille"},
       {{"--renderer", "siddon", "--precision", "u8"},
-       "--precision below f32 means something to renderers other than references"},
-      {{"--renderer", "cpu", "--gl", "software"}, "--gl means something to renderers on OpenGL only"},
-      {{"--window", "0,100"}, "--window means something to --attenuation windowed only"},
+       "--precision below f32 works only with renderers other than references"},
+      {{"--renderer", "cpu", "--gl", "software"}, "--gl works only with renderers on OpenGL"},
+      {{"--window", "0,100"}, "--window works only with --attenuation windowed"},
       {{"--renderer", "splat", "--gl", "software", "--wobble-sigma", "-1"}, "--wobble-sigma -1: expected 0 mm or more"},
   };
   for (const auto& [flags, message] : refused) {

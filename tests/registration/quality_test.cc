@@ -79,7 +79,7 @@ TEST(Quality, TooLittleToCheckForMovedAnatomyNeedsReview) {
 }
 
 TEST(Quality, AnExclusionThatCannotBeKeptNeedsReview) {
-  expect_review([](RegistrationResult& r) { r.views[0].has_all_left_out = false; },
+  expect_review([](RegistrationResult& r) { r.views[0].has_all_excluded = false; },
                 "what is excluded covers nearly all that view 1 shows");
 }
 

@@ -73,7 +73,7 @@ TEST(ProjectedRegion, CoversThePixelsWhoseRaysMeetIt) {
   const Ball ball{.center_mm = {10.0, -15.0, 20.0}, .radius_mm = 30.0};
   Eigen::Isometry3d pose = random_poses(1).front();
   for (const Vector3d& spacing_mm : {Vector3d(1, 1, 1), Vector3d(0.7, 0.7, 3.0)}) {
-    const ProjectedRegion region({.volume = mask_of(ball, spacing_mm), .left_out = {}, .cut_ends = {}});
+    const ProjectedRegion region({.volume = mask_of(ball, spacing_mm), .excluded = {}, .cut_ends = {}});
     for (const double gantry_deg : {0.0, 45.0, 90.0}) {
       FixedImage image = open_image(gantry_deg);
       region.restrict(image, pose, 0.0);
@@ -86,14 +86,14 @@ TEST(ProjectedRegion, ForABeamOfMegavoltageToo) {
   const Ball ball{.center_mm = {0.0, 0.0, 0.0}, .radius_mm = 25.0};
   FixedImage image = open_image(0.0);
   image.view.beam = Beam::kMegavoltage;
-  ProjectedRegion({.volume = mask_of(ball, Vector3d::Ones()), .left_out = {}})
+  ProjectedRegion({.volume = mask_of(ball, Vector3d::Ones()), .excluded = {}})
       .restrict(image, Eigen::Isometry3d::Identity(), 0.0);
   expect_shadow(image, Vector3d::Zero(), ball.radius_mm, kRimMm);
 }
 
 TEST(ProjectedRegion, SlackGrowsIt) {
   const Ball ball{.center_mm = {-5.0, 10.0, 0.0}, .radius_mm = 20.0};
-  const ProjectedRegion region({.volume = mask_of(ball, Vector3d::Ones()), .left_out = {}, .cut_ends = {}});
+  const ProjectedRegion region({.volume = mask_of(ball, Vector3d::Ones()), .excluded = {}, .cut_ends = {}});
   for (const double slack_mm : {4.0, 12.0}) {
     FixedImage image = open_image(0.0);
     region.restrict(image, Eigen::Isometry3d::Identity(), slack_mm);
@@ -103,7 +103,7 @@ TEST(ProjectedRegion, SlackGrowsIt) {
 
 TEST(ProjectedRegion, WhatIsLeftOutIsCutAndSlackCutsMore) {
   const Ball out{.center_mm = {15.0, 5.0, -10.0}, .radius_mm = 18.0};
-  const ProjectedRegion region({.volume = {}, .left_out = {mask_of(out, Vector3d::Ones())}, .cut_ends = {}});
+  const ProjectedRegion region({.volume = {}, .excluded = {mask_of(out, Vector3d::Ones())}, .cut_ends = {}});
   for (const double slack_mm : {0.0, 6.0}) {
     FixedImage image = open_image(90.0);
     region.restrict(image, Eigen::Isometry3d::Identity(), slack_mm);
@@ -113,7 +113,7 @@ TEST(ProjectedRegion, WhatIsLeftOutIsCutAndSlackCutsMore) {
   const Ball in{.center_mm = {15.0, 5.0, -10.0}, .radius_mm = 40.0};
   FixedImage image = open_image(90.0);
   ProjectedRegion(
-      {.volume = mask_of(in, Vector3d::Ones()), .left_out = {mask_of(out, Vector3d::Ones())}, .cut_ends = {}})
+      {.volume = mask_of(in, Vector3d::Ones()), .excluded = {mask_of(out, Vector3d::Ones())}, .cut_ends = {}})
       .restrict(image, Eigen::Isometry3d::Identity(), 0.0);
   for (int row = 0; row < 120; ++row)
     for (int column = 0; column < 120; ++column) {
@@ -127,7 +127,7 @@ TEST(ProjectedRegion, NeverAddsToTheField) {
   FixedImage image = open_image(0.0);
   image.field = Image<std::uint8_t>(120, 120, 0);
   const Ball ball{.center_mm = Vector3d::Zero(), .radius_mm = 30.0};
-  ProjectedRegion({.volume = mask_of(ball, Vector3d::Ones()), .left_out = {}})
+  ProjectedRegion({.volume = mask_of(ball, Vector3d::Ones()), .excluded = {}})
       .restrict(image, Eigen::Isometry3d::Identity(), 5.0);
   EXPECT_EQ(std::ranges::count(image.field.pixels, 1), 0);
 }
@@ -136,7 +136,7 @@ TEST(ProjectedRegion, OfEverythingLeavesTheFieldAlone) {
   FixedImage image = open_image(0.0);
   ProjectedRegion().restrict(image, Eigen::Isometry3d::Identity(), 0.0);
   const Volume<std::uint8_t> nothing(Vector3i(4, 4, 4), Eigen::Affine3d::Identity());
-  ProjectedRegion({.volume = {}, .left_out = {nothing}, .cut_ends = {}})
+  ProjectedRegion({.volume = {}, .excluded = {nothing}, .cut_ends = {}})
       .restrict(image, Eigen::Isometry3d::Identity(), 0.0);
   EXPECT_EQ(std::ranges::count(image.field.pixels, 1), 120 * 120);
 }
@@ -245,7 +245,7 @@ RegistrationScene cut_spine(const Vector3d& ct_mm) {
 
 Eigen::Isometry3d registered(const RegistrationScene& scene) {
   const ProjectedRegion region(
-      {.volume = {}, .left_out = {}, .cut_ends = beyond_the_ct(scene.ct, AttenuationModel{}.threshold_hu)});
+      {.volume = {}, .excluded = {}, .cut_ends = beyond_the_ct(scene.ct, AttenuationModel{}.threshold_hu)});
   RegistrationOptions registration = preset("setup");
   registration.check_alternatives = false;
   registration.region = &region;
@@ -273,7 +273,7 @@ TEST(Region, ASmallVolumeIsRegistered) {
   const RegistrationScene scene = make_scene(options);
   const ProjectedRegion region(
       {.volume = mask_of({.center_mm = Vector3d(10.0, 20.0, -20.0), .radius_mm = 18.0}, Vector3d::Ones()),
-       .left_out = {},
+       .excluded = {},
        .cut_ends = {}});
   RegistrationOptions registration = preset("setup");
   registration.region = &region;

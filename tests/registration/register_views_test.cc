@@ -105,7 +105,7 @@ TEST(RegisterViews, OnlyTheRegionOfInterestIsCompared) {
     for (int j = 0; j < ct.size.y(); ++j)
       for (int i = 0; i < ct.size.x(); ++i)
         left.at(i, j, k) = (ct.patient_from_voxel * Eigen::Vector3d(i, j, k)).x() < 30.0 ? 1 : 0;
-  const ProjectedRegion region({.volume = left, .left_out = {}, .cut_ends = {}});
+  const ProjectedRegion region({.volume = left, .excluded = {}, .cut_ends = {}});
   RegistrationOptions options = without_alternatives();
   options.region = &region;
   const auto result = register_views(*scene.renderers, scene.xrays, scene.planned, options);

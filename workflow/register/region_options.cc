@@ -95,7 +95,7 @@ RegionOfStudy region_of(const RegionOptions& options, const Study& study, double
     result.rendered_ct = without(result.rendered_ct.value_or(study.ct->hu), mask);
     // A couch lies behind everything: its pixels stay, only its voxels go.
     if (structure_of(study, name).interpreted_type != "SUPPORT")
-      region.left_out.push_back(dilated(mask, options.margin_mm));
+      region.excluded.push_back(dilated(mask, options.margin_mm));
   }
   result.projected = ProjectedRegion(region);
   return result;

@@ -12,8 +12,7 @@ namespace {
 
 // Throws UsageError if a flag was given that the renderer does not have.
 void refuse(bool given, const char* flag, const char* of, RendererKind kind) {
-  if (given)
-    throw UsageError(fmt::format("{} means something to {} only, and the renderer is {}", flag, of, to_string(kind)));
+  if (given) throw UsageError(fmt::format("{} works only with {}, and the renderer is {}", flag, of, to_string(kind)));
 }
 
 }  // namespace
@@ -34,7 +33,7 @@ AttenuationModel RenderingOptions::model() const {
   model.kind = attenuation_name() == "physical" ? AttenuationModel::Kind::kPhysical : AttenuationModel::Kind::kWindowed;
   model.threshold_hu = threshold_hu;
   if (!window.empty() && attenuation_name() != "windowed")
-    throw UsageError("--window means something to --attenuation windowed only");
+    throw UsageError("--window works only with --attenuation windowed");
   if (!window.empty()) {
     model.window_low_hu = window[0];
     model.window_high_hu = window[1];

@@ -8,6 +8,7 @@
 #include <cmath>
 
 #include "base/error.h"
+#include "geometry/rotation.h"
 
 namespace isoshift {
 namespace {
@@ -30,6 +31,19 @@ double number_from(const std::string& text, std::string_view flag) {
 
 }  // namespace
 
+void check_couch_angles(const std::optional<double>& couch_angle_deg, const std::optional<double>& couch_pitch_deg,
+                        const std::optional<double>& couch_roll_deg) {
+  constexpr double kTurnDeg = 360.0, kMostTiltedDeg = 45.0;
+  if (const double angle_deg = couch_angle_deg.value_or(0.0); !(std::abs(angle_deg) <= kTurnDeg))
+    throw UsageError(fmt::format("--couch-angle: {}, expected degrees from -360 to 360", angle_deg));
+  for (const auto& [flag, angle_deg] : {std::pair("--couch-pitch", couch_pitch_deg.value_or(0.0)),
+                                        std::pair("--couch-roll", couch_roll_deg.value_or(0.0))})
+    if (!(std::abs(angle_deg) <= kTurnDeg) ||
+        std::abs(wrapped_rad(rad_from_deg(angle_deg))) > rad_from_deg(kMostTiltedDeg))
+      throw UsageError(
+          fmt::format("{}: {}, expected degrees from -45 to 45: no table top tilts farther", flag, angle_deg));
+}
+
 void StudyOptions::check_finite() const {
   const auto check = [](const char* flag, const auto& values) {
     for (const double value : values)
@@ -37,9 +51,7 @@ void StudyOptions::check_finite() const {
   };
   check("--isocenter", isocenter);
   check("--rt-image-position", rt_image_position);
-  check("--couch-angle", std::array{couch_angle_deg.value_or(0.0)});
-  check("--couch-pitch", std::array{couch_pitch_deg.value_or(0.0)});
-  check("--couch-roll", std::array{couch_roll_deg.value_or(0.0)});
+  check_couch_angles(couch_angle_deg, couch_pitch_deg, couch_roll_deg);
   check("--sad", std::array{sad_mm.value_or(0.0)});
   check("--sid", std::array{sid_mm.value_or(0.0)});
 }

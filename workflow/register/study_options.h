@@ -9,6 +9,10 @@
 
 namespace isoshift {
 
+// Throws UsageError for an angle of the couch at imaging that no couch has, in degrees, IEC 61217.
+void check_couch_angles(const std::optional<double>& couch_angle_deg, const std::optional<double>& couch_pitch_deg,
+                        const std::optional<double>& couch_roll_deg);
+
 struct StudyOptions {
   std::filesystem::path study, plan, structures, machine;
   std::vector<std::filesystem::path> ct, images;

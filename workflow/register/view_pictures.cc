@@ -40,7 +40,7 @@ std::vector<ViewPicture> view_pictures(const Study& study, Renderer& renderer,
   std::vector<ProjectedRegion> regions;
   regions.reserve(structures.size());
   for (const MarkedStructure& structure : structures)
-    regions.emplace_back(RegionOfInterest{.volume = structure.mask, .left_out = {}, .cut_ends = {}});
+    regions.emplace_back(RegionOfInterest{.volume = structure.mask, .excluded = {}, .cut_ends = {}});
   const std::array poses = {study.planned_room_from_patient, actual_room_from_patient};
   std::vector<ViewPicture> pictures;
   for (const XrayImage& xray : study.xrays) {

@@ -10,6 +10,7 @@
 #include <cerrno>
 #include <cstring>
 #include <fstream>
+#include <sstream>
 #include <string_view>
 
 #include "base/error.h"
@@ -81,6 +82,21 @@ void AuditLog::write(const std::string& lines) const {
   if (before == 0) flush(path_.parent_path());
 }
 
+// A line that was cut off proves nothing.
+void AuditLog::Proofs::add(const std::string& text) {
+  const Json line = Json::parse(text, nullptr, false);
+  if (!line.is_object()) return;
+  const std::string event = text_of(line, "event"), session = text_of(line, "session");
+  if (event == "registered") registrations[session] = text_of(line, "record");
+  if (event == "sent") sendings.insert({session, text_of(line, "peer"), text_of(line, "object")});
+  if (event == "not released") releases.erase(session);
+  if (event != "released") return;
+  releases[session] = text_of(line, "release");
+  if (line.contains("objects") && line["objects"].is_array())
+    for (const Json& object : line["objects"])
+      if (object.is_object()) objects.emplace(text_of(object, "sha256"), session);
+}
+
 const AuditLog::Proofs& AuditLog::proofs() const {
   struct stat status{};
   if (::stat(path_.c_str(), &status) != 0) {
@@ -97,18 +113,7 @@ const AuditLog::Proofs& AuditLog::proofs() const {
   std::ifstream file(path_);
   if (!file) throw Error(fmt::format("{}: cannot be read", path_.string()));
   Proofs proofs;
-  for (std::string text; std::getline(file, text);) {
-    const Json line = Json::parse(text, nullptr, false);
-    if (!line.is_object()) continue;  // a line that was cut off
-    const std::string event = text_of(line, "event"), session = text_of(line, "session");
-    if (event == "registered") proofs.registrations[session] = text_of(line, "record");
-    if (event == "sent") proofs.sendings.insert({session, text_of(line, "peer"), text_of(line, "object")});
-    if (event != "released") continue;
-    proofs.releases.emplace(session, text_of(line, "release"));
-    if (line.contains("objects") && line["objects"].is_array())
-      for (const Json& object : line["objects"])
-        if (object.is_object()) proofs.objects.emplace(text_of(object, "sha256"), session);
-  }
+  for (std::string text; std::getline(file, text);) proofs.add(text);
   proofs_ = std::move(proofs);
   read_version_ = {.inode = status.st_ino, .size = status.st_size, .written = status.st_mtim};
   return proofs_;
@@ -121,12 +126,18 @@ bool AuditLog::has_registration(const std::string& session, const std::string& r
 }
 
 bool AuditLog::has_release(const std::string& session, const std::string& release_sha256) const {
-  return proofs().releases.contains({session, release_sha256});
+  const auto& releases = proofs().releases;
+  const auto found = releases.find(session);
+  return found != releases.end() && found->second == release_sha256;
 }
 
 bool AuditLog::has_sending(const std::string& session, const std::string& peer,
                            const std::string& object_sha256) const {
-  return proofs().sendings.contains({session, peer, object_sha256});
+  Proofs kept;
+  std::istringstream lines(kept_);
+  for (std::string line; std::getline(lines, line);) kept.add(line);
+  const std::array sending = {session, peer, object_sha256};
+  return kept.sendings.contains(sending) || proofs().sendings.contains(sending);
 }
 
 std::optional<std::string> AuditLog::session_releasing(const std::string& object_sha256) const {

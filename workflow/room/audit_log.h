@@ -32,8 +32,9 @@ class AuditLog {
   // The following say what the lines prove. They throw Error if the log exists and cannot be read.
   // True if the newest registration of the session has this record.
   bool has_registration(const std::string& session, const std::string& record_sha256) const;
-  // True if a release of the session has this file.
+  // True if the newest release of the session has this file.
   bool has_release(const std::string& session, const std::string& release_sha256) const;
+  // True if the peer has confirmed the object. Lines that were kept count, too.
   bool has_sending(const std::string& session, const std::string& peer, const std::string& object_sha256) const;
   // The session with which an object was released; nothing if the object was not released.
   std::optional<std::string> session_releasing(const std::string& object_sha256) const;
@@ -45,10 +46,12 @@ class AuditLog {
     timespec written{};
   };
   struct Proofs {
-    std::map<std::string, std::string> registrations;        // SHA-256 of the newest record, by session
-    std::set<std::pair<std::string, std::string>> releases;  // session, SHA-256 of the release file
-    std::map<std::string, std::string> objects;              // session, by SHA-256 of a released object
-    std::set<std::array<std::string, 3>> sendings;           // session, peer, SHA-256 of the object
+    std::map<std::string, std::string> registrations;  // SHA-256 of the newest record, by session
+    std::map<std::string, std::string> releases;       // SHA-256 of the newest release file, by session
+    std::map<std::string, std::string> objects;        // session, by SHA-256 of a released object
+    std::set<std::array<std::string, 3>> sendings;     // session, peer, SHA-256 of the object
+
+    void add(const std::string& line);
   };
   void write(const std::string& lines) const;
   const Proofs& proofs() const;  // reads the log again if it has changed

@@ -76,7 +76,7 @@ PatientFiles::Taken PatientFiles::take(const fs::path& file, Notes& notes) {
   try {
     one = scan_file(file);
   } catch (const Error& error) {
-    notes.warnings.push_back(fmt::format("left out: {}", error.what()));
+    notes.warnings.push_back(fmt::format("left aside: {}", error.what()));
     taken.is_readable = false;
     return taken;
   }
@@ -88,7 +88,7 @@ PatientFiles::Taken PatientFiles::take(const fs::path& file, Notes& notes) {
       patients_.at(known_.at(before).patient_id).last = clock_.now();
       copies_of_.emplace(found->uid, file);
       if (sha256_of_file(before) != sha256_of_file(file))
-        notes.warnings.push_back(fmt::format("{}: left out: differs from {}, which has the same SOPInstanceUID",
+        notes.warnings.push_back(fmt::format("{}: left aside: differs from {}, which has the same SOPInstanceUID",
                                              file.string(), before.string()));
       return taken;
     }

@@ -156,10 +156,10 @@ std::optional<Release> ResultsTree::release_of(const std::string& session) const
   const JsonFile file = read_json_file(path);
   if (!audit_.has_release(session, file.sha256))
     throw Error(
-        fmt::format("{}: audit.jsonl has no line of this release: isoshift release did not write this file, or "
-                    "it was changed since. Nothing of the session is sent. Remove the file, and release the "
-                    "session with isoshift release",
-                    path.string()));
+        fmt::format("{}: is not the newest release of session {} in audit.jsonl: isoshift release did not write this "
+                    "file, or it was changed since, or another release followed it. Nothing of the session is sent. "
+                    "Remove the file, and release the session with isoshift release",
+                    path.string(), session));
   Release release;
   try {
     release = release_from(file.json);
@@ -262,11 +262,15 @@ std::vector<std::string> ResultsTree::released() const {
 }
 
 // A mark counts for the object that it names.
-bool ResultsTree::is_sent(const Delivery& delivery) const {
+bool ResultsTree::is_marked(const Delivery& delivery) const {
   const fs::path mark = sent_file(delivery);
   if (!fs::exists(mark)) return false;
   const nlohmann::json json = read_json_file(mark).json;
   return json.is_object() && json.value("object", nlohmann::json()) == delivery.object.sha256;
+}
+
+bool ResultsTree::is_sent(const Delivery& delivery) const {
+  return is_marked(delivery) && audit_.has_sending(delivery.session, delivery.peer, delivery.object.sha256);
 }
 
 std::vector<Delivery> ResultsTree::pending_of(const Release& release) const {
@@ -310,7 +314,9 @@ void ResultsTree::prepare_to_send(const Delivery& delivery) {
   replace_text(prepared_file(delivery), Json{{"on", local_time()}, {"object", delivery.object.sha256}}.dump() + "\n");
 }
 
-bool ResultsTree::is_in_doubt(const Delivery& delivery) const { return fs::exists(prepared_file(delivery)); }
+bool ResultsTree::is_in_doubt(const Delivery& delivery) const {
+  return fs::exists(prepared_file(delivery)) || (is_marked(delivery) && !is_sent(delivery));
+}
 
 void ResultsTree::mark_sent(const Delivery& delivery, const std::string& answer) {
   fs::rename(prepared_file(delivery), sent_file(delivery));
@@ -319,23 +325,6 @@ void ResultsTree::mark_sent(const Delivery& delivery, const std::string& answer)
                  {"peer", delivery.peer},
                  {"object", delivery.object.sha256},
                  {"answer", answer.empty() ? "success" : answer}});
-}
-
-void ResultsTree::complete_audit() {
-  for (const std::string& session : released()) {
-    std::optional<Release> release;
-    try {
-      release = release_of(session);
-    } catch (const Error&) {
-      continue;  // nothing of it was sent; pending() says why
-    }
-    if (!release) continue;
-    for (const auto& delivery : deliveries_of(*release)) {
-      const auto& [name, peer, object] = delivery;
-      if (is_sent(delivery) && !audit_.has_sending(name, peer, object.sha256))
-        audit("sent", {{"session", name}, {"peer", peer}, {"object", object.sha256}, {"noted", "at the next start"}});
-    }
-  }
 }
 
 void ResultsTree::audit(const std::string& event, const Json& details) { audit_.note(event, details); }

@@ -5,7 +5,7 @@
 //   sessions/NAME/           the result of a session of X-rays
 //   registered/NAME.json     the SHA-256 of every file in that folder when it was registered
 //   released/NAME.json       who released the session, and which objects are sent to which peers
-//   sent/NAME.PEER.FILE      the mark that this peer has confirmed this file
+//   sent/NAME.PEER.FILE      the mark that this peer has confirmed this file; it counts with its line in the audit log
 //   audit.jsonl              the audit log, without names of patients and without UIDs
 //
 // A session is released or sent only if its folder is unchanged since its record was written, and if the audit log has
@@ -100,7 +100,7 @@ class ResultsTree {
   // Writes the mark, which mark_sent() then only renames: if the disk is full, the object is not sent, since it could
   // not be marked.
   void prepare_to_send(const Delivery& delivery);
-  // True if sending was prepared and the object was not marked as sent: the peer may have the object.
+  // True if a sending was prepared or marked, and the audit log has no line for it: the peer may have the object.
   bool is_in_doubt(const Delivery& delivery) const;
   void mark_sent(const Delivery& delivery, const std::string& answer);
 
@@ -108,8 +108,6 @@ class ResultsTree {
   void audit(const std::string& event, const nlohmann::ordered_json& details);
   // Writes the lines that were kept. Throws Error if they still cannot be written.
   void write_kept_audit();
-  // Adds the lines of objects whose sender was killed before it wrote the line. The caller must hold the lock.
-  void complete_audit();
 
  private:
   std::filesystem::path record_file(const std::string& session) const;
@@ -122,6 +120,7 @@ class ResultsTree {
   void put_release(const Release& release);
   std::filesystem::path sent_file(const Delivery& delivery) const;
   std::filesystem::path prepared_file(const Delivery& delivery) const;
+  bool is_marked(const Delivery& delivery) const;
   bool is_sent(const Delivery& delivery) const;
 
   std::filesystem::path path_;

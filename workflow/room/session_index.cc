@@ -107,10 +107,10 @@ void SessionIndex::update(const std::vector<WaitingSession>& waiting, const std:
   const std::string title = fmt::format("isoshift: sessions of {}", site_);
   ResultsPage newest{.title = title, .refresh_s = kRefreshS};
   newest.columns = {"Session", "Patient", "Acquired", "Verdict", "Action", "State"};
-  newest.summary = {
-      fmt::format("{} sessions registered, {} waiting. Nothing is sent before somebody releases it: isoshift "
-                  "release SESSION --by NAME",
-                  sessions_.size(), waiting.size())};
+  newest.summary = {fmt::format(
+      "{} sessions registered, {} waiting. A result is sent only after its release: by a person, with isoshift "
+      "release SESSION --by NAME, or by the site's rule",
+      sessions_.size(), waiting.size())};
   for (const std::string& trouble : troubles) newest.summary.push_back("Trouble: " + trouble);
   for (const WaitingSession& one : waiting) newest.rows.push_back(row_of(one));
   std::map<std::string, ResultsPage, std::greater<>> months;

@@ -40,7 +40,6 @@ Watch::Watch(const WatchFile& watch, const Parts& parts)
       next_forgetting_(seen_at_) {
   tree_.clean();
   take_results();
-  troubles_.attempt("completing the audit log", [&] { tree_.complete_audit(); });
   tree_.audit("started", {{"sessions", index_.size()}});
 }
 
@@ -151,7 +150,7 @@ std::vector<Watch::Complete> Watch::complete_sessions() {
       const bool is_running = running_ && running_->session == session.name;
       std::string why = is_running ? "is being registered" : reason_to_wait(session, own, patient_id, patient.last);
       const bool is_complete = why.empty();
-      if (is_complete) why = "has its turn soon";
+      if (is_complete) why = "is next to be registered";
       waiting_.push_back({.name = session.name,
                           .patient_id = patient_id,
                           .acquired = times_of(session.images),

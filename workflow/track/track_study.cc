@@ -157,7 +157,7 @@ class TrackRun {
         const XrayView view = xray_view(timed.header, beam_of(timed.header, said), said);
         views.push_back(prepare(read_xray_image(*file_, timed.header, view)));
       } catch (const Error& error) {
-        notes_.warnings.push_back(fmt::format("left out: {}", error.what()));
+        notes_.warnings.push_back(fmt::format("left aside: {}", error.what()));
         ++unreadable_;
       }
     }

@@ -42,7 +42,7 @@ void XrayStream::take(TimedXray timed, Notes& notes) {
   if (processed_until_s_ && timed.time_s <= *processed_until_s_) {
     ++counts_.late;
     late_s_.push_back(timed.time_s);
-    notes.warnings.push_back(fmt::format("{}: came after a later one had been processed, and was left out", where));
+    notes.warnings.push_back(fmt::format("{}: came after a later one had been processed, and was left aside", where));
     return;
   }
   const auto same_moment = [&](const TimedXray& other) {
@@ -50,8 +50,8 @@ void XrayStream::take(TimedXray timed, Notes& notes) {
   };
   if (std::ranges::any_of(waiting_, same_moment)) {
     ++counts_.broken;
-    notes.warnings.push_back(fmt::format("{}: left out: another X-ray of {} has the same {}", where, timed.header.label,
-                                         described(DCM_AcquisitionTime)));
+    notes.warnings.push_back(fmt::format("{}: left aside: another X-ray of {} has the same {}", where,
+                                         timed.header.label, described(DCM_AcquisitionTime)));
     return;
   }
   if (!begin_s_ || timed.time_s < *begin_s_) begin_s_ = processed_until_s_ ? begin_s_ : timed.time_s;
@@ -75,7 +75,7 @@ void XrayStream::offer(const std::vector<std::filesystem::path>& files, int trie
       if (!std::filesystem::exists(file)) continue;  // renamed meanwhile
       if (++failures_[file] < tries) continue;
       ++counts_.broken;
-      notes.warnings.push_back(fmt::format("left out: {}", error.what()));
+      notes.warnings.push_back(fmt::format("left aside: {}", error.what()));
     }
     failures_.erase(file);
     done_files_.insert(file.native());

@@ -313,7 +313,32 @@ TEST_F(RtImageTest, AFrameThatNoExposureNamesIsLeftOut) {
   const std::vector<RtImage> frames = read_rt_images(study_.image(0), notes_);
   ASSERT_EQ(frames.size(), 1U);
   EXPECT_EQ(frames.front().frame, 1);
-  EXPECT_THAT(notes_.warnings, ElementsAre(HasSubstr("frame 1 was left out: no item of ExposureSequence (3002,0030)")));
+  EXPECT_THAT(notes_.warnings,
+              ElementsAre(HasSubstr("frame 1 was left aside: no item of ExposureSequence (3002,0030)")));
+}
+
+TEST_F(RtImageTest, AFrameWithoutItsIncrementHasNoTimeOfItsOwn) {
+  join_images(study_);
+  const std::vector<RtImage> untold = read_rt_images(study_.image(0), notes_);
+  EXPECT_TRUE(untold[0].has_own_time);
+  EXPECT_FALSE(untold[1].has_own_time);
+  edit(study_.image(0), [](DicomItem d) { d.put(DCM_FrameTime, 2500.0); });
+  const std::vector<RtImage> told = read_rt_images(study_.image(0), notes_);
+  ASSERT_TRUE(told[1].has_own_time);
+  EXPECT_NEAR(*acquisition_seconds(told[1]) - *acquisition_seconds(told[0]), 2.5, 1e-6);
+}
+
+TEST_F(RtImageTest, DateAndTimeInOneAttributeAreRead) {
+  const auto of = [&](const char* text) {
+    return changed([&](DicomItem d) {
+      for (const DcmTagKey& tag : {DCM_AcquisitionTime, DCM_ContentTime}) d.erase(tag);
+      d.put(DCM_AcquisitionDate, "20200101");
+      d.put(DCM_AcquisitionDateTime, text);
+    });
+  };
+  EXPECT_EQ(acquired(of("20260301101530.25+0100")), "2026-03-01 10:15:30");
+  EXPECT_NEAR(*acquisition_seconds(of("20260301101530.25")) - *acquisition_seconds(of("20260301101500")), 30.25, 1e-6);
+  EXPECT_FALSE(acquisition_seconds(of("20260301")));
 }
 
 TEST_F(RtImageTest, FramesWithoutExposuresShareTheGeometryOfTheFile) {

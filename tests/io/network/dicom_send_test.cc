@@ -5,11 +5,13 @@
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include <chrono>
 #include <fstream>
 #include <iterator>
 #include <optional>
+#include <thread>
 
 #include "base/child_process.h"
 #include "base/sha256.h"
@@ -60,7 +62,7 @@ class DicomSendTest : public testing::Test {
                          60s);
     wait_for_listener(port);
     try {
-      send_object(study_.plan(), sha256_, peer_at(host, port, pinned), false);
+      send_object(file_, sha256_, peer_at(host, port, pinned), false);
     } catch (const PeerError& error) {
       return error.what();
     } catch (const Error& error) {
@@ -81,14 +83,16 @@ class DicomSendTest : public testing::Test {
     EXPECT_TRUE(fs::is_empty(folder_ / "received"));
     EXPECT_THAT(log(), Not(HasSubstr("Association Received")));
   }
-  std::string log() const {
-    std::ifstream file(folder_ / "log");
+  static std::string text_of(const fs::path& path) {
+    std::ifstream file(path, std::ios::binary);
     return {std::istreambuf_iterator<char>(file), {}};
   }
+  std::string log() const { return text_of(folder_ / "log"); }
 
   TemporaryFolder folder_;
   std::optional<Certificates> certificates_;
   SmallStudy study_;
+  fs::path file_ = study_.plan();
   std::string sha256_ = sha256_of_file(study_.plan());
   std::string key_ = "client.key";
 };
@@ -148,12 +152,31 @@ TEST_F(DicomSendTest, ACertificateThatTheAuthorityDidNotSignIsRefusedEvenIfItIsP
   expect_nothing_sent();
 }
 
-TEST_F(DicomSendTest, AFileThatWasExchangedWhileThePeerWasCalledIsNotSent) {
+TEST_F(DicomSendTest, AFileThatIsNotWhatWasReleasedIsNotSent) {
   certificates_->make("server", "record", "IP:127.0.0.1");
   sha256_ = std::string(64, '0');
   EXPECT_THAT(error_of_sending("server", "127.0.0.1"),
               AllOf(StartsWith("the object: "), HasSubstr("RTPLAN.dcm: was changed: its SHA-256 is ")));
-  EXPECT_TRUE(fs::is_empty(folder_ / "received"));
+  expect_nothing_sent();
+}
+
+// A pipe tells how often it is read: whoever opens it again gets another object.
+TEST_F(DicomSendTest, WhatIsSentIsReadOnce) {
+  certificates_->make("server", "record", "IP:127.0.0.1");
+  std::string bytes = text_of(study_.plan());
+  file_ = folder_ / "pipe";
+  ASSERT_EQ(::mkfifo(file_.c_str(), 0600), 0);
+  std::jthread writer([&](const std::stop_token& stop) {
+    while (!stop.stop_requested()) {
+      std::ofstream(file_, std::ios::binary) << bytes;
+      bytes = text_of(study_.image(0));
+      std::this_thread::sleep_for(200ms);  // the reader sees the end before the pipe has a writer again
+    }
+  });
+  EXPECT_EQ(error_of_sending("server", "127.0.0.1"), "");
+  expect_sent();
+  writer.request_stop();
+  std::ifstream(file_).ignore();  // lets the writer go
 }
 
 TEST_F(DicomSendTest, FilesThatCannotBeUsedAreNamed) {
@@ -180,7 +203,7 @@ TEST_F(DicomSendTest, ACipherThatBcp195DoesNotAllowIsRefused) {
                               folder_.path().string(), port, cipher)},
                  60s);
     wait_for_listener(port);
-    EXPECT_THROW(send_object(study_.plan(), sha256_, peer_at("127.0.0.1", port, ""), false),
+    EXPECT_THROW(send_object(file_, sha256_, peer_at("127.0.0.1", port, ""), false),
                  PeerError);  // it is no DICOM peer
     const auto end = server.end(30s);
     ASSERT_TRUE(end);

@@ -107,20 +107,61 @@ TEST_F(ResultsTreeTest, TheLineOfAReleaseNamesThePersonAndTheUser) {
   EXPECT_EQ(to_string(tree_.release_of(b)->releaser), "J. Doe (user isoshift)");
 }
 
-TEST_F(ResultsTreeTest, ASendingThatAKilledProcessDidNotLogIsAddedToTheLog) {
+TEST_F(ResultsTreeTest, AMarkWithoutItsLineInTheLogIsInDoubt) {
+  tree_.release(a_, kDoe, {"record"});
+  const std::vector<Delivery> pending = tree_.pending().deliveries;
+  ASSERT_EQ(pending.size(), 2U);
+  tree_.prepare_to_send(pending[0]);
+  tree_.mark_sent(pending[0], "");
+  EXPECT_EQ(ResultsTree(tree_.path()).pending().deliveries.size(), 1U);
+  const std::string before = audit();
+  replace_text(tree_.path() / "audit.jsonl", before.substr(0, before.find("\"event\":\"sent\"") + 20));  // cut
+  // A mark that nobody but its forger wrote.
+  fs::copy_file(tree_.path() / "sent" / (a_ + ".record." + pending[0].object.file), folder_ / "mark");
+  std::string forged = text_of(folder_ / "mark");
+  forged.replace(forged.find(pending[0].object.sha256), pending[0].object.sha256.size(), pending[1].object.sha256);
+  write_text(tree_.path() / "sent" / (a_ + ".record." + pending[1].object.file), forged);
+  ResultsTree reopened(tree_.path());
+  ASSERT_EQ(reopened.pending().deliveries.size(), 2U);
+  for (const Delivery& delivery : pending) EXPECT_TRUE(reopened.is_in_doubt(delivery));
+  for (const Delivery& delivery : pending) {
+    reopened.prepare_to_send(delivery);
+    reopened.mark_sent(delivery, "");
+  }
+  EXPECT_THAT(reopened.pending().deliveries, IsEmpty());
+  EXPECT_FALSE(reopened.is_in_doubt(pending[0]));
+  EXPECT_EQ(lines_of("sent"), 3);  // each with a line of its own, the first behind the cut one
+}
+
+TEST_F(ResultsTreeTest, WhatAPeerConfirmedWhileTheLogCannotBeWrittenIsNotSentAgain) {
   tree_.release(a_, kDoe, {"record"});
   const Delivery sent = tree_.pending().deliveries[0];
-  tree_.prepare_to_send(sent);
-  tree_.mark_sent(sent, "");
-  const std::string before = audit();
-  tree_.complete_audit();
-  EXPECT_EQ(audit(), before);
-  replace_text(tree_.path() / "audit.jsonl", before.substr(0, before.find("\"event\":\"sent\"") + 20));  // cut
-  tree_.complete_audit();
-  EXPECT_THAT(audit(), HasSubstr("\n{\"on\":"));  // a line of its own behind the cut one
-  EXPECT_THAT(audit(), HasSubstr("\"event\":\"sent\",\"session\":\"" + a_ + "\",\"peer\":\"record\""));
-  EXPECT_THAT(audit(), HasSubstr("at the next start"));
-  EXPECT_EQ(lines_of("registered") + lines_of("released"), 2);
+  {
+    const FileSizeLimit full(audit().size());
+    tree_.prepare_to_send(sent);
+    tree_.mark_sent(sent, "");
+    EXPECT_EQ(tree_.pending().deliveries.size(), 1U);
+    EXPECT_THROW(tree_.write_kept_audit(), Error);
+  }
+  tree_.write_kept_audit();
+  EXPECT_EQ(lines_of("sent"), 1);
+  EXPECT_EQ(ResultsTree(tree_.path()).pending().deliveries.size(), 1U);
+}
+
+TEST_F(ResultsTreeTest, AReleaseThatAnotherReplacedDoesNotCountAgain) {
+  tree_.release(a_, kDoe, {"record"});
+  const std::string first = text_of(released(a_));
+  fs::remove(released(a_));
+  tree_.release(a_, kDoe, {"archive"});
+  replace_text(released(a_), first);
+  EXPECT_THAT(tree_.pending().deliveries, IsEmpty());
+  EXPECT_THAT(tree_.pending().refused[a_], HasSubstr("is not the newest release of session " + a_));
+}
+
+TEST_F(ResultsTreeTest, AFolderInThePlaceOfAReleaseIsNamed) {
+  fs::create_directory(released(a_));
+  EXPECT_THAT(error_of_release(a_), HasSubstr(a_ + ".json: is a folder, expected a JSON file"));
+  EXPECT_THAT(tree_.pending().refused[a_], HasSubstr(a_ + ".json: is a folder"));
 }
 
 TEST_F(ResultsTreeTest, AMarkOfAnotherObjectIsNoMark) {
@@ -317,13 +358,12 @@ TEST_F(ResultsTreeTest, AHandWrittenReleaseIsNotSent) {
   std::string forged = text_of(released(a_));
   forged.replace(forged.find(a_), a_.size(), b);
   write_text(released(b), forged);
-  tree_.complete_audit();  // does not make it good
   const ResultsTree::Pending pending = tree_.pending();
   for (const Delivery& delivery : pending.deliveries) EXPECT_EQ(delivery.session, a_);
   ASSERT_TRUE(pending.refused.contains(b));
-  EXPECT_THAT(pending.refused.at(b), AllOf(HasSubstr(b + ".json: audit.jsonl has no line of this release"),
+  EXPECT_THAT(pending.refused.at(b), AllOf(HasSubstr(b + ".json: is not the newest release of session "),
                                            HasSubstr("Remove the file, and release the session")));
-  EXPECT_THAT(error_of_release(b), HasSubstr("audit.jsonl has no line of this release"));
+  EXPECT_THAT(error_of_release(b), HasSubstr("is not the newest release of session "));
   fs::remove(released(b));
   EXPECT_EQ(error_of_release(b), "");
 }

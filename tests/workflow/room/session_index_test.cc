@@ -105,7 +105,7 @@ TEST_F(SessionIndexTest, AHandWrittenReleaseIsTold) {
   add("a", "2026-03-01 10:15:00");
   write_text(tree_.path() / "released" / "a.json", "{}");
   index_.update({}, {});
-  EXPECT_THAT(page("index.html"), HasSubstr("a.json: audit.jsonl has no line of this release"));
+  EXPECT_THAT(page("index.html"), HasSubstr("a.json: is not the newest release of session"));
 }
 
 TEST_F(SessionIndexTest, AYearOfSessionsIsNotInOnePage) {

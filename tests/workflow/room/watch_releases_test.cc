@@ -193,7 +193,7 @@ TEST_F(WatchReleases, ForgedAndExchangedResultsAreNotSentAndSaidOnce) {
                                     }),
               1)
         << patient;
-  EXPECT_THAT(room_.index(), HasSubstr("audit.jsonl has no line of this release"));
+  EXPECT_THAT(room_.index(), HasSubstr("is not the newest release of session"));
 }
 
 TEST_F(WatchReleases, ASessionThatIsRegisteredAgainNeedsAReleaseOfItsOwn) {
