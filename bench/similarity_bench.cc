@@ -34,7 +34,7 @@ void compare(benchmark::State& state, SimilarityKind kind) {
       benchmark::Counter(static_cast<double>(count), benchmark::Counter::kIsIterationInvariantRate);
 }
 
-const bool registered = [] {
+const bool kRegistered = [] {
   for (const SimilarityKind kind : kSimilarityKinds)
     benchmark::RegisterBenchmark(fmt::format("similarity/{}", to_string(kind)).c_str(), compare, kind)
         ->Arg(3000)

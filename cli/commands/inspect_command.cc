@@ -69,7 +69,7 @@ std::string describe_rt_image(RtImage image, const std::optional<std::string>& p
           line("frame of reference", or_missing(image.frame_of_reference_uid)) +
           line("isocenter in that frame", or_missing(image.isocenter_mm, "mm")) +
           line("acquired", or_missing(image.acquisition_date) + " " + or_missing(image.acquisition_time));
-  for (const std::string& override_ : applied.overrides) text += line("profile", override_);
+  for (const std::string& applied_override : applied.overrides) text += line("profile", applied_override);
   const auto missing = missing_attributes(image);
   for (const MissingAttribute& attribute : missing)
     text += line("MISSING", fmt::format("{}; {}", described(attribute.tag),
