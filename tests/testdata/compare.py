@@ -33,14 +33,12 @@ UID = re.compile(r"2\.25\.\d+")
 
 
 class Uids:
-    """New UIDs of one file against those of the other: each stands for one, and only for a new one."""
+    """UIDs of one folder against those of the other: each stands for exactly one, so that what refers to what is the same."""
 
     def __init__(self):
         self.pairs = {}
 
     def are_same(self, one, other):
-        if one == other:
-            return True
         return self.pairs.setdefault(one, other) == other and list(self.pairs.values()).count(other) == 1
 
 
