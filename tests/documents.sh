@@ -20,13 +20,13 @@ complain() {
 while IFS=: read -r document name; do
   grep -qxF "$name" <<<"$tests" || complain "$document: there is no test $name"
 done < <({
-  grep -oE '`[A-Z][A-Za-z0-9]+\.([A-Z][A-Za-z0-9]+|\*)`' README.md CHANGELOG.md ARCHITECTURE.md docs/*.md docs/commands/*.md
+  grep -oE '`[A-Z][A-Za-z0-9]+\.([A-Z][A-Za-z0-9]+|\*)`' README.md CHANGELOG.md ARCHITECTURE.md docs/*.md docs/commands/*.md testdata/README.md testdata/*/README.md
   grep -oE '`[A-Z][a-z]+[A-Za-z0-9]*`' CHANGELOG.md | sed 's/^/CHANGELOG.md:/'
 } | tr -d '`' | grep -v ':RTImage[.]' | sort -u)
 
-# tests/..., bench/..., docs/... and the like.
+# tests/..., bench/..., docs/..., testdata/... and the like.
 while IFS=: read -r document file; do
   [ -e "$file" ] || complain "$document: there is no $file"
-done < <(grep -oE '(tests|bench|docs|packaging|drr|io|registration|workflow|geometry|setup|base|cli|phantom)/[A-Za-z0-9_./-]+\.[a-z]+' \
-  README.md docs/*.md docs/commands/*.md | sort -u)
+done < <(grep -oE '(testdata|tests|bench|docs|packaging|drr|io|registration|workflow|geometry|setup|base|cli|phantom)/[A-Za-z0-9_./-]+\.[a-z]+' \
+  README.md docs/*.md docs/commands/*.md testdata/README.md testdata/*/README.md tests/real_data/README.md | sort -u)
 exit $status

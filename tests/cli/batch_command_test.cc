@@ -11,6 +11,7 @@
 #include "base/child_process.h"
 #include "base/error.h"
 #include "tests/support/small_study.h"
+#include "tests/support/testdata.h"
 #include "workflow/batch/batch_folder.h"
 #include "workflow/batch/batch_manifest.h"
 
@@ -23,12 +24,9 @@ using testing::HasSubstr;
 class BatchCommandTest : public testing::Test {
  protected:
   BatchCommandTest() {
-    for (const int seed : {1, 2}) {
-      PhantomOptions options = small_phantom();
-      options.seed = static_cast<std::uint64_t>(seed);
-      options.fractions = 2;
-      fs::create_directories(exported() / fmt::format("{}", seed));
-      write_phantom_study(options, exported() / fmt::format("{}", seed), {});
+    for (const char* patient : {"1", "2"}) {
+      fs::create_directories(exported() / patient);
+      fs::copy(testdata("small") / patient, exported() / patient, fs::copy_options::recursive);
     }
   }
   ~BatchCommandTest() override { use_program(ISOSHIFT_PROGRAM); }

@@ -8,6 +8,7 @@
 
 #include "io/dicom/rt_plan.h"
 #include "tests/support/small_study.h"
+#include "tests/support/testdata.h"
 
 namespace isoshift {
 namespace {
@@ -44,14 +45,9 @@ std::array<double, 6> shift_by_hand(const Eigen::Matrix3d& r, const Eigen::Vecto
 
 class CheckCommandTest : public testing::Test {
  protected:
-  static void SetUpTestSuite() {
-    study_ = new SmallStudy;
-    ASSERT_EQ(register_study(*study_).exit_status, 0);
-  }
-  static void TearDownTestSuite() { delete study_; }
-
-  std::string ours() const { return (study_->output() / "spatial_registration.dcm").string(); }
-  std::string plan() const { return study_->plan().string(); }
+  // An object that isoshift wrote, and its plan: a head in HFS, couch at 0.
+  static std::string ours() { return testdata("registrations/HFS/spatial_registration.dcm").string(); }
+  static std::string plan() { return testdata("registrations/HFS/RTPLAN.dcm").string(); }
   const Eigen::Vector3d isocenter_ = small_phantom().placement.isocenter_patient_mm;
 
   static DicomItem matrix_item(const DicomItem& d) {
@@ -111,18 +107,19 @@ class CheckCommandTest : public testing::Test {
       EXPECT_NEAR(one["couch_shift"][axis].get<double>(), other["couch_shift"][axis].get<double>(), 1e-6) << axis;
   }
 
-  static SmallStudy* study_;
   TemporaryFolder folder_;
 };
-SmallStudy* CheckCommandTest::study_ = nullptr;
 
-TEST_F(CheckCommandTest, OursPassesAndMeansTheShiftOfTheReport) {
-  const CommandOutcome outcome = run_command({"check", ours(), "--plan", plan(), "--json"});
+TEST_F(CheckCommandTest, OneWrittenNowPassesAndMeansTheShiftOfTheReport) {
+  const SmallStudy study;
+  ASSERT_EQ(register_study(study).exit_status, 0);
+  const std::string written = (study.output() / "spatial_registration.dcm").string();
+  const CommandOutcome outcome = run_command({"check", written, "--plan", study.plan().string(), "--json"});
   ASSERT_EQ(outcome.exit_status, 0) << outcome.err;
   EXPECT_TRUE(checked(outcome)["passes"].get<bool>());
-  std::ifstream file(study_->output() / "result.json");
+  std::ifstream file(study.output() / "result.json");
   expect_same_shift(checked(outcome), nlohmann::json::parse(file));
-  EXPECT_THAT(run_command({"check", ours()}).out, HasSubstr("spatial_registration.dcm: passes"));
+  EXPECT_THAT(run_command({"check", written}).out, HasSubstr("spatial_registration.dcm: passes"));
 }
 
 TEST_F(CheckCommandTest, AnInvertedOneIsFoundByThePlanAndByItsPair) {
@@ -135,12 +132,14 @@ TEST_F(CheckCommandTest, AnInvertedOneIsFoundByThePlanAndByItsPair) {
 }
 
 TEST_F(CheckCommandTest, OneFromTheRoomMeansTheSameShift) {
+  const SmallStudy study;
+  ASSERT_EQ(register_study(study).exit_status, 0);
   const std::string from_room = (folder_ / "from_room").string();
-  ASSERT_EQ(
-      run_command({"register", study_->path().string(), "-o", from_room, "--source-for", "iec-fixed"}).exit_status, 0);
-  const std::string theirs = from_room + "/spatial_registration.dcm";
-  const CommandOutcome outcome =
-      run_command({"check", ours(), theirs, "--plan", plan(), "--couch-angle", "0", "--json"});
+  ASSERT_EQ(run_command({"register", study.path().string(), "-o", from_room, "--source-for", "iec-fixed"}).exit_status,
+            0);
+  const CommandOutcome outcome = run_command({"check", (study.output() / "spatial_registration.dcm").string(),
+                                              from_room + "/spatial_registration.dcm", "--plan", study.plan().string(),
+                                              "--couch-angle", "0", "--json"});
   ASSERT_EQ(outcome.exit_status, 0) << outcome.out << outcome.err;
   expect_same_shift(checked(outcome, 0), checked(outcome, 1));
   const auto difference = nlohmann::json::parse(outcome.out)["difference"];
@@ -289,7 +288,7 @@ TEST_F(CheckCommandTest, ThePlanOfAnotherPatientIsRefused) {
 }
 
 TEST_F(CheckCommandTest, ThePlanOfAnotherFrameIsRefusedAndOneWithoutIsNoted) {
-  const std::string registered = read_rt_plan(study_->plan()).frame_of_reference_uid.value();
+  const std::string registered = read_rt_plan(plan()).frame_of_reference_uid.value();
   const std::string elsewhere =
       copy_of(plan(), "elsewhere.dcm", [](DicomItem d) { d.put(DCM_FrameOfReferenceUID, "1.2.3"); });
   const CommandOutcome outcome = run_command({"check", ours(), "--plan", elsewhere});
@@ -319,7 +318,7 @@ TEST_F(CheckCommandTest, TwoThatCannotBeComparedAreAnError) {
   const CommandOutcome cts = run_command({"check", ours(), of_other_ct});
   EXPECT_EQ(cts.exit_status, 1);
   EXPECT_THAT(cts.out, HasSubstr("they register different frames (FrameOfReferenceUID (0020,0052)): " + ours() +
-                                 " registers " + read_rt_plan(study_->plan()).frame_of_reference_uid.value() + ", " +
+                                 " registers " + read_rt_plan(plan()).frame_of_reference_uid.value() + ", " +
                                  of_other_ct + " registers 1.2.3. Compare registrations of one planning CT only"));
   const CommandOutcome as_json = run_command({"check", ours(), of_other_ct, "--json"});
   EXPECT_EQ(as_json.exit_status, 1);
@@ -369,7 +368,7 @@ TEST_F(CheckCommandTest, WhatContradictsThePlanIsRefused) {
 }
 
 TEST_F(CheckCommandTest, AnObjectThatMeansSeveralThingsGivesNoNumber) {
-  const std::string ct = read_rt_plan(study_->plan()).frame_of_reference_uid.value();
+  const std::string ct = read_rt_plan(plan()).frame_of_reference_uid.value();
   const std::string itself = ours_from(ct, our_matrix(), "itself.dcm", "Somebody");
   const std::string twice = copy_of(foreign(), "twice.dcm", [](DicomItem d) {
     d.items(DCM_RegistrationSequence)[1].append_item(DCM_MatrixRegistrationSequence);

@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cstdlib>
 #include <fstream>
 #include <iterator>
 #include <nlohmann/json.hpp>
@@ -19,19 +20,34 @@ namespace {
 
 using testing::HasSubstr;
 
+// 40 moments of two imagers and a 4D CT of four phases: 20 s of one core, and too large for testdata/.
+void make_breathing_study(const std::filesystem::path& folder) {
+  const CommandOutcome made = run_command({"phantom", "-o", folder.string(), "--overwrite", "--anatomy", "thorax",
+                                           "--breathing", "8", "--voxel-mm", "2", "--image-pixels", "192", "--phases",
+                                           "4", "--translation", "1,-2,1", "--rotation", "0,0,0"});
+  ASSERT_EQ(made.exit_status, 0) << made.err;
+}
+
+// ctest runs every test in a process of its own. It names a folder for one study of all, which BreathingStudy makes.
+const char* shared_study() { return std::getenv("ISOSHIFT_BREATHING_STUDY"); }
+
+TEST(BreathingStudy, IsMadeOnceForAllTests) {
+  if (shared_study() == nullptr) GTEST_SKIP() << "every test suite makes its own outside of ctest";
+  make_breathing_study(shared_study());
+}
+
 class TrackCommandTest : public testing::Test {
  protected:
   static constexpr int kMoments = 40;
 
   static void SetUpTestSuite() {
+    if (shared_study() != nullptr) return;
     folder_ = new TemporaryFolder;
-    const CommandOutcome made =
-        run_command({"phantom", "-o", study().string(), "--anatomy", "thorax", "--breathing", "8", "--voxel-mm", "2",
-                     "--image-pixels", "192", "--phases", "4", "--translation", "1,-2,1", "--rotation", "0,0,0"});
-    ASSERT_EQ(made.exit_status, 0) << made.err;
+    make_breathing_study(study());
   }
   static void TearDownTestSuite() { delete folder_; }
-  static std::filesystem::path study() { return *folder_ / "study"; }
+  // No test changes it.
+  static std::filesystem::path study() { return shared_study() != nullptr ? shared_study() : *folder_ / "study"; }
 
   // Runs track on the study, or on what else is named, and returns track.json.
   nlohmann::json track(const std::vector<std::string>& more, bool whole_study = true) {

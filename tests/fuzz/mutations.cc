@@ -16,7 +16,8 @@
 #include "base/error.h"
 #include "io/dicom/decoder_process.h"
 #include "tests/fuzz/readers.h"
-#include "tests/support/small_study.h"
+#include "tests/support/temporary_folder.h"
+#include "tests/support/testdata.h"
 
 namespace isoshift {
 namespace {
@@ -34,26 +35,17 @@ std::string bytes_of(const std::filesystem::path& path) {
 
 std::vector<Original> originals() {
   std::vector<Original> list;
-  SmallStudy study;
-  const auto add = [&](const std::string& reader, const std::filesystem::path& path, const std::string& name) {
-    list.push_back({reader, name, bytes_of(path)});
+  const auto add = [&](const std::string& reader, const std::string& file) {
+    list.push_back({reader, file, bytes_of(testdata(file))});
   };
-  add("ct", study.ct_slice(18), "CT slice");
-  for (const char* command : {"dcmcjpls +el", "dcmcjpeg +e1", "dcmcrle", "dcmconv +td", "dcmconv +ti", "dcmconv +tb"}) {
-    const std::filesystem::path copy = study.path() / "copy.dcm";
-    if (run_shell(fmt::format("{} {} {}", command, study.ct_slice(18).string(), copy.string())).exit_status != 0)
-      throw Error(fmt::format("{} failed", command));
-    add("ct", copy, command);
-    std::filesystem::remove(copy);
-  }
-  add("rt_image", study.image(1), "RT Image");
-  add("rt_plan", study.plan(), "RT Plan");
-  draw(study, {{"Ball", {rectangle({-12, 38, -410}, 30, 20), rectangle({-12, 38, -404}, 30, 20)}}});
-  add("rt_structures", study.structures(), "RT Structure Set");
-  register_study(study, {"--write-reg-for-review"});
-  add("spatial_registration", study.output() / "spatial_registration.dcm", "Spatial Registration");
-  join_images(study);
-  add("rt_image", study.image(0), "RT Image of two frames");
+  add("ct", "small/1/CT/CT0018.dcm");
+  for (const char* name : {"jpeg-ls", "jpeg-lossless", "rle", "deflated", "implicit", "big-endian"})
+    add("ct", fmt::format("compressed/{}.dcm", name));
+  add("rt_image", "small/1/RTIMAGE/KV_G090.dcm");
+  add("rt_plan", "small/1/RTPLAN.dcm");
+  add("rt_structures", "thorax/RTSTRUCT.dcm");
+  add("spatial_registration", "registrations/HFS/spatial_registration.dcm");
+  add("rt_image", "rt-images/obi-frames/KV.dcm");
   return list;
 }
 

@@ -1,4 +1,4 @@
-// The thorax of a patient with a structure set by another program (data/README.md).
+// The thorax of a patient with a structure set by another program (tests/real_data/README.md).
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

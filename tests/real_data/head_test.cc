@@ -1,4 +1,5 @@
-// The plastic head with known setup errors (data/README.md): DICOM nobody here wrote, X-rays by another program.
+// The plastic head with known setup errors (tests/real_data/README.md): DICOM nobody here wrote, X-rays by another
+// program.
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>

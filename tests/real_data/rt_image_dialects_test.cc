@@ -1,4 +1,4 @@
-// RT Images as real machines write them (data/README.md): what is missing must be refused by name.
+// RT Images as real machines write them (tests/real_data/README.md): what is missing must be refused by name.
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>

@@ -1,5 +1,5 @@
-// Real X-rays of a steel ball by a TrueBeam (data/README.md): they decide the signs of gantry angle, receptor
-// translation and couch axes against a real machine.
+// Real X-rays of a steel ball by a TrueBeam (tests/real_data/README.md): they decide the signs of gantry angle,
+// receptor translation and couch axes against a real machine.
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>

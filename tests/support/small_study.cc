@@ -5,6 +5,7 @@
 
 #include "io/dicom/decode.h"
 #include "io/dicom/rt_plan.h"
+#include "tests/support/testdata.h"
 
 namespace isoshift {
 
@@ -17,6 +18,15 @@ PhantomOptions small_phantom() {
   options.image_pixels = 96;
   options.photons = 0.0;
   return options;
+}
+
+SmallStudy::SmallStudy() {
+  namespace fs = std::filesystem;
+  const fs::path from = testdata("small/1");
+  fs::create_directories(path() / "RTIMAGE");
+  fs::copy(from / "CT", path() / "CT");
+  for (const char* file : {"RTIMAGE/KV_G000.dcm", "RTIMAGE/KV_G090.dcm", "RTPLAN.dcm", "truth.json"})
+    fs::copy_file(from / file, path() / file);
 }
 
 SmallStudy::SmallStudy(const PhantomOptions& options) {

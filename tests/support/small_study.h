@@ -19,7 +19,8 @@ PhantomOptions small_phantom();
 // A study folder with one phantom in it. Tests change its files with edit().
 class SmallStudy {
  public:
-  explicit SmallStudy(const PhantomOptions& options = small_phantom());
+  SmallStudy();  // that of small_phantom(), copied from testdata/small/1: its first fraction
+  explicit SmallStudy(const PhantomOptions& options);
 
   std::filesystem::path path() const { return folder_ / "study"; }
   std::filesystem::path output() const { return folder_ / "result"; }
