@@ -34,7 +34,7 @@ RegisterOptions checked_registration_flags(const WatchFile& watch) {
   try {
     app.parse(std::vector<std::string>(watch.registration.rbegin(), watch.registration.rend()));
     options.registration.settle();
-    options.study.study = watch.results;  // any: its words are what is checked
+    options.study.parts.study = watch.results;  // any: its words are what is checked
     (void)options.study.request();
     if (!options.site.empty()) throw UsageError("--site is named by site, not here");
     (void)chosen_site(watch.site, options.anatomy);

@@ -167,10 +167,10 @@ TEST_F(BatchCommandTest, ScanWritesTheManifestThatBatchReads) {
   EXPECT_EQ(run_command({"batch", "--scan", exported().string(), "-o", manifest.string()}).exit_status, 0);
   const std::vector<BatchCase> found = read_manifest(manifest);
   ASSERT_EQ(found.size(), 4U);
-  EXPECT_EQ(found[0].ct, std::vector{exported() / "1" / "CT"});
-  EXPECT_EQ(found[0].images.size(), 2U);
-  EXPECT_EQ(found[1].images[0], exported() / "1" / "RTIMAGE" / "F02" / "KV_G000.dcm");
-  EXPECT_EQ(found[2].plan, exported() / "2" / "RTPLAN.dcm");
+  EXPECT_EQ(found[0].parts.ct, std::vector{exported() / "1" / "CT"});
+  EXPECT_EQ(found[0].parts.images.size(), 2U);
+  EXPECT_EQ(found[1].parts.images[0], exported() / "1" / "RTIMAGE" / "F02" / "KV_G000.dcm");
+  EXPECT_EQ(found[2].parts.plan, exported() / "2" / "RTPLAN.dcm");
 }
 
 // AP and LAT, LAT again, the couch moves, AP and LAT: LAT again belongs to neither pair.
@@ -195,7 +195,7 @@ TEST_F(BatchCommandTest, ScanDoesNotPairARetakeAcrossACouchMove) {
   std::vector<std::vector<std::string>> found;
   for (const BatchCase& one : read_manifest(manifest)) {
     found.emplace_back();
-    for (const fs::path& image : one.images) found.back().push_back(image.stem());
+    for (const fs::path& image : one.parts.images) found.back().push_back(image.stem());
   }
   using testing::ElementsAre;
   EXPECT_THAT(found, ElementsAre(ElementsAre("KV_G000", "KV_G090"), ElementsAre("c"), ElementsAre("d", "e")));
@@ -223,8 +223,8 @@ TEST_F(ManifestTest, TablesAndJsonLinesSayTheSame) {
   for (const char* name : {"m.csv", "m.jsonl"}) {
     const auto cases = read_manifest(folder_ / name);
     ASSERT_EQ(cases.size(), 1U);
-    EXPECT_EQ(cases[0].ct, std::vector{folder_ / "CT, planning"});
-    EXPECT_EQ(cases[0].images, (std::vector{folder_ / "a.dcm", folder_ / "b.dcm"}));
+    EXPECT_EQ(cases[0].parts.ct, std::vector{folder_ / "CT, planning"});
+    EXPECT_EQ(cases[0].parts.images, (std::vector{folder_ / "a.dcm", folder_ / "b.dcm"}));
     EXPECT_EQ(cases[0].anatomy, "head");
   }
 }

@@ -94,7 +94,7 @@ void Batch::serve() {
     if (one == cases_.end() || folder_.has_ended(name)) return;
     try {
       RegisterOptions registered = options_.each;
-      registered.study = one->options(options_.each.study);
+      registered.study.parts = one->parts;
       if (!one->anatomy.empty()) registered.anatomy = one->anatomy;
       registered.output = folder_.folder_of(name);
       register_study(registered, shared, nobody);

@@ -10,8 +10,8 @@
 namespace isoshift {
 
 struct StudyOptions {
-  std::filesystem::path study, plan, structures, machine;
-  std::vector<std::filesystem::path> ct, images;
+  StudyParts parts;
+  std::filesystem::path machine;
   std::vector<double> isocenter, rt_image_position;
   std::vector<std::string> gantry_angles, allow;
   std::string patient_position, intensity, beam;

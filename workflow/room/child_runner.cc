@@ -11,8 +11,8 @@ void ChildRunner::begin(const StudyParts& parts, const std::filesystem::path& fo
   for (const auto& file : parts.ct) words.push_back(file.string());
   words.emplace_back("--image");
   for (const auto& file : parts.images) words.push_back(file.string());
-  if (parts.plan) words.insert(words.end(), {"--plan", parts.plan->string()});
-  if (parts.structures) words.insert(words.end(), {"--structures", parts.structures->string()});
+  if (!parts.plan.empty()) words.insert(words.end(), {"--plan", parts.plan.string()});
+  if (!parts.structures.empty()) words.insert(words.end(), {"--structures", parts.structures.string()});
   words.insert(words.end(), {"--site", watch_.site.path.string(), "--output", folder.string()});
   words.insert(words.end(), watch_.registration.begin(), watch_.registration.end());
   child_ = std::make_unique<Child>(std::move(words), limit_);
