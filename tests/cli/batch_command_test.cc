@@ -8,8 +8,8 @@
 #include <iterator>
 #include <nlohmann/json.hpp>
 
-#include "base/child_process.h"
 #include "base/error.h"
+#include "base/process.h"
 #include "tests/support/small_study.h"
 #include "workflow/batch/batch_folder.h"
 #include "workflow/batch/batch_manifest.h"
@@ -128,7 +128,11 @@ TEST_F(BatchCommandTest, OneBadCaseStopsNoOther) {
 // A program that dies over its first case is started anew for the next.
 TEST_F(BatchCommandTest, AWorkerThatDiesTakesItsCaseWithIt) {
   const fs::path program = folder_ / "dies";
-  std::ofstream(program) << "#!/bin/sh\necho ready\nread name\nkill -9 $$\n";
+  std::ofstream(program) << R"(#!/bin/sh
+echo '{"ready":{}}'
+read order
+kill -9 $$
+)";
   fs::permissions(program, fs::perms::owner_all);
   use_program(program);
   const CommandOutcome outcome = batch();
@@ -136,6 +140,17 @@ TEST_F(BatchCommandTest, AWorkerThatDiesTakesItsCaseWithIt) {
   const nlohmann::json all = summary()["cases"];
   EXPECT_EQ(all.size(), 4U);
   for (const auto& one : all) EXPECT_THAT(one["error"].get<std::string>(), HasSubstr("ended by signal 9"));
+
+  std::ofstream(program) << R"(#!/bin/sh
+echo '{"ready":{}}'
+read order
+echo hello
+exec sleep 600
+)";
+  fs::remove_all(results());
+  EXPECT_EQ(batch().exit_status, 4);
+  for (const auto& one : summary()["cases"])
+    EXPECT_THAT(one["error"].get<std::string>(), HasSubstr("the message of a worker: is no JSON"));
 
   std::ofstream(program) << "#!/bin/sh\nexit 3\n";
   fs::remove_all(results());
