@@ -123,7 +123,7 @@ int check(int patient_count, std::optional<int> only) {
     ++count.all;
     RegistrationResult result;
     try {
-      result = register_views(renderers, xrays, planned, options);
+      result = register_views(renderers, prepared(xrays), planned, options);
     } catch (const Error& error) {
       fmt::print("{},{},{},error,,,,,,,,,\"{}\"\n", ct, of, what, error.what());
       return;
