@@ -13,26 +13,30 @@
 
 namespace isoshift {
 
-JsonFile read_json_file(const std::filesystem::path& path) {
-  if (std::filesystem::is_directory(path))
-    throw Error(fmt::format("{}: is a folder, expected a JSON file", path.string()));
-  std::ifstream file(path, std::ios::binary);
-  const std::string content{std::istreambuf_iterator<char>(file), {}};
-  if (!file) throw Error(fmt::format("{}: cannot be read", path.string()));
+nlohmann::json json_from(const std::string& text, const std::string& where) {
   std::vector<std::set<std::string>> keys;  // of the objects that are open
   const auto check_keys = [&](int, nlohmann::json::parse_event_t event, const nlohmann::json& parsed) {
     using Event = nlohmann::json::parse_event_t;
     if (event == Event::object_start) keys.emplace_back();
     if (event == Event::object_end) keys.pop_back();
     if (event == Event::key && !keys.back().insert(parsed.get<std::string>()).second)
-      throw Error(fmt::format("{}: says {} twice", path.string(), parsed.get<std::string>()));
+      throw Error(fmt::format("{}: says {} twice", where, parsed.get<std::string>()));
     return true;
   };
   try {
-    return {.json = nlohmann::json::parse(content, check_keys), .sha256 = sha256_of(content)};
+    return nlohmann::json::parse(text, check_keys);
   } catch (const nlohmann::json::exception& error) {
-    throw Error(fmt::format("{}: is no JSON: {}", path.string(), error.what()));
+    throw Error(fmt::format("{}: is no JSON: {}", where, error.what()));
   }
+}
+
+JsonFile read_json_file(const std::filesystem::path& path) {
+  if (std::filesystem::is_directory(path))
+    throw Error(fmt::format("{}: is a folder, expected a JSON file", path.string()));
+  std::ifstream file(path, std::ios::binary);
+  const std::string content{std::istreambuf_iterator<char>(file), {}};
+  if (!file) throw Error(fmt::format("{}: cannot be read", path.string()));
+  return {.json = json_from(content, path.string()), .sha256 = sha256_of(content)};
 }
 
 JsonSection::JsonSection(const nlohmann::json& json, std::string where) : json_(json), where_(std::move(where)) {

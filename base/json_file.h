@@ -17,7 +17,10 @@ struct JsonFile {
   std::string sha256;  // of the file, hexadecimal
 };
 
-// Throws Error for a file that cannot be read, is no JSON, or says a key of an object twice.
+// Throws Error naming `where` for a text that is no JSON, or says a key of an object twice.
+nlohmann::json json_from(const std::string& text, const std::string& where);
+
+// Throws Error for a file that cannot be read, or whose text does what json_from() refuses.
 JsonFile read_json_file(const std::filesystem::path& path);
 
 template <class T>

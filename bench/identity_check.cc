@@ -100,6 +100,7 @@ std::vector<std::pair<std::string, std::vector<XrayImage>>> variants(const std::
   return list;
 }
 
+// Long because a row of the table takes many figures of one registration.
 int check(int patient_count, std::optional<int> only) {
   std::vector<Patient> patients;
   patients.reserve(static_cast<std::size_t>(patient_count));
@@ -123,7 +124,7 @@ int check(int patient_count, std::optional<int> only) {
     ++count.all;
     RegistrationResult result;
     try {
-      result = register_views(renderers, xrays, planned, options);
+      result = register_views(renderers, prepared(xrays), planned, options);
     } catch (const Error& error) {
       fmt::print("{},{},{},error,,,,,,,,,\"{}\"\n", ct, of, what, error.what());
       return;

@@ -47,6 +47,7 @@ std::vector<Candidate> candidates() {
 
 }  // namespace
 
+// Long because it is one measurement, read from top to bottom.
 int main(int argc, char** argv) {
   std::vector<std::vector<MotionSample>> traces;
   std::vector<std::string> sessions;

@@ -25,7 +25,7 @@ void register_two_views(benchmark::State& state, const char* name) {
   planned.linear() << 1, 0, 0, 0, 0, 1, 0, -1, 0;
   double evaluations = 0.0, rendering = 0.0, similarity = 0.0, seconds = 0.0;
   for (auto _ : state) {
-    RegistrationResult result = register_views(renderers, xrays, planned, preset(name));
+    RegistrationResult result = register_views(renderers, prepared(xrays), planned, preset(name));
     evaluations = result.evaluations();
     rendering += result.seconds_rendering;
     similarity += result.seconds_similarity;

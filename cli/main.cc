@@ -7,8 +7,11 @@
 
 #include "base/graceful_end.h"
 #include "base/output_folder.h"
+#include "base/process.h"
 #include "cli/commands/commands.h"
+#include "cli/commands/register_command.h"
 #include "io/dicom/decoder_process.h"
+#include "workflow/register/serve_registrations.h"
 
 namespace {
 
@@ -33,11 +36,17 @@ void end_cleanly_on_signals() {
 }  // namespace
 
 int main(int argc, char** argv) {
-  // Not commands for people: the child that decodes compressed pixels, and the manual that the build makes.
-  if (argc == 2 && std::string_view(argv[1]) == "__decode") return isoshift::run_decoder();
-  if (argc == 3 && std::string_view(argv[1]) == "__manual") return isoshift::write_manual(argv[2]), 0;
+  // Not commands for people: what this program runs as its child, and the manual that the build makes.
+  const std::string_view hidden = argc == 3 ? argv[1] : "", role = argc == 3 ? argv[2] : "";
+  if (hidden == "__manual") return isoshift::write_manual(argv[2]), 0;
+  if (hidden == "__child" && role == "decode") return isoshift::run_decoder();
   isoshift::use_decoder("/proc/self/exe");
   end_cleanly_on_signals();
+  if (hidden == "__child" && role == "register") {
+    isoshift::Channel parent(isoshift::parent_socket());
+    isoshift::serve_registrations(parent, isoshift::register_options_from);
+    return 0;
+  }
   isoshift::Console console{.out = std::cout, .err = std::cerr, .err_is_terminal = ::isatty(STDERR_FILENO) == 1};
   return isoshift::run_isoshift(argc, argv, console);
 }

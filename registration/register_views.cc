@@ -23,14 +23,13 @@ void round_to_eight_bit(FixedImage& image) {
 }
 
 // Before anything is searched: the CT must appear in every view as planned.
-void require_visible(const RendererPyramid& renderers, std::span<const XrayImage> xrays, const FixedViews& views,
-                     const Eigen::Isometry3d& planned) {
+void require_visible(const RendererPyramid& renderers, const FixedViews& views, const Eigen::Isometry3d& planned) {
   constexpr double kPixelMm = 5.0;
   const std::vector<FixedImage> images = views.reduced_to(kPixelMm, planned, 0.0);
-  for (std::size_t n = 0; n < images.size(); ++n) {
-    const RenderResult drr = renderers.with_voxels_up_to(kPixelMm).render(std::span(&images[n].view, 1),
+  for (const FixedImage& image : images) {
+    const RenderResult drr = renderers.with_voxels_up_to(kPixelMm).render(std::span(&image.view, 1),
                                                                           std::span(&planned, 1), PixelSet::all());
-    require_not_empty(drr.line_integrals(0, 0), xrays[n].label);
+    require_not_empty(drr.line_integrals(0, 0), image.label);
   }
 }
 
@@ -61,20 +60,22 @@ void RegistrationOptions::check() const {
   if (stages.empty()) throw UsageError("stages is empty, expected at least one");
 }
 
-RegistrationResult register_views(const RendererPyramid& renderers, std::span<const XrayImage> xrays,
+RegistrationResult register_views(const RendererPyramid& renderers, std::span<const FixedImage> images,
                                   const Eigen::Isometry3d& start_room_from_patient, const RegistrationOptions& options,
                                   const SearchProgress& progress) {
   options.check();
   const auto begin = std::chrono::steady_clock::now();
   const ProjectedRegion everything;
-  FixedViews fixed{.images = {}, .region = options.region != nullptr ? *options.region : everything};
-  for (const XrayImage& xray : xrays) {
-    fixed.images.push_back(prepare(xray));
-    if (const auto rectangle = options.rectangles.find(xray.label); rectangle != options.rectangles.end())
-      restrict_to(rectangle->second, fixed.images.back());
-    if (options.eight_bit_xrays) round_to_eight_bit(fixed.images.back());
+  FixedViews fixed{.images = {images.begin(), images.end()},
+                   .region = options.region != nullptr ? *options.region : everything};
+  std::vector<XrayView> views;
+  for (FixedImage& image : fixed.images) {
+    views.push_back(image.view);
+    if (const auto rectangle = options.rectangles.find(image.label); rectangle != options.rectangles.end())
+      restrict_to(rectangle->second, image);
+    if (options.eight_bit_xrays) round_to_eight_bit(image);
   }
-  require_visible(renderers, xrays, fixed, start_room_from_patient);
+  require_visible(renderers, fixed, start_room_from_patient);
 
   const SearchOptions search_options{.stages = options.stages,
                                      .dof = options.dof,
@@ -114,8 +115,6 @@ RegistrationResult register_views(const RendererPyramid& renderers, std::span<co
       leave_out_views(renderers, fixed, start_room_from_patient, search_options, found);
   for (std::size_t view = 0; view < left_out.size(); ++view) result.views[view].left_out = left_out[view];
 
-  std::vector<XrayView> views;
-  for (const XrayImage& xray : xrays) views.push_back(xray.view);
   result.unobservable_room = unobservable_directions(views);
   judge(found.parameters, options, result);
   result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();

@@ -2,7 +2,7 @@
 // The front door of registration: X-ray views and a planned pose in, the actual pose and a verdict out.
 //
 //   const RegistrationResult result =
-//       register_views(renderers, xrays, planned_room_from_patient, preset("setup"));
+//       register_views(renderers, prepared(xrays), planned_room_from_patient, preset("setup"));
 //   if (result.verdict == Verdict::kAccepted) ...
 
 #include <Eigen/Geometry>
@@ -14,7 +14,6 @@
 #include <vector>
 
 #include "drr/renderer_pyramid.h"
-#include "geometry/xray_image.h"
 #include "registration/quality/alternatives.h"
 #include "registration/quality/consistency.h"
 #include "registration/quality/cross_checks.h"
@@ -45,9 +44,9 @@ struct RegistrationResult : Registration {
   std::vector<ViewMatch> views;
 };
 
-// Searches from `start_room_from_patient`, the planned pose, and judges what it finds. Throws Error for a blank X-ray,
-// and where the CT does not appear in a view.
-RegistrationResult register_views(const RendererPyramid& renderers, std::span<const XrayImage> xrays,
+// Searches from `start_room_from_patient`, the planned pose, and judges what it finds. `images`: the X-ray of each
+// view, as prepared() returns it. Throws Error where the CT does not appear in a view.
+RegistrationResult register_views(const RendererPyramid& renderers, std::span<const FixedImage> images,
                                   const Eigen::Isometry3d& start_room_from_patient, const RegistrationOptions& options,
                                   const SearchProgress& progress = {});
 

@@ -22,12 +22,11 @@ struct BatchFlags {
   BatchOptions batch;
   int slurm_tasks = 0;
   std::string shard;
-  bool scan = false, merge = false, worker = false, json = false;
+  bool scan = false, merge = false, json = false;
 };
 
 // Those that say which part of a batch runs, and how it is told.
-const std::set<std::string> kOfOneRun = {"cases", "output", "jobs",   "shard", "merge",
-                                         "slurm", "scan",   "worker", "json",  "help"};
+const std::set<std::string> kOfOneRun = {"cases", "output", "jobs", "shard", "merge", "slurm", "scan", "json", "help"};
 
 std::vector<std::string> kept_options(const CLI::App& command) {
   std::vector<std::string> kept;
@@ -78,14 +77,10 @@ int summarize(const Batch& batch, bool as_json, Console& console) {
 int run_batch(BatchFlags& flags, Console& console) {
   BatchOptions& options = flags.batch;
   if (!flags.shard.empty()) options.shard = shard_from(flags.shard);
-  options.takes_earlier_scan = flags.worker || flags.merge || options.shard;
+  options.takes_earlier_scan = flags.merge || options.shard;
   if (flags.scan) return scan(options, console);
   ConsoleObserver observer(console);
   Batch batch(options, observer);
-  if (flags.worker) {
-    batch.serve();
-    return kExitAccepted;
-  }
   if (flags.slurm_tasks > 0) {
     console.out << submit_to_slurm(std::filesystem::absolute(batch.folder().path()), batch.arguments(),
                                    flags.slurm_tasks)
@@ -137,7 +132,6 @@ void add_batch_command(CLI::App& app, Console& console, int& exit_status) {
       ->type_name("N")
       ->check(CLI::Range(1, 100000))
       ->group(parts);
-  command->add_flag("--worker", flags->worker)->group("");  // not for people
   command->add_flag("--json", flags->json, "Print summary.json instead of a summary in words");
   add_result_options(*command, options.each);
   add_study_switches(*command, options.each.study);

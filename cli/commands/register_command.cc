@@ -74,6 +74,21 @@ void add_result_options(CLI::App& command, RegisterOptions& options) {
       ->default_str("treatment");
 }
 
+RegisterOptions register_options_from(const std::vector<std::string>& flags) {
+  CLI::App app;
+  RegisterOptions options;
+  add_result_options(app, options);
+  add_study_switches(app, options.study);
+  add_registration_switches(app, options.registration);
+  try {
+    app.parse(std::vector<std::string>(flags.rbegin(), flags.rend()));
+  } catch (const CLI::ParseError& error) {
+    throw UsageError(error.what());
+  }
+  options.registration.settle();
+  return options;
+}
+
 void add_register_command(CLI::App& app, Console& console, int& exit_status) {
   auto options = std::make_shared<RegisterOptions>();
   CLI::App* command = app.add_subcommand("register", "Find the setup shift of an exported study");

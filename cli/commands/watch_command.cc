@@ -9,8 +9,6 @@
 #include "base/graceful_end.h"
 #include "cli/commands/commands.h"
 #include "cli/commands/register_command.h"
-#include "cli/switches/registration_switches.h"
-#include "cli/switches/study_switches.h"
 #include "io/config/watch_file.h"
 #include "workflow/register/setup_result_of.h"
 #include "workflow/room/child_runner.h"
@@ -23,27 +21,16 @@ namespace {
 
 // Flags of isoshift register that a watch file names must be some, and none of those that watch sets itself.
 RegisterOptions checked_registration_flags(const WatchFile& watch) {
-  CLI::App app;
-  RegisterOptions options;
-  add_result_options(app, options);
-  add_study_switches(app, options.study);
-  add_registration_switches(app, options.registration);
-  const auto refuse = [&](const std::exception& error) {
-    throw Error(fmt::format("{}: register: {}", watch.path.string(), error.what()));
-  };
   try {
-    app.parse(std::vector<std::string>(watch.registration.rbegin(), watch.registration.rend()));
-    options.registration.settle();
-    options.study.study = watch.results;  // any: its words are what is checked
+    RegisterOptions options = register_options_from(watch.registration);
+    options.study.parts.study = watch.results;  // any: its words are what is checked
     (void)options.study.request();
     if (!options.site.empty()) throw UsageError("--site is named by site, not here");
     (void)chosen_site(watch.site, options.anatomy);
-  } catch (const CLI::ParseError& error) {
-    refuse(error);
+    return options;
   } catch (const UsageError& error) {
-    refuse(error);
+    throw Error(fmt::format("{}: register: {}", watch.path.string(), error.what()));
   }
-  return options;
 }
 
 // `server`: of the watch file; null where it follows a folder.

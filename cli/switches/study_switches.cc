@@ -14,21 +14,22 @@ std::string allow_keys_help() {
 }  // namespace
 
 void add_study_options(CLI::App& command, StudyOptions& options) {
-  command.add_option("study", options.study, "Folder of the exported study; files are recognized by their contents")
-      ->type_name("FOLDER");
-  const char* parts = "Parts of the study";
-  command.add_option("--ct", options.ct, "Folder or files of the planning CT")->type_name("PATH")->group(parts);
   command
-      .add_option("--image", options.images,
+      .add_option("study", options.parts.study, "Folder of the exported study; files are recognized by their contents")
+      ->type_name("FOLDER");
+  const char* group = "Parts of the study";
+  command.add_option("--ct", options.parts.ct, "Folder or files of the planning CT")->type_name("PATH")->group(group);
+  command
+      .add_option("--image", options.parts.images,
                   "RT Images (X-rays), files or folders; with --machine also X-rays of other SOP classes")
       ->type_name("PATH")
-      ->group(parts);
-  command.add_option("--plan", options.plan, "RT Plan")->type_name("FILE")->group(parts);
+      ->group(group);
+  command.add_option("--plan", options.parts.plan, "RT Plan")->type_name("FILE")->group(group);
   command
-      .add_option("--structures", options.structures,
+      .add_option("--structures", options.parts.structures,
                   "RT Structure Set [the one that the plan refers to, or the only one drawn on the CT]")
       ->type_name("FILE")
-      ->group(parts);
+      ->group(group);
   add_study_switches(command, options);
 }
 

@@ -1,20 +1,10 @@
 #include "io/dicom/decoder_process.h"
 
-#include <fcntl.h>
 #include <fmt/format.h>
-#include <poll.h>
-#include <spawn.h>
 #include <sys/resource.h>
-#include <sys/socket.h>
-#include <sys/wait.h>
-#include <unistd.h>
 
-#include <algorithm>
-#include <array>
-#include <cerrno>
 #include <chrono>
 #include <csignal>
-#include <cstring>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -22,129 +12,46 @@
 #include <utility>
 
 #include "base/error.h"
+#include "base/process.h"
 #include "io/dicom/decode.h"
+#include "io/dicom/decoder_messages.h"
 
 namespace isoshift {
 namespace {
 
-using Clock = std::chrono::steady_clock;
-
 constexpr std::chrono::seconds kMaxWallTime(10);  // per frame: the largest takes about one
 constexpr rlim_t kMaxCpuS = 10;
 constexpr rlim_t kMaxMemoryBytes = rlim_t{4} << 30;
-constexpr std::uint64_t kMaxErrorBytes = 4096;
-
-struct Request {
-  std::uint64_t path_bytes = 0;   // the path follows
-  std::array<char, 64> sha256{};  // of the file's content, hexadecimal
-  std::int32_t frame = 0;
-};
-
-struct Answer {
-  std::uint8_t is_error = 0;
-  std::uint64_t bytes = 0;  // pixels, or the text of the error, follow
-};
+constexpr std::size_t kMaxErrorBytes = 4096;
+constexpr std::size_t kMaxAnswerBytes = 6 * kMaxErrorBytes + 64;  // an error whose every byte is escaped
 
 std::filesystem::path& decoder_program() {
   static std::filesystem::path program;
   return program;
 }
 
-// Both ends of a child's standard input and output, a socket: writing to a child that died is no signal.
-class Connection {
- public:
-  explicit Connection(int fd) : fd_(fd) {}
-  ~Connection() { ::close(fd_); }
-  Connection(const Connection&) = delete;
-  Connection& operator=(const Connection&) = delete;
-
-  // False where the other side is gone.
-  bool send(const void* data, std::size_t size) const {
-    const auto* at = static_cast<const char*>(data);
-    while (size > 0) {
-      const ssize_t sent = ::send(fd_, at, size, MSG_NOSIGNAL);
-      if (sent < 0 && errno == EINTR) continue;
-      if (sent <= 0) return false;
-      at += sent;
-      size -= static_cast<std::size_t>(sent);
-    }
-    return true;
-  }
-
-  // False where the other side is gone, or has not sent all by then.
-  bool receive(void* data, std::size_t size, std::optional<Clock::time_point> until = std::nullopt) const {
-    auto* at = static_cast<char*>(data);
-    while (size > 0) {
-      if (until) {
-        const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(*until - Clock::now()).count();
-        pollfd waiting{.fd = fd_, .events = POLLIN, .revents = 0};
-        if (left <= 0) return false;
-        const int ready = ::poll(&waiting, 1, static_cast<int>(left));
-        if (ready < 0 && errno == EINTR) continue;
-        if (ready <= 0) return false;
-      }
-      const ssize_t received = ::recv(fd_, at, size, 0);
-      if (received < 0 && errno == EINTR) continue;
-      if (received <= 0) return false;
-      at += received;
-      size -= static_cast<std::size_t>(received);
-    }
-    return true;
-  }
-
- private:
-  int fd_;
-};
-
 class DecoderProcess {
  public:
-  DecoderProcess() {
-    const std::filesystem::path& program = decoder_program();
-    if (program.empty()) throw Error("compressed pixel data cannot be decoded: no decoder program was set");
-    std::array<int, 2> ends{};
-    if (::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends.data()) != 0)
-      throw Error(fmt::format("the decoder cannot be started: {}", std::strerror(errno)));
-    connection_ = std::make_unique<Connection>(ends[0]);
-    const Connection of_child(ends[1]);
-    posix_spawn_file_actions_t files;
-    posix_spawn_file_actions_init(&files);
-    posix_spawn_file_actions_adddup2(&files, ends[1], STDIN_FILENO);
-    posix_spawn_file_actions_adddup2(&files, ends[1], STDOUT_FILENO);
-    posix_spawn_file_actions_addopen(&files, STDERR_FILENO, "/dev/null", O_WRONLY, 0);
-    std::string name = program.string(), command = "__decode";
-    const std::array<char*, 3> arguments = {name.data(), command.data(), nullptr};
-    const int failed = ::posix_spawn(&pid_, name.c_str(), &files, nullptr, arguments.data(), environ);
-    posix_spawn_file_actions_destroy(&files);
-    if (failed != 0) throw Error(fmt::format("{}: cannot be started as a decoder: {}", name, std::strerror(failed)));
-  }
-  ~DecoderProcess() { end(); }
-  DecoderProcess(const DecoderProcess&) = delete;
-  DecoderProcess& operator=(const DecoderProcess&) = delete;
+  DecoderProcess()
+      : process_({"isoshift", "__child", "decode"},
+                 {.program = program(), .errors = ProcessOptions::Errors::kDropped, .end_signal = SIGKILL}) {}
 
   std::vector<std::uint8_t> frame(const DicomFile& file, int frame, std::size_t bytes) {
-    const std::filesystem::path& path = file.path();
-    const auto until = Clock::now() + kMaxWallTime;
-    const std::string name = std::filesystem::absolute(path).string();
-    Request request{.path_bytes = name.size(), .frame = frame};
-    std::ranges::copy(file.sha256(), request.sha256.begin());
-    Answer answer;
+    const std::string path = file.path().string();
+    process_.allow(kMaxWallTime);
     is_usable_ = false;  // until all went well
-    if (!connection_->send(&request, sizeof request) || !connection_->send(name.data(), name.size()) ||
-        !connection_->receive(&answer, sizeof answer, until))
-      throw Error(fmt::format("{}: {}", path.string(), what_went_wrong(until)));
-    if (answer.is_error != 0) {
-      std::string message(std::min(answer.bytes, kMaxErrorBytes), ' ');
-      if (!connection_->receive(message.data(), message.size(), until))
-        throw Error(fmt::format("{}: {}", path.string(), what_went_wrong(until)));
+    const DecodedFrame answer = answer_to(
+        {.path = std::filesystem::absolute(file.path()), .sha256 = std::string(file.sha256()), .frame = frame}, path);
+    if (answer.error) {
       is_usable_ = true;
-      throw Error(message);
+      throw Error(*answer.error);
     }
     if (answer.bytes != bytes)
-      throw Error(fmt::format("{}: frame {} was decoded to {} bytes, expected {}", path.string(), frame + 1,
-                              answer.bytes, bytes));
+      throw Error(
+          fmt::format("{}: frame {} was decoded to {} bytes, expected {}", path, frame + 1, answer.bytes, bytes));
     std::vector<std::uint8_t> pixels(bytes);
-    if (!connection_->receive(pixels.data(), pixels.size(), until))
-      throw Error(fmt::format("{}: {}", path.string(), what_went_wrong(until)));
+    if (!process_.channel().read(pixels, process_.deadline()))
+      throw Error(fmt::format("{}: {}", path, what_went_wrong()));
     is_usable_ = true;
     return pixels;
   }
@@ -152,28 +59,33 @@ class DecoderProcess {
   bool is_usable() const { return is_usable_; }
 
  private:
-  // The status of a child that ended before counts, not the signal sent here.
-  int end() {
-    int status = 0;
-    if (pid_ <= 0) return status;
-    ::kill(pid_, SIGKILL);
-    while (::waitpid(pid_, &status, 0) < 0 && errno == EINTR) {
+  static const std::filesystem::path& program() {
+    if (decoder_program().empty()) throw Error("compressed pixel data cannot be decoded: no decoder program was set");
+    return decoder_program();
+  }
+
+  DecodedFrame answer_to(const FrameToDecode& request, const std::string& path) {
+    std::optional<std::string> line;
+    try {
+      if (process_.channel().send(to_line(request), process_.deadline()))
+        line = process_.channel().line(process_.deadline(), kMaxAnswerBytes);
+    } catch (const Error& endless) {
+      throw Error(fmt::format("{}: the decoder {}", path, endless.what()));
     }
-    pid_ = -1;
-    return status;
+    if (!line) throw Error(fmt::format("{}: {}", path, what_went_wrong()));
+    return decoded_frame_from(*line, fmt::format("{}: the answer of the decoder", path));
   }
 
-  std::string what_went_wrong(Clock::time_point until) {
+  std::string what_went_wrong() {
     constexpr const char* kDamaged = "the pixel data are damaged, or made to do harm";
-    if (Clock::now() >= until)
+    const ProcessEnd end = process_.wait();
+    if (end.is_late)
       return fmt::format("its pixel data were not decoded within {} s: {}", kMaxWallTime.count(), kDamaged);
-    const int status = end();
-    return fmt::format("the decoder ended with {} {}: {}", WIFSIGNALED(status) ? "signal" : "status",
-                       WIFSIGNALED(status) ? WTERMSIG(status) : WEXITSTATUS(status), kDamaged);
+    return fmt::format("the decoder ended with {} {}: {}", end.signal != 0 ? "signal" : "status",
+                       end.signal != 0 ? end.signal : end.status, kDamaged);
   }
 
-  pid_t pid_ = -1;
-  std::unique_ptr<Connection> connection_;
+  Process process_;
   bool is_usable_ = true;
 };
 
@@ -258,27 +170,24 @@ std::vector<std::uint8_t> frame_from_decoder(const DicomFile& file, int frame, s
 }
 
 int run_decoder() {
-  const Connection connection(STDIN_FILENO);
+  Channel parent(parent_socket());
   LastFile file;
-  Request request;
-  while (connection.receive(&request, sizeof request)) {
-    std::string path(request.path_bytes, '\0');
-    if (!connection.receive(path.data(), path.size())) return 1;
+  while (const std::optional<std::string> line = parent.line()) {
     limit_resources();
+    FrameToDecode request;
     std::vector<std::uint8_t> pixels;
-    std::string error;
+    DecodedFrame answer;
     try {
-      pixels = decompressed_frame(file.at(path, {request.sha256.data(), request.sha256.size()}), request.frame);
+      request = frame_to_decode_from(*line, "the request of the parent");
+      pixels = decompressed_frame(file.at(request.path, request.sha256), request.frame);
+      answer.bytes = pixels.size();
     } catch (const Error& refused) {
-      error = std::string(refused.what()).substr(0, kMaxErrorBytes);
+      answer.error = std::string(refused.what()).substr(0, kMaxErrorBytes);
     } catch (const std::exception& failed) {
-      error = fmt::format("{}: its pixel data cannot be decoded: {}", path, failed.what());
+      answer.error = fmt::format("{}: its pixel data cannot be decoded: {}", request.path.string(), failed.what());
     }
-    const Answer answer{.is_error = !error.empty(), .bytes = error.empty() ? pixels.size() : error.size()};
-    if (!connection.send(&answer, sizeof answer)) return 1;
-    const bool sent =
-        error.empty() ? connection.send(pixels.data(), pixels.size()) : connection.send(error.data(), error.size());
-    if (!sent) return 1;
+    if (!parent.send(to_line(answer)) || !parent.send({reinterpret_cast<const char*>(pixels.data()), pixels.size()}))
+      return 1;
   }
   return 0;
 }

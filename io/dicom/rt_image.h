@@ -77,6 +77,8 @@ struct RtImage {
   bool is_rt_image() const;  // and not an X-ray of another class
 };
 
+inline constexpr double kMaxAngleNoiseDeg = 0.01;  // read-outs such as 359.998 mean 0
+
 // The attributes that machine profiles may tell images apart by.
 extern const std::map<std::string, DcmTagKey, std::less<>> kEquipmentAttributes;
 

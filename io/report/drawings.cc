@@ -47,6 +47,81 @@ void draw_scale(Canvas& canvas, double x, double y, double points_per_mm, double
         TextStyle::Align::kLeft);
 }
 
+// The room seen from the foot of the couch: depth goes up and to the right.
+struct RoomDrawing {
+  double unit = 1.0;
+  Vector2d origin;
+  Vector2d at(double right, double toward, double up) const {
+    return origin + unit * Vector2d(right + 0.42 * toward, -up - 0.30 * toward);
+  }
+};
+
+void draw_table_and_patient(Canvas& canvas, const RoomDrawing& room, const SetupResult& report) {
+  // The gantry, a ring behind, and the couch.
+  canvas.circle(room.at(0, 1.0, 0), 0.78 * room.unit, {.color = color::kLightGray, .width = 0.16 * room.unit});
+  // What lies on the support turns with it.
+  const double yaw = report.table.yaw_rad(), cosine = std::cos(yaw), sine = std::sin(yaw);
+  const auto on_table = [&](double right, double toward, double up) {
+    return room.at(cosine * right - sine * toward, sine * right + cosine * toward, up);
+  };
+  const std::array<Vector2d, 4> top = {on_table(-0.34, -1.35, -0.2), on_table(0.34, -1.35, -0.2),
+                                       on_table(0.34, 0.75, -0.2), on_table(-0.34, 0.75, -0.2)};
+  const Vector2d thickness(0.0, 0.07 * room.unit);
+  for (std::size_t n = 0; n < top.size(); ++n)
+    canvas.fill_polygon(
+        std::array<Vector2d, 4>{top[n], top[(n + 1) % 4], top[(n + 1) % 4] + thickness, top[n] + thickness},
+        Rgb{170, 170, 170});
+  canvas.fill_polygon(top, Rgb{205, 205, 205});
+  // The patient: a body, and the head where it lies.
+  const double head = report.patient_position.starts_with("HF") ? 1.0 : -1.0;
+  Polygon body, skull;
+  for (int n = 0; n < 24; ++n) {
+    const double angle = 2.0 * M_PI * n / 24.0;
+    body.push_back(on_table(0.2 * std::cos(angle), -0.35 * head + 0.62 * std::sin(angle), -0.12));
+    skull.push_back(on_table(0.0, 0.42 * head, -0.1) + room.unit * 0.13 * Vector2d(std::cos(angle), std::sin(angle)));
+  }
+  for (const Polygon& part : {body, skull}) {
+    canvas.fill_polygon(part, Rgb{235, 224, 206});
+    canvas.polygon(part, {.color = color::kGray, .width = 0.5});
+  }
+}
+
+void draw_couch_shift(Canvas& canvas, const RoomDrawing& room, const SetupResult& report, const ReportPage& page) {
+  // Along the table top's axes at imaging; lengths of the arrows say nothing but which is longest.
+  const Eigen::Matrix3d turn = rotation_z(report.table.yaw_rad());
+  const std::array<Eigen::Vector3d, 3> directions = {turn.col(0), turn.col(1), Eigen::Vector3d::UnitZ()};
+  const CouchShift shift = couch_shift_for(known_setup_error(report), report.table);
+  const double longest = shift.translation_mm.cwiseAbs().maxCoeff();
+  for (int n = 0; n < 3; ++n) {
+    const Quantity& quantity = page.couch[static_cast<std::size_t>(n)];
+    if (!quantity.is_number || quantity.words.empty()) continue;
+    const double value = shift.translation_mm[n];
+    const Eigen::Vector3d end =
+        std::copysign(0.3 + 0.45 * std::abs(value) / longest, value) * directions[static_cast<std::size_t>(n)];
+    const Vector2d tip = room.at(end.x(), end.y(), end.z()), from = room.at(0, 0, 0);
+    canvas.arrow(from, tip, {.color = color::kVermilion, .width = 2.4});
+    const Vector2d way = (tip - from).normalized();
+    const std::string text = quantity.value.substr(quantity.value.find_first_of("0123456789")) + " " + quantity.unit;
+    // Below a level arrow, beside the others.
+    const bool is_level = std::abs(way.y()) < 0.3, is_steep = std::abs(way.x()) < 0.3;
+    const double size = 0.14 * room.unit + 2.0;
+    using enum TextStyle::Align;
+    canvas.text(tip.x() + (is_level   ? 0.0
+                           : is_steep ? 6.0
+                                      : 4.0 * way.x()),
+                tip.y() + (is_level         ? 5.0
+                           : way.y() < -0.3 ? -0.3 * size
+                                            : -1.2 * size),
+                text,
+                {.size = size,
+                 .bold = true,
+                 .color = color::kVermilion,
+                 .align = is_level         ? kCenter
+                          : way.x() < -0.3 ? kRight
+                                           : kLeft});
+  }
+}
+
 }  // namespace
 
 std::string caption_of(ViewTile tile) {
@@ -142,83 +217,18 @@ std::string captioned_png(const std::vector<CaptionedPicture>& pictures, int per
 
 void draw_couch(Canvas& canvas, double x, double y, double width, double height, const SetupResult& report,
                 const ReportPage& page) {
-  // Room (right, toward the gantry, up) in units of the drawing; depth goes up and to the right.
   const double unit = std::min(width / 2.9, height / 2.35);
-  const Vector2d origin(x + 0.45 * width, y + 0.58 * height);
-  const auto at = [&](double right, double toward, double up) {
-    return Vector2d(origin + unit * Vector2d(right + 0.42 * toward, -up - 0.30 * toward));
-  };
-  // The gantry, a ring behind, and the couch.
-  canvas.circle(at(0, 1.0, 0), 0.78 * unit, {.color = color::kLightGray, .width = 0.16 * unit});
-  // What lies on the support turns with it.
-  const double yaw = report.table.yaw_rad(), cosine = std::cos(yaw), sine = std::sin(yaw);
-  const auto on_table = [&](double right, double toward, double up) {
-    return at(cosine * right - sine * toward, sine * right + cosine * toward, up);
-  };
-  const std::array<Vector2d, 4> top = {on_table(-0.34, -1.35, -0.2), on_table(0.34, -1.35, -0.2),
-                                       on_table(0.34, 0.75, -0.2), on_table(-0.34, 0.75, -0.2)};
-  const Vector2d thickness(0.0, 0.07 * unit);
-  for (std::size_t n = 0; n < top.size(); ++n)
-    canvas.fill_polygon(
-        std::array<Vector2d, 4>{top[n], top[(n + 1) % 4], top[(n + 1) % 4] + thickness, top[n] + thickness},
-        Rgb{170, 170, 170});
-  canvas.fill_polygon(top, Rgb{205, 205, 205});
-  // The patient: a body, and the head where it lies.
-  const double head = report.patient_position.starts_with("HF") ? 1.0 : -1.0;
-  Polygon body, skull;
-  for (int n = 0; n < 24; ++n) {
-    const double angle = 2.0 * M_PI * n / 24.0;
-    body.push_back(on_table(0.2 * std::cos(angle), -0.35 * head + 0.62 * std::sin(angle), -0.12));
-    skull.push_back(on_table(0.0, 0.42 * head, -0.1) + unit * 0.13 * Vector2d(std::cos(angle), std::sin(angle)));
-  }
-  for (const Polygon& part : {body, skull}) {
-    canvas.fill_polygon(part, Rgb{235, 224, 206});
-    canvas.polygon(part, {.color = color::kGray, .width = 0.5});
-  }
-
+  const RoomDrawing room{.unit = unit, .origin = Vector2d(x + 0.45 * width, y + 0.58 * height)};
+  draw_table_and_patient(canvas, room, report);
   const LineStyle axis{.color = color::kGray, .width = 0.7};
   const TextStyle small{.size = 0.115 * unit + 2.0, .color = color::kGray};
-  canvas.arrow(at(0, 0, 0), at(0.95, 0, 0), axis);
-  canvas.text(at(0.97, 0, 0).x(), at(0.97, 0, 0.1).y(), "x right", small);
-  canvas.arrow(at(0, 0, 0), at(0, 1.25, 0), axis);
-  canvas.text(at(0, 1.27, 0).x() + 2, at(0, 1.27, 0.16).y(), "y to gantry", small);
-  canvas.arrow(at(0, 0, 0), at(0, 0, 0.95), axis);
-  canvas.text(at(0, 0, 0.97).x() - 2, at(0, 0, 1.16).y(), "z up", small);
-
-  if (page.withheld || page.couch.size() < 3) return;
-  // Along the table top's axes at imaging; lengths of the arrows say nothing but which is longest.
-  const std::array<Eigen::Vector3d, 3> directions = {rotation_z(yaw).col(0), rotation_z(yaw).col(1),
-                                                     Eigen::Vector3d::UnitZ()};
-  const CouchShift shift = couch_shift_for(known_setup_error(report), report.table);
-  const double longest = shift.translation_mm.cwiseAbs().maxCoeff();
-  for (int n = 0; n < 3; ++n) {
-    const Quantity& quantity = page.couch[static_cast<std::size_t>(n)];
-    if (!quantity.is_number || quantity.words.empty()) continue;
-    const double value = shift.translation_mm[n];
-    const Eigen::Vector3d end =
-        std::copysign(0.3 + 0.45 * std::abs(value) / longest, value) * directions[static_cast<std::size_t>(n)];
-    const Vector2d tip = at(end.x(), end.y(), end.z()), from = at(0, 0, 0);
-    canvas.arrow(from, tip, {.color = color::kVermilion, .width = 2.4});
-    const Vector2d way = (tip - from).normalized();
-    const std::string text = quantity.value.substr(quantity.value.find_first_of("0123456789")) + " " + quantity.unit;
-    // Below a level arrow, beside the others.
-    const bool is_level = std::abs(way.y()) < 0.3, is_steep = std::abs(way.x()) < 0.3;
-    const double size = 0.14 * unit + 2.0;
-    using enum TextStyle::Align;
-    canvas.text(tip.x() + (is_level   ? 0.0
-                           : is_steep ? 6.0
-                                      : 4.0 * way.x()),
-                tip.y() + (is_level         ? 5.0
-                           : way.y() < -0.3 ? -0.3 * size
-                                            : -1.2 * size),
-                text,
-                {.size = size,
-                 .bold = true,
-                 .color = color::kVermilion,
-                 .align = is_level         ? kCenter
-                          : way.x() < -0.3 ? kRight
-                                           : kLeft});
-  }
+  canvas.arrow(room.at(0, 0, 0), room.at(0.95, 0, 0), axis);
+  canvas.text(room.at(0.97, 0, 0).x(), room.at(0.97, 0, 0.1).y(), "x right", small);
+  canvas.arrow(room.at(0, 0, 0), room.at(0, 1.25, 0), axis);
+  canvas.text(room.at(0, 1.27, 0).x() + 2, room.at(0, 1.27, 0.16).y(), "y to gantry", small);
+  canvas.arrow(room.at(0, 0, 0), room.at(0, 0, 0.95), axis);
+  canvas.text(room.at(0, 0, 0.97).x() - 2, room.at(0, 0, 1.16).y(), "z up", small);
+  if (!page.withheld && page.couch.size() >= 3) draw_couch_shift(canvas, room, report, page);
 }
 
 void draw_convergence(Canvas& canvas, double x, double y, double width, double height,

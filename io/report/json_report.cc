@@ -161,8 +161,46 @@ Json unobservable_json(const SetupResult& report) {
   return directions;
 }
 
+Json view_json(const SetupResult::View& view) {
+  const std::optional<LeftOutView>& left_out = view.match.left_out;
+  return {{"label", view.label},
+          {"sop_instance_uid", view.sop_instance_uid},
+          {"sop_class_uid", view.sop_class_uid},
+          {"sha256", view.sha256},
+          {"frame", view.frame},
+          {"acquired", view.acquired},
+          {"reported_values_origin", view.origin},
+          {"beam", view.is_megavoltage ? "MV" : "kV"},
+          {"gantry_deg", or_null(view.gantry_deg)},
+          {"source_room_mm", array_of(view.source_room_mm)},
+          {"pixel_mm", view.pixel_mm},
+          {"columns", view.columns},
+          {"rows", view.rows},
+          {"similarity_start", view.match.similarity_start},
+          {"similarity_final", view.match.similarity_final},
+          {"left_out_mm", left_out ? Json(left_out->distance_mm) : Json(nullptr)},
+          {"left_out_deg", left_out ? Json(deg_from_rad(left_out->angle_rad)) : Json(nullptr)},
+          {"parts", parts_json(view)},
+          {"picture", picture_json(view.picture)}};
+}
+
+Json references_json(const SetupResult& report) {
+  Json images = Json::array();
+  for (const SetupResult::View& view : report.views) images.push_back(view.sop_instance_uid);
+  return {{"ct_series", report.ct_series_uid},
+          {"ct_sha256", report.ct_sha256},
+          {"plan", or_null(report.plan_uid)},
+          {"plan_class", report.plan_class_uid},
+          {"plan_label", report.plan_label},
+          {"plan_approval", report.plan_approval},
+          {"plan_sha256", report.plan_sha256},
+          {"images", images},
+          {"spatial_registration", or_null(report.spatial_registration_uid)}};
+}
+
 }  // namespace
 
+// Long because result.json is: one line per key, in the order of the file.
 std::string json_report(const SetupResult& report) {
   const ShownShift shown = shown_shift(report);
   Json json = {{"schema", 1},
@@ -203,30 +241,7 @@ std::string json_report(const SetupResult& report) {
   json["renderer_settings"] = Json::object();
   for (const auto& [name, value] : report.renderer_settings) json["renderer_settings"][name] = value;
   json["window_hu"] = report.window_hu ? array_of(*report.window_hu) : Json(nullptr);
-  Json images = Json::array();
-  for (const SetupResult::View& view : report.views) {
-    const std::optional<LeftOutView>& left_out = view.match.left_out;
-    json["views"].push_back({{"label", view.label},
-                             {"sop_instance_uid", view.sop_instance_uid},
-                             {"sop_class_uid", view.sop_class_uid},
-                             {"sha256", view.sha256},
-                             {"frame", view.frame},
-                             {"acquired", view.acquired},
-                             {"reported_values_origin", view.origin},
-                             {"beam", view.is_megavoltage ? "MV" : "kV"},
-                             {"gantry_deg", or_null(view.gantry_deg)},
-                             {"source_room_mm", array_of(view.source_room_mm)},
-                             {"pixel_mm", view.pixel_mm},
-                             {"columns", view.columns},
-                             {"rows", view.rows},
-                             {"similarity_start", view.match.similarity_start},
-                             {"similarity_final", view.match.similarity_final},
-                             {"left_out_mm", left_out ? Json(left_out->distance_mm) : Json(nullptr)},
-                             {"left_out_deg", left_out ? Json(deg_from_rad(left_out->angle_rad)) : Json(nullptr)},
-                             {"parts", parts_json(view)},
-                             {"picture", picture_json(view.picture)}});
-    images.push_back(view.sop_instance_uid);
-  }
+  for (const SetupResult::View& view : report.views) json["views"].push_back(view_json(view));
   for (const StageReport& stage : report.stages) json["stages"].push_back(stage_json(stage));
   json["evaluations"] = report.evaluations();
   json["alternatives"] = alternatives_json(report);
@@ -235,15 +250,7 @@ std::string json_report(const SetupResult& report) {
                      {"rendering", report.seconds_rendering},
                      {"similarity", report.seconds_similarity},
                      {"total", report.seconds_total}};
-  json["references"] = {{"ct_series", report.ct_series_uid},
-                        {"ct_sha256", report.ct_sha256},
-                        {"plan", or_null(report.plan_uid)},
-                        {"plan_class", report.plan_class_uid},
-                        {"plan_label", report.plan_label},
-                        {"plan_approval", report.plan_approval},
-                        {"plan_sha256", report.plan_sha256},
-                        {"images", images},
-                        {"spatial_registration", or_null(report.spatial_registration_uid)}};
+  json["references"] = references_json(report);
   json["machine"] =
       report.machine ? Json{{"name", report.machine->name}, {"sha256", report.machine->sha256}} : Json(nullptr);
   json["region"] = report.region;

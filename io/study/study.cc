@@ -307,15 +307,12 @@ void place_patient(const StudyRequest& request, const std::vector<RtPlan::Beam>&
 }  // namespace
 
 Study load_study(const StudyRequest& request, Notes& notes, const Progress& progress, CtStore& cts) {
-  NamedParts named = request.parts;
-  named.takes_other_xrays = request.machine.has_value();
-  const StudyParts parts = find_parts(named);
-  notes.left_aside = parts.left_aside;
+  const StudyParts parts = find_parts(request.parts, request.machine.has_value(), notes);
   Study study;
   study.machine = request.machine;
   study.image_files = parts.images;
-  if (parts.plan) study.plan = read_rt_plan(*parts.plan);
-  if (parts.structures) study.structures = read_rt_structures(*parts.structures);
+  if (!parts.plan.empty()) study.plan = read_rt_plan(parts.plan);
+  if (!parts.structures.empty()) study.structures = read_rt_structures(parts.structures);
   XrayFiles files(request.one_per_imager);
   std::vector<Finding> of_session;
   study.rt_images = read_images(parts.images, request, files, of_session, notes);

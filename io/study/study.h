@@ -20,7 +20,7 @@ namespace isoshift {
 
 // What to register, and what the user supplies or allows.
 struct StudyRequest {
-  NamedParts parts;
+  StudyParts parts;
   std::optional<Eigen::Vector3d> isocenter_patient_mm;
   RtImageSwitches switches;
   std::optional<MachineProfile> machine;

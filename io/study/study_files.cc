@@ -169,25 +169,26 @@ std::vector<const StudyFiles::Structures*> candidates_of(const std::vector<Study
 }
 
 void choose_structures(const std::vector<StudyFiles::Structures>& all, const StudyFiles::Plan* plan,
-                       const StudyFiles::Ct& ct, StudyParts& parts) {
+                       const StudyFiles::Ct& ct, StudyParts& parts, Notes& notes) {
   const auto candidates = candidates_of(all, plan, ct);
   if (candidates.size() == 1) parts.structures = candidates.front()->file;
   for (const StudyFiles::Structures& structures : all) {
     if (structures.file == parts.structures) continue;
     std::string reason = "an RT Structure Set that was not drawn on the CT";
     if (candidates.size() == 1 && structures.sop_instance_uid == candidates.front()->sop_instance_uid)
-      reason = fmt::format("the same RT Structure Set as {}", parts.structures->string());
+      reason = fmt::format("the same RT Structure Set as {}", parts.structures.string());
     else if (candidates.size() == 1 && is_drawn_on(ct, structures))
       reason = "an RT Structure Set that the plan does not refer to";
     else if (is_drawn_on(ct, structures))
       reason = fmt::format("one of {} RT Structure Sets drawn on the CT; name the one meant: --structures FILE",
                            candidates.size());
-    parts.left_aside.push_back(fmt::format("{}: {}", structures.file.string(), reason));
+    notes.left_aside.push_back(fmt::format("{}: {}", structures.file.string(), reason));
   }
 }
 
 // A structure set that a person named; those found in the folder are others.
-void take_named_structures(const fs::path& named, const std::vector<StudyFiles::Structures>& found, StudyParts& parts) {
+void take_named_structures(const fs::path& named, const std::vector<StudyFiles::Structures>& found, StudyParts& parts,
+                           Notes& notes) {
   const std::vector<StudyFiles::Structures> structures = scan_readable({named}).structures;
   if (structures.size() != 1)
     throw Error(fmt::format("{}: holds {} RT Structure Sets, expected one.\n       Name the file: --structures FILE",
@@ -195,13 +196,14 @@ void take_named_structures(const fs::path& named, const std::vector<StudyFiles::
   parts.structures = structures.front().file;
   for (const StudyFiles::Structures& other : found)
     if (other.sop_instance_uid != structures.front().sop_instance_uid)
-      parts.left_aside.push_back(fmt::format("{}: an RT Structure Set that was not named", other.file.string()));
+      notes.left_aside.push_back(fmt::format("{}: an RT Structure Set that was not named", other.file.string()));
 }
 
 // The parts among scanned files, of which a person may have named some.
-StudyParts chosen(StudyFiles files, std::vector<StudyFiles::Plan> other_plans, const NamedParts& named) {
+StudyParts chosen(StudyFiles files, std::vector<StudyFiles::Plan> other_plans, const StudyParts& named,
+                  bool takes_other_xrays, Notes& notes) {
   for (const StudyFiles::Image& xray : files.other_xrays) {
-    if (named.takes_other_xrays)
+    if (takes_other_xrays)
       files.images.push_back(xray);
     else
       files.left_aside.push_back(
@@ -216,15 +218,16 @@ StudyParts chosen(StudyFiles files, std::vector<StudyFiles::Plan> other_plans, c
                             files.other_xrays.empty() ? "Name the X-rays: --image FILE"
                                                       : "For X-rays of other classes their geometry is needed: "
                                                         "--machine FILE"));
-  if (named.plan && files.plans.empty()) throw Error(fmt::format("{}: holds no RT Plan", named.plan->string()));
+  if (!named.plan.empty() && files.plans.empty()) throw Error(fmt::format("{}: holds no RT Plan", named.plan.string()));
 
-  StudyParts parts{.left_aside = files.left_aside};
-  const StudyFiles::Plan* plan = choose_plan(files, named.plan.has_value());
+  StudyParts parts;
+  notes.left_aside = files.left_aside;
+  const StudyFiles::Plan* plan = choose_plan(files, !named.plan.empty());
   const StudyFiles::Ct& ct = choose_ct(files, plan);
   parts.ct = ct.files;
   for (const StudyFiles::Ct& other : files.cts)
     if (&other != &ct)
-      parts.left_aside.push_back(fmt::format("{} and {} more: CT series {}, not the one the plan was made on",
+      notes.left_aside.push_back(fmt::format("{} and {} more: CT series {}, not the one the plan was made on",
                                              other.files.front().string(), other.files.size() - 1,
                                              other.series_instance_uid));
   if (plan != nullptr) {
@@ -235,25 +238,25 @@ StudyParts chosen(StudyFiles files, std::vector<StudyFiles::Plan> other_plans, c
   std::erase_if(other_plans,
                 [&](const auto& other) { return plan && other.sop_instance_uid == plan->sop_instance_uid; });
   for (const StudyFiles::Plan& other : other_plans)
-    parts.left_aside.push_back(fmt::format("{}: an RT Plan that {}", other.file.string(),
-                                           named.plan ? "was not named" : "no X-ray refers to"));
-  if (named.structures)
-    take_named_structures(*named.structures, files.structures, parts);
+    notes.left_aside.push_back(fmt::format("{}: an RT Plan that {}", other.file.string(),
+                                           !named.plan.empty() ? "was not named" : "no X-ray refers to"));
+  if (!named.structures.empty())
+    take_named_structures(named.structures, files.structures, parts, notes);
   else
-    choose_structures(files.structures, plan, ct, parts);
+    choose_structures(files.structures, plan, ct, parts, notes);
   // An image of another plan that lies here too belongs to that one; an image of an unknown plan is a matter for
   // checks.
   for (const StudyFiles::Image& image : files.images) {
     const bool of_other =
         std::ranges::find(other_plans, image.plan_uid, &StudyFiles::Plan::sop_instance_uid) != other_plans.end();
     if (of_other && named.images.empty())
-      parts.left_aside.push_back(fmt::format("{}: an X-ray of another plan", image.file.string()));
+      notes.left_aside.push_back(fmt::format("{}: an X-ray of another plan", image.file.string()));
     else
       parts.images.push_back(image.file);
   }
   if (parts.images.empty())
     throw Error(fmt::format("no X-ray found refers to {} ({}).\n       Name the X-rays: --image FILE",
-                            parts.plan->string(), searched(named.images, named.study)));
+                            parts.plan.string(), searched(named.images, named.study)));
   return parts;
 }
 
@@ -361,7 +364,7 @@ StudyFiles scan_study(const std::vector<fs::path>& paths) {
   return files;
 }
 
-StudyParts find_parts(const NamedParts& named) {
+StudyParts find_parts(const StudyParts& named, bool takes_other_xrays, Notes& notes) {
   StudyFiles files;
   if (!named.study.empty()) files = scan_readable({named.study});
   std::vector<StudyFiles::Plan> other_plans;  // a named plan makes those found in the folder others
@@ -371,10 +374,13 @@ StudyParts find_parts(const NamedParts& named) {
     std::swap(files.images, images.images);
     std::swap(files.other_xrays, images.other_xrays);
   }
-  if (named.plan) std::swap(other_plans, files.plans), files.plans = scan_readable({*named.plan}).plans;
-  return chosen(std::move(files), std::move(other_plans), named);
+  if (!named.plan.empty()) std::swap(other_plans, files.plans), files.plans = scan_readable({named.plan}).plans;
+  return chosen(std::move(files), std::move(other_plans), named, takes_other_xrays, notes);
 }
 
-StudyParts choose_parts(const StudyFiles& files) { return chosen(files, {}, {}); }
+StudyParts choose_parts(const StudyFiles& files) {
+  Notes nobody;
+  return chosen(files, {}, {}, false, nobody);
+}
 
 }  // namespace isoshift

@@ -9,6 +9,7 @@
 #include <unordered_set>
 #include <vector>
 
+#include "io/dicom/notes.h"
 #include "io/dicom/table_read_outs.h"
 
 namespace isoshift {
@@ -78,23 +79,14 @@ StudyFiles scan_file(const std::filesystem::path& path);
 // Adds the files of `from` to `files`.
 void merge(StudyFiles from, StudyFiles& files);
 
-// The parts of one registration.
+// The files of one registration: the parts that a person or a manifest names, or the parts that were found. A path or a
+// list that is empty names nothing.
 struct StudyParts {
-  std::vector<std::filesystem::path> ct;
-  std::vector<std::filesystem::path> images;
-  std::optional<std::filesystem::path> plan;
-  std::optional<std::filesystem::path> structures;
-  std::vector<std::string> left_aside;
-};
+  std::filesystem::path study;  // folder in which the parts that are not named are searched for
+  std::vector<std::filesystem::path> ct, images;
+  std::filesystem::path plan, structures;
 
-// The parts that the user named; the other parts are searched for in `study`.
-struct NamedParts {
-  std::filesystem::path study;
-  bool takes_other_xrays = false;  // a machine profile supplies the geometry of X-rays that are not RT Images
-  std::vector<std::filesystem::path> ct;
-  std::vector<std::filesystem::path> images;
-  std::optional<std::filesystem::path> plan;
-  std::optional<std::filesystem::path> structures;
+  bool operator==(const StudyParts&) const = default;
 };
 
 // Finds the parts of a study:
@@ -103,9 +95,10 @@ struct NamedParts {
 // drawn;
 // - the images of that plan;
 // - the structure set to which the plan refers, or else the only structure set that was drawn on that CT.
-// All other files are left aside, with the reason. Throws Error if there is no CT or no image, or if the files do not
-// tell which of several candidates is meant. Several structure sets are an error only where a structure set is needed.
-StudyParts find_parts(const NamedParts& named);
+// All other files are left aside in the notes, with the reason. `takes_other_xrays`: a machine profile supplies the
+// geometry of X-rays that are not RT Images. Throws Error if there is no CT or no image, or if the files do not tell
+// which of several candidates is meant. Several structure sets are an error only where a structure set is needed.
+StudyParts find_parts(const StudyParts& named, bool takes_other_xrays, Notes& notes);
 
 // The same, with all scanned files as candidates.
 StudyParts choose_parts(const StudyFiles& files);

@@ -237,4 +237,10 @@ FixedImage prepare(const XrayImage& xray) {
   return image;
 }
 
+std::vector<FixedImage> prepared(std::span<const XrayImage> xrays) {
+  std::vector<FixedImage> images;
+  for (const XrayImage& xray : xrays) images.push_back(prepare(xray));
+  return images;
+}
+
 }  // namespace isoshift

@@ -2,6 +2,7 @@
 // From X-ray pixels to what a DRR can be compared with. The only part of isoshift that uses OpenCV.
 
 #include <cstdint>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -48,5 +49,6 @@ void restrict_to(const PixelRectangle& rectangle, FixedImage& image);
 
 // The whole way for one X-ray, at full resolution. Throws Error for a blank one.
 FixedImage prepare(const XrayImage& xray);
+std::vector<FixedImage> prepared(std::span<const XrayImage> xrays);
 
 }  // namespace isoshift

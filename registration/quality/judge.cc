@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <utility>
 
 #include "geometry/rotation.h"
 #include "registration/pose_parameters.h"
@@ -36,6 +37,88 @@ double parts_that_may_disagree(int parts, bool is_volume_chosen) {
   return std::max(1.0, allowed);
 }
 
+void review(RegistrationResult& result, std::string reason) { result.demote(Verdict::kReview, std::move(reason)); }
+
+void judge_search(std::span<const double> parameters, const RegistrationOptions& options, RegistrationResult& result) {
+  for (std::size_t axis = 0; axis < parameters.size(); ++axis) {
+    const double bound = axis < 3 ? options.bound_mm : options.bound_rad * kLeverMm;
+    if (std::abs(parameters[axis]) >= kAtBoundShare * bound)
+      review(result, fmt::format("the {} ended at its bound", kAxes[axis]));
+  }
+  if (result.stages.empty() || result.stages.back().reached_limit)
+    review(result, "the last stage of the search did not converge");
+  for (const StageReport& stage : result.stages)
+    if (stage.spread_mm && (*stage.spread_mm > kMaxSpreadMm || *stage.spread_rad > kMaxSpreadRad))
+      review(result, fmt::format("searches from different starts end {:.1f} mm and {:.1f} degrees apart in stage {}",
+                                 *stage.spread_mm, deg_from_rad(*stage.spread_rad), stage.name));
+}
+
+void judge_views(bool is_volume_chosen, RegistrationResult& result) {
+  double mean = 0.0;
+  for (std::size_t n = 0; n < result.views.size(); ++n) {
+    const ViewMatch& view = result.views[n];
+    const std::string name = name_of_view(view.label, n);
+    mean += view.similarity_final / static_cast<double>(result.views.size());
+    if (!(view.similarity_final >= view.similarity_start - kSimilarityNoise))
+      review(result, fmt::format("{} matches worse than at the planned pose (similarity {:.4f}, was {:.4f})", name,
+                                 view.similarity_final, view.similarity_start));
+    if (view.left_out && (view.left_out->distance_mm > kMaxSpreadMm || view.left_out->angle_rad > kMaxSpreadRad))
+      review(result, fmt::format("without {} the pose lies {:.1f} mm and {:.1f} degrees away", name,
+                                 view.left_out->distance_mm, deg_from_rad(view.left_out->angle_rad)));
+    if (!view.has_all_excluded)
+      review(result,
+             fmt::format("what is excluded covers nearly all that {} shows, and was compared nevertheless", name));
+    const int with_signal = view.consistency.with_signal(), disagreeing = view.consistency.disagreeing();
+    if (disagreeing > parts_that_may_disagree(with_signal, is_volume_chosen))
+      review(result, fmt::format("{} of {} parts of {} match elsewhere: anatomy may have moved against the rest",
+                                 disagreeing, with_signal, name));
+    if (with_signal < 2)
+      review(result, fmt::format("too little of {} is compared to tell whether anatomy moved against the rest", name));
+  }
+  if (!(mean >= kMinSimilarity)) {
+    result.demote(mean >= kRejectedSimilarity ? Verdict::kReview : Verdict::kRejected,
+                  fmt::format("the final gradient correlation {:.3f} is below {:.2f}", mean, kMinSimilarity));
+  } else {
+    for (std::size_t n = 0; n < result.views.size(); ++n)
+      if (const ViewMatch& view = result.views[n]; !(view.similarity_final >= kMinViewSimilarity))
+        review(result, fmt::format("{} hardly matches (gradient correlation {:.3f})", name_of_view(view.label, n),
+                                   view.similarity_final));
+  }
+}
+
+void judge_uncertainty(RegistrationResult& result) {
+  if (!result.uncertainty) {
+    review(result, "the images do not determine the pose");
+  } else {
+    for (int axis = 0; axis < 3; ++axis) {
+      if (!(2.0 * result.uncertainty->translation_mm[axis] <= kMaxTwoSigmaMm))
+        review(result, fmt::format("the {} is uncertain: {:.1f} mm at two sigma", kAxes[static_cast<std::size_t>(axis)],
+                                   2.0 * result.uncertainty->translation_mm[axis]));
+      if (!(2.0 * result.uncertainty->rotation_rad[axis] <= kMaxTwoSigmaRad))
+        review(result, fmt::format("the {} is uncertain: {:.1f} degrees at two sigma",
+                                   kAxes[static_cast<std::size_t>(axis) + 3],
+                                   deg_from_rad(2.0 * result.uncertainty->rotation_rad[axis])));
+    }
+  }
+}
+
+void judge_alternatives(RegistrationResult& result) {
+  for (const Alternative& alternative : result.alternatives) {
+    const double as_is = 1.0 - alternative.as_is, as_other = 1.0 - alternative.similarity;
+    if (as_other * kAlternativeMargin <= as_is)
+      review(result, fmt::format("with {} the images match better ({:.3f}; as they are {:.3f})",
+                                 alternative.description, alternative.similarity, alternative.as_is));
+    // A ball, for one, looks the same from both sides: that is harmless where it means the same pose.
+    else if (!(as_other >= kAlternativeMargin * as_is) &&
+             (alternative.distance_mm > kMaxSpreadMm || alternative.angle_rad > kMaxSpreadRad))
+      review(result,
+             fmt::format(
+                 "with {} the images match as well ({:.3f}; as they are {:.3f}), {:.1f} mm and {:.1f} degrees away",
+                 alternative.description, alternative.similarity, alternative.as_is, alternative.distance_mm,
+                 deg_from_rad(alternative.angle_rad)));
+  }
+}
+
 }  // namespace
 
 std::vector<Eigen::Vector3d> unobservable_directions(std::span<const XrayView> views) {
@@ -56,84 +139,18 @@ std::vector<Eigen::Vector3d> unobservable_directions(std::span<const XrayView> v
 void judge(std::span<const double> parameters, const RegistrationOptions& options, RegistrationResult& result) {
   result.reasons.clear();
   result.verdict = Verdict::kAccepted;
-  const auto review = [&](std::string reason) { result.demote(Verdict::kReview, std::move(reason)); };
-
-  for (std::size_t axis = 0; axis < parameters.size(); ++axis) {
-    const double bound = axis < 3 ? options.bound_mm : options.bound_rad * kLeverMm;
-    if (std::abs(parameters[axis]) >= kAtBoundShare * bound)
-      review(fmt::format("the {} ended at its bound", kAxes[axis]));
-  }
-  if (result.stages.empty() || result.stages.back().reached_limit)
-    review("the last stage of the search did not converge");
-  for (const StageReport& stage : result.stages)
-    if (stage.spread_mm && (*stage.spread_mm > kMaxSpreadMm || *stage.spread_rad > kMaxSpreadRad))
-      review(fmt::format("searches from different starts end {:.1f} mm and {:.1f} degrees apart in stage {}",
-                         *stage.spread_mm, deg_from_rad(*stage.spread_rad), stage.name));
-
-  const bool is_volume_chosen = options.region != nullptr && options.region->has_volume();
-  double mean = 0.0;
-  for (std::size_t n = 0; n < result.views.size(); ++n) {
-    const ViewMatch& view = result.views[n];
-    const std::string name = name_of_view(view.label, n);
-    mean += view.similarity_final / static_cast<double>(result.views.size());
-    if (!(view.similarity_final >= view.similarity_start - kSimilarityNoise))
-      review(fmt::format("{} matches worse than at the planned pose (similarity {:.4f}, was {:.4f})", name,
-                         view.similarity_final, view.similarity_start));
-    if (view.left_out && (view.left_out->distance_mm > kMaxSpreadMm || view.left_out->angle_rad > kMaxSpreadRad))
-      review(fmt::format("without {} the pose lies {:.1f} mm and {:.1f} degrees away", name, view.left_out->distance_mm,
-                         deg_from_rad(view.left_out->angle_rad)));
-    if (!view.has_all_excluded)
-      review(fmt::format("what is excluded covers nearly all that {} shows, and was compared nevertheless", name));
-    const int with_signal = view.consistency.with_signal(), disagreeing = view.consistency.disagreeing();
-    if (disagreeing > parts_that_may_disagree(with_signal, is_volume_chosen))
-      review(fmt::format("{} of {} parts of {} match elsewhere: anatomy may have moved against the rest", disagreeing,
-                         with_signal, name));
-    if (with_signal < 2)
-      review(fmt::format("too little of {} is compared to tell whether anatomy moved against the rest", name));
-  }
-  if (!(mean >= kMinSimilarity)) {
-    result.demote(mean >= kRejectedSimilarity ? Verdict::kReview : Verdict::kRejected,
-                  fmt::format("the final gradient correlation {:.3f} is below {:.2f}", mean, kMinSimilarity));
-  } else {
-    for (std::size_t n = 0; n < result.views.size(); ++n)
-      if (const ViewMatch& view = result.views[n]; !(view.similarity_final >= kMinViewSimilarity))
-        review(fmt::format("{} hardly matches (gradient correlation {:.3f})", name_of_view(view.label, n),
-                           view.similarity_final));
-  }
-
-  if (!result.uncertainty) {
-    review("the images do not determine the pose");
-  } else {
-    for (int axis = 0; axis < 3; ++axis) {
-      if (!(2.0 * result.uncertainty->translation_mm[axis] <= kMaxTwoSigmaMm))
-        review(fmt::format("the {} is uncertain: {:.1f} mm at two sigma", kAxes[static_cast<std::size_t>(axis)],
-                           2.0 * result.uncertainty->translation_mm[axis]));
-      if (!(2.0 * result.uncertainty->rotation_rad[axis] <= kMaxTwoSigmaRad))
-        review(fmt::format("the {} is uncertain: {:.1f} degrees at two sigma",
-                           kAxes[static_cast<std::size_t>(axis) + 3],
-                           deg_from_rad(2.0 * result.uncertainty->rotation_rad[axis])));
-    }
-  }
-  for (const Alternative& alternative : result.alternatives) {
-    const double as_is = 1.0 - alternative.as_is, as_other = 1.0 - alternative.similarity;
-    if (as_other * kAlternativeMargin <= as_is)
-      review(fmt::format("with {} the images match better ({:.3f}; as they are {:.3f})", alternative.description,
-                         alternative.similarity, alternative.as_is));
-    // A ball, for one, looks the same from both sides: that is harmless where it means the same pose.
-    else if (!(as_other >= kAlternativeMargin * as_is) &&
-             (alternative.distance_mm > kMaxSpreadMm || alternative.angle_rad > kMaxSpreadRad))
-      review(fmt::format(
-          "with {} the images match as well ({:.3f}; as they are {:.3f}), {:.1f} mm and {:.1f} degrees away",
-          alternative.description, alternative.similarity, alternative.as_is, alternative.distance_mm,
-          deg_from_rad(alternative.angle_rad)));
-  }
-  if (!options.check_alternatives) review("the preset leaves out the check for mirrored, turned and exchanged images");
+  judge_search(parameters, options, result);
+  judge_views(options.region != nullptr && options.region->has_volume(), result);
+  judge_uncertainty(result);
+  judge_alternatives(result);
+  if (!options.check_alternatives)
+    review(result, "the preset leaves out the check for mirrored, turned and exchanged images");
   // On the phantom of the demo, where ray casters end 0.1 mm beside the truth, splatting ended 1.4 mm beside it: its
   // noise belongs to the voxels, moves with them, and carries its own gradients into the last stage.
   if (const auto kind = renderer_kind_from(result.renderer); kind && is_splatting(*kind))
-    review(fmt::format("the DRRs of {} are too noisy for the last stage of the search", result.renderer));
+    review(result, fmt::format("the DRRs of {} are too noisy for the last stage of the search", result.renderer));
   if (!result.unobservable_room.empty())
-    review("all views look along nearly the same direction, along which nothing was measured");
+    review(result, "all views look along nearly the same direction, along which nothing was measured");
 }
 
 }  // namespace isoshift

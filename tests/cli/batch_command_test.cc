@@ -8,8 +8,8 @@
 #include <iterator>
 #include <nlohmann/json.hpp>
 
-#include "base/child_process.h"
 #include "base/error.h"
+#include "base/process.h"
 #include "tests/support/small_study.h"
 #include "tests/support/testdata.h"
 #include "workflow/batch/batch_folder.h"
@@ -126,7 +126,11 @@ TEST_F(BatchCommandTest, OneBadCaseStopsNoOther) {
 // A program that dies over its first case is started anew for the next.
 TEST_F(BatchCommandTest, AWorkerThatDiesTakesItsCaseWithIt) {
   const fs::path program = folder_ / "dies";
-  std::ofstream(program) << "#!/bin/sh\necho ready\nread name\nkill -9 $$\n";
+  std::ofstream(program) << R"(#!/bin/sh
+echo '{"ready":{}}'
+read order
+kill -9 $$
+)";
   fs::permissions(program, fs::perms::owner_all);
   use_program(program);
   const CommandOutcome outcome = batch();
@@ -134,6 +138,17 @@ TEST_F(BatchCommandTest, AWorkerThatDiesTakesItsCaseWithIt) {
   const nlohmann::json all = summary()["cases"];
   EXPECT_EQ(all.size(), 4U);
   for (const auto& one : all) EXPECT_THAT(one["error"].get<std::string>(), HasSubstr("ended by signal 9"));
+
+  std::ofstream(program) << R"(#!/bin/sh
+echo '{"ready":{}}'
+read order
+echo hello
+exec sleep 600
+)";
+  fs::remove_all(results());
+  EXPECT_EQ(batch().exit_status, 4);
+  for (const auto& one : summary()["cases"])
+    EXPECT_THAT(one["error"].get<std::string>(), HasSubstr("the message of a worker: is no JSON"));
 
   std::ofstream(program) << "#!/bin/sh\nexit 3\n";
   fs::remove_all(results());
@@ -165,10 +180,10 @@ TEST_F(BatchCommandTest, ScanWritesTheManifestThatBatchReads) {
   EXPECT_EQ(run_command({"batch", "--scan", exported().string(), "-o", manifest.string()}).exit_status, 0);
   const std::vector<BatchCase> found = read_manifest(manifest);
   ASSERT_EQ(found.size(), 4U);
-  EXPECT_EQ(found[0].ct, std::vector{exported() / "1" / "CT"});
-  EXPECT_EQ(found[0].images.size(), 2U);
-  EXPECT_EQ(found[1].images[0], exported() / "1" / "RTIMAGE" / "F02" / "KV_G000.dcm");
-  EXPECT_EQ(found[2].plan, exported() / "2" / "RTPLAN.dcm");
+  EXPECT_EQ(found[0].parts.ct, std::vector{exported() / "1" / "CT"});
+  EXPECT_EQ(found[0].parts.images.size(), 2U);
+  EXPECT_EQ(found[1].parts.images[0], exported() / "1" / "RTIMAGE" / "F02" / "KV_G000.dcm");
+  EXPECT_EQ(found[2].parts.plan, exported() / "2" / "RTPLAN.dcm");
 }
 
 // AP and LAT, LAT again, the couch moves, AP and LAT: LAT again belongs to neither pair.
@@ -193,7 +208,7 @@ TEST_F(BatchCommandTest, ScanDoesNotPairARetakeAcrossACouchMove) {
   std::vector<std::vector<std::string>> found;
   for (const BatchCase& one : read_manifest(manifest)) {
     found.emplace_back();
-    for (const fs::path& image : one.images) found.back().push_back(image.stem());
+    for (const fs::path& image : one.parts.images) found.back().push_back(image.stem());
   }
   using testing::ElementsAre;
   EXPECT_THAT(found, ElementsAre(ElementsAre("KV_G000", "KV_G090"), ElementsAre("c"), ElementsAre("d", "e")));
@@ -221,8 +236,8 @@ TEST_F(ManifestTest, TablesAndJsonLinesSayTheSame) {
   for (const char* name : {"m.csv", "m.jsonl"}) {
     const auto cases = read_manifest(folder_ / name);
     ASSERT_EQ(cases.size(), 1U);
-    EXPECT_EQ(cases[0].ct, std::vector{folder_ / "CT, planning"});
-    EXPECT_EQ(cases[0].images, (std::vector{folder_ / "a.dcm", folder_ / "b.dcm"}));
+    EXPECT_EQ(cases[0].parts.ct, std::vector{folder_ / "CT, planning"});
+    EXPECT_EQ(cases[0].parts.images, (std::vector{folder_ / "a.dcm", folder_ / "b.dcm"}));
     EXPECT_EQ(cases[0].anatomy, "head");
   }
 }

@@ -89,7 +89,7 @@ TEST(HeadRegistration, RankCorrelationIsBlindToMonotoneChanges) {
       const auto [least, most] = std::ranges::minmax(xray.values.pixels);
       for (float& value : xray.values.pixels) value = most * static_cast<float>(change(value / most, least / most));
     }
-    const auto result = register_views(renderers, xrays, study.planned_room_from_patient, by_ranks);
+    const auto result = register_views(renderers, prepared(xrays), study.planned_room_from_patient, by_ranks);
     return setup_error_from_poses(study.planned_room_from_patient, result.actual_room_from_patient);
   };
   const Eigen::Isometry3d as_is = found_with([](double share, double) { return share; });

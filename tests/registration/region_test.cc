@@ -249,7 +249,7 @@ Eigen::Isometry3d registered(const RegistrationScene& scene) {
   RegistrationOptions registration = preset("setup");
   registration.check_alternatives = false;
   registration.region = &region;
-  const auto result = register_views(*scene.renderers, scene.xrays, scene.planned, registration);
+  const auto result = register_views(*scene.renderers, prepared(scene.xrays), scene.planned, registration);
   return setup_error_from_poses(scene.planned, result.actual_room_from_patient);
 }
 
@@ -260,7 +260,7 @@ TEST(Region, ASpineOfWhichTheCtHoldsAPartIsRegistered) {
   EXPECT_THAT(registered(scene), PoseNear(scene.truth, 0.7, 0.5));
   RegistrationOptions of_all = preset("setup");
   of_all.check_alternatives = false;
-  const auto drawn = register_views(*scene.renderers, scene.xrays, scene.planned, of_all);
+  const auto drawn = register_views(*scene.renderers, prepared(scene.xrays), scene.planned, of_all);
   EXPECT_THAT(setup_error_from_poses(scene.planned, drawn.actual_room_from_patient),
               testing::Not(PoseNear(scene.truth, 0.7, 0.5)));
 }
@@ -277,7 +277,7 @@ TEST(Region, ASmallVolumeIsRegistered) {
        .cut_ends = {}});
   RegistrationOptions registration = preset("setup");
   registration.region = &region;
-  const auto result = register_views(*scene.renderers, scene.xrays, scene.planned, registration);
+  const auto result = register_views(*scene.renderers, prepared(scene.xrays), scene.planned, registration);
   EXPECT_THAT(setup_error_from_poses(scene.planned, result.actual_room_from_patient), PoseNear(scene.truth, 1.0, 2.0));
   EXPECT_NE(result.verdict, Verdict::kAccepted);  // too little to tell whether anatomy moved
 }

@@ -63,7 +63,7 @@ TEST(RegisterViews, RecoversKnownOffsetFromTwoOrthogonalViewsInEveryPatientPosit
   for (const PatientPosition position : kPatientPositions) {
     const double couch_deg = position == PatientPosition::kHfs ? 0.0 : 20.0;
     Scene scene = make_scene(position, couch_deg, {0.0, 90.0});
-    const auto result = register_views(*scene.renderers, scene.xrays, scene.planned, without_alternatives());
+    const auto result = register_views(*scene.renderers, prepared(scene.xrays), scene.planned, without_alternatives());
     // Pixels of 1.1 mm at the isocenter and slices of 2 mm: about a fourth of a pixel, and its angle at 100 mm.
     EXPECT_THAT(setup_error_from_poses(scene.planned, result.actual_room_from_patient), PoseNear(scene.truth, 0.3, 0.2))
         << to_string(position);
@@ -75,7 +75,7 @@ TEST(RegisterViews, RecoversKnownOffsetFromTwoOrthogonalViewsInEveryPatientPosit
 
 TEST(RegisterViews, AcceptsWhatItFindsAndSaysHowSureItIs) {
   Scene scene = make_scene(PatientPosition::kHfs, 0.0, {0.0, 90.0});
-  const auto result = register_views(*scene.renderers, scene.xrays, scene.planned, preset("setup"));
+  const auto result = register_views(*scene.renderers, prepared(scene.xrays), scene.planned, preset("setup"));
   EXPECT_THAT(setup_error_from_poses(scene.planned, result.actual_room_from_patient), PoseNear(scene.truth, 0.3, 0.2));
   EXPECT_EQ(result.verdict, Verdict::kAccepted) << testing::PrintToString(result.reasons);
   ASSERT_TRUE(result.uncertainty);
@@ -108,14 +108,14 @@ TEST(RegisterViews, OnlyTheRegionOfInterestIsCompared) {
   const ProjectedRegion region({.volume = left, .excluded = {}, .cut_ends = {}});
   RegistrationOptions options = without_alternatives();
   options.region = &region;
-  const auto result = register_views(*scene.renderers, scene.xrays, scene.planned, options);
+  const auto result = register_views(*scene.renderers, prepared(scene.xrays), scene.planned, options);
   EXPECT_THAT(setup_error_from_poses(scene.planned, result.actual_room_from_patient), PoseNear(scene.truth, 0.5, 0.4));
 }
 
 TEST(RegisterViews, RecoversFromObliqueAndFromThreeViews) {
   for (const auto& gantry_angles : {std::vector<double>{315, 45}, std::vector<double>{0, 120, 240}}) {
     Scene scene = make_scene(PatientPosition::kHfs, 350.0, gantry_angles);
-    const auto result = register_views(*scene.renderers, scene.xrays, scene.planned, without_alternatives());
+    const auto result = register_views(*scene.renderers, prepared(scene.xrays), scene.planned, without_alternatives());
     EXPECT_THAT(setup_error_from_poses(scene.planned, result.actual_room_from_patient),
                 PoseNear(scene.truth, 0.3, 0.2));
   }
@@ -124,7 +124,7 @@ TEST(RegisterViews, RecoversFromObliqueAndFromThreeViews) {
 // Oblique views: from the front this head and its mirror image are hard to tell apart.
 TEST(RegisterViews, APatientExactlyOnPlanIsAccepted) {
   Scene scene = make_scene(PatientPosition::kHfs, 0.0, {30.0, 120.0}, Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero());
-  const auto result = register_views(*scene.renderers, scene.xrays, scene.planned, preset("setup"));
+  const auto result = register_views(*scene.renderers, prepared(scene.xrays), scene.planned, preset("setup"));
   EXPECT_THAT(setup_error_from_poses(scene.planned, result.actual_room_from_patient), PoseNear(scene.truth, 0.3, 0.2));
   EXPECT_EQ(result.verdict, Verdict::kAccepted) << testing::PrintToString(result.reasons);
 }
@@ -134,7 +134,7 @@ TEST(RegisterViews, ABlankXrayIsAnError) {
   std::ranges::fill(scene.xrays[1].values.pixels, 0.0F);
   scene.xrays[1].label = "DARK";
   try {
-    register_views(*scene.renderers, scene.xrays, scene.planned, preset("setup"));
+    register_views(*scene.renderers, prepared(scene.xrays), scene.planned, preset("setup"));
     FAIL();
   } catch (const Error& error) {
     EXPECT_THAT(error.what(), testing::HasSubstr("DARK: the X-ray is blank"));
@@ -143,12 +143,12 @@ TEST(RegisterViews, ABlankXrayIsAnError) {
 
 TEST(RegisterViews, SameSeedSamePose) {
   Scene scene = make_scene(PatientPosition::kHfs, 0.0, {0.0, 90.0});
-  const auto first = register_views(*scene.renderers, scene.xrays, scene.planned, without_alternatives());
-  const auto second = register_views(*scene.renderers, scene.xrays, scene.planned, without_alternatives());
+  const auto first = register_views(*scene.renderers, prepared(scene.xrays), scene.planned, without_alternatives());
+  const auto second = register_views(*scene.renderers, prepared(scene.xrays), scene.planned, without_alternatives());
   EXPECT_EQ(first.actual_room_from_patient.matrix(), second.actual_room_from_patient.matrix());
   RegistrationOptions other_seed = without_alternatives();
   other_seed.seed = 2;
-  const auto third = register_views(*scene.renderers, scene.xrays, scene.planned, other_seed);
+  const auto third = register_views(*scene.renderers, prepared(scene.xrays), scene.planned, other_seed);
   EXPECT_NE(first.actual_room_from_patient.matrix(), third.actual_room_from_patient.matrix());  // the seed is used
   EXPECT_THAT(third.actual_room_from_patient, PoseNear(first.actual_room_from_patient, 0.1, 0.05));
 }
@@ -157,7 +157,7 @@ TEST(RegisterViews, TranslationOnlyLeavesTheRotationAlone) {
   Scene scene = make_scene(PatientPosition::kHfs, 0.0, {0.0, 90.0});
   RegistrationOptions options = without_alternatives();
   options.dof = Dof::kTranslation;
-  const auto result = register_views(*scene.renderers, scene.xrays, scene.planned, options);
+  const auto result = register_views(*scene.renderers, prepared(scene.xrays), scene.planned, options);
   const auto error = setup_error_from_poses(scene.planned, result.actual_room_from_patient);
   EXPECT_TRUE(error.linear().isIdentity(1e-12));
   EXPECT_THAT(Eigen::Vector3d(error.translation()), VectorNear(Eigen::Vector3d(scene.truth.translation()), 2.0));

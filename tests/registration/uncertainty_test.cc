@@ -94,7 +94,8 @@ TEST(Uncertainty, OfABallIsNotAccepted) {
     options.placement.rotation_deg = turned_deg;
     options.placement.translation_mm = Vector3d(2.0, -3.0, 1.0);
     const RegistrationScene scene = make_scene(options);
-    const RegistrationResult result = register_views(*scene.renderers, scene.xrays, scene.planned, preset("setup"));
+    const RegistrationResult result =
+        register_views(*scene.renderers, prepared(scene.xrays), scene.planned, preset("setup"));
     EXPECT_NE(result.verdict, Verdict::kAccepted);
     ASSERT_TRUE(result.uncertainty);
     EXPECT_GT(result.uncertainty->rotation_rad.minCoeff(), rad_from_deg(0.5));

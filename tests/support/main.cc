@@ -2,7 +2,7 @@
 
 #include <gmock/gmock.h>
 
-#include "base/child_process.h"
+#include "base/process.h"
 #include "io/dicom/decoder_process.h"
 
 int main(int argc, char** argv) {

@@ -1,11 +1,9 @@
 #include "workflow/batch/batch.h"
 
 #include <fmt/format.h>
-#include <tbb/global_control.h>
 
 #include <algorithm>
 #include <map>
-#include <thread>
 #include <utility>
 
 #include "base/error.h"
@@ -62,48 +60,30 @@ bool Batch::run() {
 bool Batch::register_all() {
   std::vector<BatchJob> jobs;
   for (const BatchCase& one : cases_)
-    if (!folder_.has_ended(one.name)) jobs.push_back({.name = one.name, .ct_key = one.ct_key()});
+    if (!folder_.has_ended(one.name))
+      jobs.push_back({.name = one.name,
+                      .ct_key = one.ct_key(),
+                      .order = {.parts = one.parts,
+                                .flags = options_.kept,
+                                .anatomy = one.anatomy,
+                                .output = std::filesystem::absolute(folder_.folder_of(one.name)),
+                                .at_a_time = options_.jobs}});
   if (jobs.size() < cases_.size())
     observer_.say(
         fmt::format("{} of {} cases have been registered before", cases_.size() - jobs.size(), cases_.size()));
-  std::vector<std::string> of_worker = arguments();
-  of_worker.emplace_back("--worker");
   const GracefulEnd end;
   const std::string step = fmt::format("Registering {}", jobs.size());
   const std::size_t total = jobs.size();
   std::size_t ended = 0;
   run_in_workers(
-      std::move(jobs), options_.jobs, of_worker,
-      [&](const std::string& name, const std::optional<std::string>& death) {
-        if (death) folder_.fail(name, *death);
+      std::move(jobs), options_.jobs,
+      [&](const std::string& name, const std::optional<std::string>& failure) {
+        if (failure) folder_.fail(name, *failure);
         if (!folder_.has_ended(name)) folder_.fail(name, "the worker said that it ended, and left no result");
         observer_.progress(step, ++ended, total);
       },
       [&] { return end.is_asked_for(); });
   return ended == total;
-}
-
-void Batch::serve() {
-  const unsigned cores = std::max(1U, std::thread::hardware_concurrency());
-  const tbb::global_control threads(tbb::global_control::max_allowed_parallelism,
-                                    std::max(1U, cores / static_cast<unsigned>(options_.jobs)));
-  SharedWork shared;
-  Observer nobody;  // all is in the result
-  serve_cases([&](const std::string& name) {
-    const auto one = std::ranges::find(cases_, name, &BatchCase::name);
-    if (one == cases_.end() || folder_.has_ended(name)) return;
-    try {
-      RegisterOptions registered = options_.each;
-      registered.study = one->options(options_.each.study);
-      if (!one->anatomy.empty()) registered.anatomy = one->anatomy;
-      registered.output = folder_.folder_of(name);
-      register_study(registered, shared, nobody);
-    } catch (const WriteError&) {
-      throw;  // the case is as good as before
-    } catch (const std::exception& error) {
-      folder_.fail(name, error.what());
-    }
-  });
 }
 
 std::vector<std::string> Batch::arguments() const {

@@ -36,9 +36,6 @@ class Batch {
   // Registers the cases that have not ended. Returns false if it was asked to end before all cases had ended.
   bool run();
 
-  // The work of a worker process: registers the cases whose names it reads from standard input.
-  void serve();
-
   // The summary of all cases, or of the cases of the shard.
   BatchSummary summary() const { return summary_of(folder_, cases_); }
 

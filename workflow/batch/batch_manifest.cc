@@ -11,6 +11,7 @@
 #include <map>
 #include <nlohmann/json.hpp>
 #include <set>
+#include <utility>
 
 #include "base/csv.h"
 #include "base/error.h"
@@ -125,17 +126,18 @@ BatchCase case_of(const NumberedRow& row, const fs::path& folder, const std::str
     return all;
   };
   BatchCase one_case{.name = one("case"),
-                     .study = path(one("study")),
-                     .plan = path(one("plan")),
-                     .structures = path(one("structures")),
-                     .ct = paths("ct"),
-                     .images = paths("images"),
+                     .parts = {.study = path(one("study")),
+                               .ct = paths("ct"),
+                               .images = paths("images"),
+                               .plan = path(one("plan")),
+                               .structures = path(one("structures"))},
                      .anatomy = one("anatomy")};
   const auto is_allowed = [](unsigned char c) { return std::isalnum(c) != 0 || c == '.' || c == '_' || c == '-'; };
   if (one_case.name.empty() || one_case.name.starts_with('.') || !std::ranges::all_of(one_case.name, is_allowed))
     throw Error(fmt::format("{}, line {}: case \"{}\": expected a name of letters, digits, \".\", \"_\" and \"-\"",
                             where, row.line, one_case.name));
-  if (one_case.study.empty() && (one_case.ct.empty() || one_case.images.empty()))
+  const StudyParts& parts = one_case.parts;
+  if (parts.study.empty() && (parts.ct.empty() || parts.images.empty()))
     throw Error(
         fmt::format("{}, line {}: case {}: expected a study, or ct and images", where, row.line, one_case.name));
   return one_case;
@@ -175,16 +177,7 @@ std::string joined(const std::vector<fs::path>& paths) {
 
 }  // namespace
 
-StudyOptions BatchCase::options(StudyOptions switches) const {
-  switches.study = study;
-  switches.ct = ct;
-  switches.images = images;
-  switches.plan = plan;
-  switches.structures = structures;
-  return switches;
-}
-
-std::string BatchCase::ct_key() const { return ct.empty() ? study.string() : joined(ct); }
+std::string BatchCase::ct_key() const { return parts.ct.empty() ? parts.study.string() : joined(parts.ct); }
 
 std::vector<BatchCase> read_manifest(const fs::path& path) {
   std::ifstream file(path, std::ios::binary);
@@ -207,10 +200,10 @@ std::vector<BatchCase> read_manifest(const fs::path& path) {
 
 std::string manifest_csv(const std::vector<BatchCase>& cases) {
   std::string csv = fmt::format("{}\n", fmt::join(kColumns, ","));
-  for (const BatchCase& c : cases)
-    csv += fmt::format("{},{},{},{},{},{},{}\n", c.name, csv_quoted(c.study.string()), csv_quoted(joined(c.ct)),
-                       csv_quoted(c.plan.string()), csv_quoted(c.structures.string()), csv_quoted(joined(c.images)),
-                       c.anatomy);
+  for (const auto& [name, parts, anatomy] : cases)
+    csv += fmt::format("{},{},{},{},{},{},{}\n", name, csv_quoted(parts.study.string()), csv_quoted(joined(parts.ct)),
+                       csv_quoted(parts.plan.string()), csv_quoted(parts.structures.string()),
+                       csv_quoted(joined(parts.images)), anatomy);
   return csv;
 }
 
@@ -224,17 +217,12 @@ std::vector<BatchCase> scan_cases(const fs::path& folder, bool other_xrays, Note
       notes.warnings.push_back(fmt::format("case {}: {}", session.name, remark));
     try {
       const StudyFiles own = files_for(session, files);
-      const StudyParts parts = choose_parts(own);
+      StudyParts parts = choose_parts(own);
       if (const std::string absent = missing_ct_images(own); !absent.empty()) throw Error(absent + " are not there");
       if (const std::string reason = unreadable_beside(parts, files); !reason.empty())
         throw Error("a file beside them may be theirs: " + reason);
-      cases.push_back({.name = session.name,
-                       .study = {},
-                       .plan = parts.plan.value_or(fs::path()),
-                       .structures = parts.structures.value_or(fs::path()),
-                       .ct = ct_paths(top, parts.ct, files),
-                       .images = parts.images,
-                       .anatomy = ""});
+      parts.ct = ct_paths(top, parts.ct, files);
+      cases.push_back({.name = session.name, .parts = std::move(parts), .anatomy = ""});
     } catch (const Error& error) {
       notes.warnings.push_back(fmt::format(
           "{} and {} more X-rays make no case: {}\n       Or a manifest says what the files do not: --scan writes one",

@@ -6,18 +6,15 @@
 #include <vector>
 
 #include "io/dicom/notes.h"
-#include "workflow/register/study_options.h"
+#include "io/study/study_files.h"
 
 namespace isoshift {
 
 struct BatchCase {
   std::string name;  // also the name of its folder: letters, digits, ".", "_" and "-"
-  std::filesystem::path study, plan, structures;
-  std::vector<std::filesystem::path> ct, images;
+  StudyParts parts;
   std::string anatomy;  // empty: the anatomy of --anatomy
 
-  // `switches`, which are given for all cases, with the parts of this study.
-  StudyOptions options(StudyOptions switches) const;
   // Cases with equal keys share their CT.
   std::string ct_key() const;
 };

@@ -4,9 +4,9 @@
 
 #include <utility>
 
-#include "base/child_process.h"
 #include "base/error.h"
 #include "base/output_folder.h"
+#include "base/process.h"
 
 namespace isoshift {
 namespace {
@@ -25,7 +25,7 @@ std::string quoted(const std::string& word) {
 // What sbatch answers. Throws Error where it refuses.
 std::string submitted(std::vector<std::string> words) {
   words.insert(words.begin(), {"sbatch", "--parsable"});
-  const ChildEnd end = run_child(std::move(words), kLongestSubmission);
+  const ProcessEnd end = run_to_end(std::move(words), kLongestSubmission);
   if (end.is_late) throw Error(fmt::format("sbatch: did not end within {} minutes", kLongestSubmission.count()));
   if (end.status != 0) throw Error(fmt::format("sbatch: {}", end.output.empty() ? "failed" : end.output));
   return end.output.substr(0, end.output.find(';'));  // before a cluster's name

@@ -2,116 +2,97 @@
 
 #include <fmt/format.h>
 #include <poll.h>
-#include <signal.h>
-#include <sys/prctl.h>
-#include <sys/socket.h>
-#include <sys/wait.h>
-#include <unistd.h>
+#include <string.h>
 
 #include <algorithm>
-#include <cerrno>
-#include <chrono>
-#include <cstring>
-#include <iostream>
+#include <filesystem>
 #include <list>
 #include <memory>
 #include <set>
 #include <utility>
+#include <variant>
 
-#include "base/child_process.h"
 #include "base/error.h"
+#include "base/process.h"
 
 namespace isoshift {
 namespace {
 
-using Clock = std::chrono::steady_clock;
-
-constexpr char kStop = '!';  // begins a line that says why no case can be registered any more
-
-// A child on the other end of a socket that is its standard input and output.
+// A child that registers one case after the other.
 class Worker {
  public:
-  explicit Worker(const std::vector<std::string>& arguments) {
-    int ends[2];
-    if (::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends) != 0)
-      throw Error(fmt::format("no worker can be started: {}", std::strerror(errno)));
-    socket_ = ends[0];
-    std::vector<std::string> words = {"isoshift"};
-    words.insert(words.end(), arguments.begin(), arguments.end());
-    try {
-      process_ = start_child(this_program(), std::move(words), {.in = ends[1], .out = ends[1], .err = -1});
-    } catch (const Error&) {
-      ::close(ends[0]);
-      ::close(ends[1]);
-      throw;
-    }
-    ::close(ends[1]);
-  }
-  ~Worker() {
-    ::close(socket_);
-    if (process_ == 0) return;
-    ::kill(process_, SIGTERM);
-    ::waitpid(process_, nullptr, 0);
-  }
-  Worker(const Worker&) = delete;
-  Worker& operator=(const Worker&) = delete;
+  Worker()
+      : process_({"isoshift", "__child", "register"},
+                 {.program = this_program(), .errors = ProcessOptions::Errors::kInherited}) {}
 
-  int socket() const { return socket_; }
+  int socket() { return process_.channel().socket(); }
+  bool is_ready() const { return is_ready_; }
   const std::optional<BatchJob>& job() const { return job_; }
   const std::string& last_ct() const { return last_ct_; }
 
   void give(BatchJob job) {
-    const std::string line = job.name + "\n";
     last_ct_ = job.ct_key;
     job_ = std::move(job);
-    deadline_ = Clock::now() + kLongestRegistration;
-    ::send(socket_, line.data(), line.size(), MSG_NOSIGNAL);  // one that died is found when it is read from
+    process_.allow(kLongestRegistration);
+    process_.channel().send(to_line(job_->order), process_.deadline());  // one that died is found when it is read from
   }
 
-  // Reads what is there. False: it died. Throws Error for what would befall every other case, too.
-  bool hear() {
-    char buffer[512];
-    const ssize_t count = ::recv(socket_, buffer, sizeof buffer, 0);
-    if (count <= 0) return false;
-    heard_.append(buffer, static_cast<std::size_t>(count));
-    for (std::size_t end = 0; (end = heard_.find('\n')) != std::string::npos; heard_.erase(0, end + 1)) {
-      if (heard_.front() == kStop) throw Error(heard_.substr(1, end - 1));
-      if (is_ready_ && job_ && heard_.compare(0, end, job_->name) == 0) job_.reset();
-      is_ready_ = true;  // its first line says so
-    }
-    return true;
-  }
-  bool is_ready() const { return is_ready_; }
-
-  void kill_if_late() {
-    if (!job_ || is_late_ || Clock::now() < deadline_) return;
-    is_late_ = true;
-    ::kill(process_, SIGKILL);
-  }
-
-  // Of one that has died.
-  struct Death {
-    std::string why;
-    bool from_outside = false;  // a signal that programs do not give themselves
+  // The end of a job. `failure`: why it has no result.
+  struct JobEnd {
+    BatchJob job;
+    std::optional<std::string> failure;
+    bool is_from_outside = false;  // the worker was killed from outside, so the job may not be the cause
   };
-  Death death() {
-    int status = 0;
-    ::waitpid(std::exchange(process_, 0), &status, 0);
-    if (is_late_) return {fmt::format("it did not end within {} minutes", kLongestRegistration.count()), false};
-    if (WIFSIGNALED(status))
-      return {fmt::format("the program was ended by signal {} ({})", WTERMSIG(status), ::strsignal(WTERMSIG(status))),
-              WTERMSIG(status) == SIGKILL || WTERMSIG(status) == SIGTERM};
-    return {fmt::format("the program ended with status {}", WEXITSTATUS(status)), WEXITSTATUS(status) == 128 + SIGTERM};
+  // Reads what there is. Throws WriteError for what would befall every other case, too.
+  std::optional<JobEnd> hear() {
+    process_.kill_if_late();
+    const bool has_died = process_.channel().hear(Channel::Time()) == Channel::Heard::kEnd;
+    std::optional<JobEnd> end;
+    try {
+      while (const auto line = process_.channel().take_line())
+        take(registration_message_from(*line, "the message of a worker"), end);
+    } catch (const WriteError&) {
+      throw;
+    } catch (const Error& damaged) {
+      damage_ = damaged.what();
+    }
+    if (damage_.empty() && !has_died) return end;
+    is_alive_ = false;
+    if (job_) end = end_of_job(why_it_died());
+    return end;
+  }
+  bool is_alive() const { return is_alive_; }
+
+  std::string why_it_died() {
+    if (!damage_.empty()) return damage_;
+    const ProcessEnd end = process_.wait();
+    is_from_outside_ = end.is_from_outside();
+    if (end.is_late) return fmt::format("it did not end within {} minutes", kLongestRegistration.count());
+    if (end.signal != 0)
+      return fmt::format("the program was ended by signal {} ({})", end.signal, ::strsignal(end.signal));
+    return fmt::format("the program ended with status {}", end.status);
   }
 
  private:
-  int socket_ = -1;
-  pid_t process_ = 0;
-  bool is_ready_ = false;
-  std::string heard_;
+  void take(const RegistrationMessage& message, std::optional<JobEnd>& end) {
+    if (std::holds_alternative<Ready>(message) != !is_ready_ || (is_ready_ && !job_))
+      throw Error("the message of a worker: answers no order");
+    if (!std::exchange(is_ready_, true)) return;
+    const auto* failed = std::get_if<Failed>(&message);
+    if (failed != nullptr && failed->is_of_disk) throw WriteError(failed->why);
+    end = end_of_job(failed != nullptr ? std::optional(failed->why) : std::nullopt);
+  }
+
+  JobEnd end_of_job(std::optional<std::string> failure) {
+    process_.allow(std::nullopt);
+    return {
+        .job = *std::exchange(job_, std::nullopt), .failure = std::move(failure), .is_from_outside = is_from_outside_};
+  }
+
+  Process process_;
+  bool is_ready_ = false, is_alive_ = true, is_from_outside_ = false;
+  std::string damage_;  // what is wrong with its message; empty: nothing
   std::optional<BatchJob> job_;
-  Clock::time_point deadline_;  // of its job
-  bool is_late_ = false;
   std::string last_ct_;
 };
 
@@ -129,16 +110,17 @@ std::list<BatchJob>::iterator next_for(const Worker& worker, std::list<BatchJob>
 
 }  // namespace
 
-void run_in_workers(std::vector<BatchJob> all, int count, const std::vector<std::string>& arguments,
-                    const std::function<void(const std::string& name, const std::optional<std::string>& death)>& on_end,
-                    const std::function<bool()>& should_stop) {
+void run_in_workers(
+    std::vector<BatchJob> all, int count,
+    const std::function<void(const std::string& name, const std::optional<std::string>& failure)>& on_end,
+    const std::function<bool()>& should_stop) {
   std::list<BatchJob> jobs(std::make_move_iterator(all.begin()), std::make_move_iterator(all.end()));
   std::list<std::unique_ptr<Worker>> workers;
   std::set<std::string> tried_twice;
   for (;;) {
     auto idle = static_cast<std::size_t>(std::ranges::count_if(workers, [](const auto& w) { return !w->job(); }));
     for (; workers.size() < static_cast<std::size_t>(count) && idle < jobs.size(); ++idle)
-      workers.push_back(std::make_unique<Worker>(arguments));
+      workers.push_back(std::make_unique<Worker>());
     for (const auto& worker : workers) {
       if (worker->job() || jobs.empty()) continue;
       const auto next = next_for(*worker, jobs, workers);
@@ -151,38 +133,20 @@ void run_in_workers(std::vector<BatchJob> all, int count, const std::vector<std:
     for (const auto& worker : workers) polled.push_back({.fd = worker->socket(), .events = POLLIN, .revents = 0});
     constexpr int kPatienceMs = 200;
     ::poll(polled.data(), polled.size(), kPatienceMs);
-    auto event = polled.begin();
-    for (auto worker = workers.begin(); worker != workers.end(); ++event) {
+    for (auto worker = workers.begin(); worker != workers.end();) {
       const auto now = worker++;
-      (*now)->kill_if_late();
-      if (event->revents == 0) continue;
-      const std::optional<BatchJob> job = (*now)->job();
-      const bool is_alive = (*now)->hear();
-      if (is_alive && (*now)->job().has_value() == job.has_value()) continue;
+      const std::optional<Worker::JobEnd> end = (*now)->hear();
+      if (!end && (*now)->is_alive()) continue;
       if (should_stop()) return;  // the signal that says so has reached the workers, too
-      if (!(*now)->is_ready()) throw Error(fmt::format("a worker could not begin: {}", (*now)->death().why));
-      const std::optional<Worker::Death> death = is_alive ? std::nullopt : std::optional((*now)->death());
-      if (!is_alive) workers.erase(now);
-      // One that was killed from outside may have been in nobody's way: its case has another try.
-      if (job && death && death->from_outside && tried_twice.insert(job->name).second)
-        jobs.push_front(*job);
-      else if (job)
-        on_end(job->name, death ? std::optional(death->why) : std::nullopt);
-    }
-  }
-}
-
-void serve_cases(const std::function<void(const std::string& name)>& run) {
-  ::prctl(PR_SET_PDEATHSIG, SIGKILL);  // nobody would be told of what it does any more
-  std::cout << "ready" << std::endl;
-  for (std::string name; std::getline(std::cin, name);) {
-    try {
-      run(name);
-      std::cout << name << std::endl;
-    } catch (const std::exception& error) {
-      std::string why = error.what();
-      std::ranges::replace(why, '\n', ' ');
-      std::cout << kStop << why << std::endl;
+      if (!(*now)->is_ready()) throw Error(fmt::format("a worker could not begin: {}", (*now)->why_it_died()));
+      if (!(*now)->is_alive()) workers.erase(now);
+      if (!end) continue;
+      // If a worker was killed from outside, its case may not be the cause, and gets a second try.
+      if (end->is_from_outside && !std::filesystem::exists(end->job.order.output) &&
+          tried_twice.insert(end->job.name).second)
+        jobs.push_front(end->job);
+      else
+        on_end(end->job.name, end->failure);
     }
   }
 }

@@ -114,13 +114,13 @@ void add_errors(const RegistrationResult& result, const Eigen::Isometry3d& truth
 
 // A registration that ends with an error counts as one that found nothing.
 EvaluatedRun evaluated(int number, const StartPose& start, const Eigen::Isometry3d& truth, const Study& study,
-                       const RegistrationSetup& setup) {
+                       std::span<const FixedImage> images, const RegistrationSetup& setup) {
   constexpr double kNothing = std::numeric_limits<double>::infinity();
   EvaluatedRun run{
       .number = number, .start_mtre_mm = start.mtre_mm, .mtre_mm = kNothing, .mpd_mm = kNothing, .mrpd_mm = kNothing};
   try {
-    const RegistrationResult result = register_views(
-        setup.renderers(), study.xrays, start.setup_error * study.planned_room_from_patient, setup.options());
+    const RegistrationResult result =
+        register_views(setup.renderers(), images, start.setup_error * study.planned_room_from_patient, setup.options());
     add_errors(result, truth, study, run);
     run.verdict = result.verdict;
     run.reasons = joined(result.reasons);
@@ -138,6 +138,7 @@ EvaluatedRun evaluated(int number, const StartPose& start, const Eigen::Isometry
 // that.
 void run_missing(EvaluationFolder& folder, const Study& study, const RegistrationSetup& setup,
                  const Eigen::Isometry3d& truth, const std::vector<StartPose>& starts, int jobs, Observer& observer) {
+  const std::vector<FixedImage> images = prepared(study.xrays);
   std::vector<int> missing;
   for (int number = 0; number < static_cast<int>(starts.size()); ++number)
     if (!folder.has(number)) missing.push_back(number);
@@ -147,7 +148,7 @@ void run_missing(EvaluationFolder& folder, const Study& study, const Registratio
   const auto work = [&] {
     for (std::size_t n = next++; n < missing.size(); n = next++) try {
         const int number = missing[n];
-        const EvaluatedRun run = evaluated(number, starts[number], truth, study, setup);
+        const EvaluatedRun run = evaluated(number, starts[number], truth, study, images, setup);
         const std::lock_guard lock(mutex);
         folder.append(run);
         observer.progress("Evaluating", folder.runs().size(), starts.size());

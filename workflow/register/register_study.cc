@@ -55,14 +55,14 @@ SetupResult register_study(const RegisterOptions& options, SharedWork& shared, O
   if (site_file && site_file->sessions) named.max_span_s = site_file->sessions->max_span_s;
   const Study study = load(named, notes, observer, shared.cts);
   const RegistrationSetup setup(options.registration, study, beams_of(study), shared.renderers);
+  const std::vector<FixedImage> images = prepared(study.xrays);
   const double seconds_load = total.seconds();
-  RegistrationResult found =
-      register_views(setup.renderers(), study.xrays, study.planned_room_from_patient, setup.options(),
-                     [&](double share) { observer.progress("Registering", share); });
+  RegistrationResult found = register_views(setup.renderers(), images, study.planned_room_from_patient, setup.options(),
+                                            [&](double share) { observer.progress("Registering", share); });
   observer.progress("Registering", 1.0);
   for (const std::string& doubt : study.doubts) found.demote(Verdict::kReview, doubt);
 
-  SetupResult result = setup_result_of(study, options.registration, setup, std::move(found));
+  SetupResult result = setup_result_of(study, images, options.registration, setup, std::move(found));
   result.site = std::move(site);
   if (may_write_registration(options, result))
     result.spatial_registration_uid = write_spatial_registration(study, written_pose(study, result, notes),

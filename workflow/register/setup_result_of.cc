@@ -66,12 +66,13 @@ std::optional<SiteRules> chosen_site(const std::optional<SiteFile>& file, const 
                    .automatic_release = site.automatic_release};
 }
 
-SetupResult setup_result_of(const Study& study, const RegistrationRequest& request, const RegistrationSetup& setup,
-                            RegistrationResult found) {
+SetupResult setup_result_of(const Study& study, std::span<const FixedImage> images, const RegistrationRequest& request,
+                            const RegistrationSetup& setup, RegistrationResult found) {
   Renderer& renderer = setup.renderers().finest();
   const RegistrationOptions& registration = setup.options();
   const std::vector<MarkedStructure> structures = marked_structures(study, request.region);
-  std::vector<ViewPicture> pictures = view_pictures(study, renderer, structures, found.actual_room_from_patient);
+  std::vector<ViewPicture> pictures =
+      view_pictures(study, images, renderer, structures, found.actual_room_from_patient);
   SetupResult result;
   static_cast<Registration&>(result) = std::move(found);
   result.made_on = local_time();

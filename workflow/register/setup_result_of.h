@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <optional>
+#include <span>
 #include <string>
 
 #include "io/config/site_file.h"
@@ -22,8 +23,9 @@ std::optional<SiteFile> named_site(const std::filesystem::path& file);
 std::optional<SiteRules> chosen_site(const std::optional<SiteFile>& file, const std::string& anatomy,
                                      std::optional<SiteRules> before = std::nullopt);
 
-// The result without notes, loading times and written files. The pictures of its views are rendered anew.
-SetupResult setup_result_of(const Study& study, const RegistrationRequest& request, const RegistrationSetup& setup,
-                            RegistrationResult found);
+// The result without notes, loading times and written files. `images`: the prepared X-rays that were registered. The
+// DRRs in the pictures of the views are rendered anew.
+SetupResult setup_result_of(const Study& study, std::span<const FixedImage> images, const RegistrationRequest& request,
+                            const RegistrationSetup& setup, RegistrationResult found);
 
 }  // namespace isoshift

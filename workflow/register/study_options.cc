@@ -59,11 +59,9 @@ void StudyOptions::check_finite() const {
 StudyRequest StudyOptions::request() const {
   check_finite();
   StudyRequest request;
-  if (study.empty() && (ct.empty() || images.empty()))
+  if (parts.study.empty() && (parts.ct.empty() || parts.images.empty()))
     throw UsageError("which study? Name its folder, or its parts with --ct and --image");
-  request.parts = {.study = study, .ct = ct, .images = images, .plan = std::nullopt};
-  if (!plan.empty()) request.parts.plan = plan;
-  if (!structures.empty()) request.parts.structures = structures;
+  request.parts = parts;
   if (!isocenter.empty()) request.isocenter_patient_mm = Eigen::Vector3d(isocenter.data());
   for (const std::string& text : gantry_angles) {
     const auto [label, angle] = key_and_value(text, "--gantry-angle");

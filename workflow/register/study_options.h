@@ -14,8 +14,8 @@ void check_couch_angles(const std::optional<double>& couch_angle_deg, const std:
                         const std::optional<double>& couch_roll_deg);
 
 struct StudyOptions {
-  std::filesystem::path study, plan, structures, machine;
-  std::vector<std::filesystem::path> ct, images;
+  StudyParts parts;
+  std::filesystem::path machine;
   std::vector<double> isocenter, rt_image_position;
   std::vector<std::string> gantry_angles, allow;
   std::string patient_position, intensity, beam;

@@ -4,7 +4,6 @@
 #include <array>
 
 #include "registration/preprocess/image_operations.h"
-#include "registration/preprocess/preprocess.h"
 #include "registration/region.h"
 
 namespace isoshift {
@@ -34,7 +33,7 @@ std::vector<Polygon> silhouette(const ProjectedRegion& structure, const XrayView
 
 }  // namespace
 
-std::vector<ViewPicture> view_pictures(const Study& study, Renderer& renderer,
+std::vector<ViewPicture> view_pictures(const Study& study, std::span<const FixedImage> images, Renderer& renderer,
                                        const std::vector<MarkedStructure>& structures,
                                        const Eigen::Isometry3d& actual_room_from_patient) {
   std::vector<ProjectedRegion> regions;
@@ -43,9 +42,9 @@ std::vector<ViewPicture> view_pictures(const Study& study, Renderer& renderer,
     regions.emplace_back(RegionOfInterest{.volume = structure.mask, .excluded = {}, .cut_ends = {}});
   const std::array poses = {study.planned_room_from_patient, actual_room_from_patient};
   std::vector<ViewPicture> pictures;
-  for (const XrayImage& xray : study.xrays) {
-    const int factor = (std::max(xray.view.columns, xray.view.rows) + kMaxEdge - 1) / kMaxEdge;
-    const FixedImage image = reduced(prepare(xray), factor);
+  for (const FixedImage& whole : images) {
+    const int factor = (std::max(whole.view.columns, whole.view.rows) + kMaxEdge - 1) / kMaxEdge;
+    const FixedImage image = reduced(whole, factor);
     const RenderResult drrs = renderer.render(std::span(&image.view, 1), poses, PixelSet::all());
     ViewPicture& picture = pictures.emplace_back();
     put_grays(picture, image.line_integral, image_of(image.view, drrs.line_integrals(0, 0)),

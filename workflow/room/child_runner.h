@@ -4,13 +4,13 @@
 #include <chrono>
 #include <memory>
 
-#include "base/child_process.h"
+#include "base/process.h"
 #include "io/config/watch_file.h"
 #include "workflow/room/runner.h"
 
 namespace isoshift {
 
-// Runs isoshift register with the site file and the flags of a watch file.
+// Orders registrations with the site file and the flags of a watch file, each from a child of its own.
 class ChildRunner : public Runner {
  public:
   explicit ChildRunner(const WatchFile& watch, std::chrono::milliseconds limit = kLongestRegistration)
@@ -21,12 +21,12 @@ class ChildRunner : public Runner {
   void give_up() override { child_.reset(); }
 
  private:
-  Failure failure_of(const ChildEnd& end) const;
+  Failure failure_of(const ProcessEnd& end) const;
 
   const WatchFile& watch_;
   std::chrono::milliseconds limit_;  // a registration that takes longer is ended
   std::filesystem::path folder_;
-  std::unique_ptr<Child> child_;
+  std::unique_ptr<Process> child_;
 };
 
 }  // namespace isoshift

@@ -30,9 +30,9 @@ class TrackRun {
   TrackRecord run() {
     OutputFolder output(options_.output, options_.overwrite);
     if (!options_.truth.empty()) record_.truth = read_motion_trace(options_.truth, notes_);
-    StudyOptions parts = options_.study;
-    if (is_filled()) parts.images = {options_.follow};
-    StudyRequest request = parts.request();
+    StudyOptions named = options_.study;
+    if (is_filled()) named.parts.images = {options_.follow};
+    StudyRequest request = named.request();
     request.one_per_imager = true;
     if (is_filled()) wait_for_first();
     const Study study = first_study(request);

@@ -160,9 +160,19 @@ TEST_F(DecoderThatFailsTest, OneThatStallsIsEnded) {
 }
 
 TEST_F(DecoderThatFailsTest, AnAnswerOfAnotherLengthIsRefused) {
-  // is_error, padding, and a length of 2^40.
-  EXPECT_THAT(error_with_decoder("printf '\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\1\\0\\0'; exec sleep 5"),
+  EXPECT_THAT(error_with_decoder("echo '{\"bytes\": 1099511627776}'; exec sleep 5"),
               testing::HasSubstr("was decoded to 1099511627776 bytes, expected 1"));
+}
+
+TEST_F(DecoderThatFailsTest, AnAnswerThatIsNoneIsRefused) {
+  const auto names_file_and = [&](const std::string& text) {
+    return testing::AllOf(testing::StartsWith(compressed_.string()), testing::HasSubstr(text));
+  };
+  EXPECT_THAT(error_with_decoder("echo hello; exec sleep 5"), names_file_and("the answer of the decoder: is no JSON"));
+  EXPECT_THAT(error_with_decoder("echo '{\"bytes\": 1, \"rows\": 1}'; exec sleep 5"),
+              names_file_and("the answer of the decoder: there is no key rows"));
+  EXPECT_THAT(error_with_decoder("exec cat /dev/zero"),
+              names_file_and("the decoder sent a line of more than 24640 bytes"));
 }
 
 // What the stream says of its size counts, not only what the header says.

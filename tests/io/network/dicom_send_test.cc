@@ -13,7 +13,7 @@
 #include <optional>
 #include <thread>
 
-#include "base/child_process.h"
+#include "base/process.h"
 #include "base/sha256.h"
 #include "tests/support/certificates.h"
 #include "tests/support/small_study.h"
@@ -55,11 +55,11 @@ class DicomSendTest : public testing::Test {
                                const std::string& pinned = "") {
     const std::uint16_t port = free_port();
     const std::string& folder = folder_.path().string();
-    const Child receiver({"sh", "-c",
-                          fmt::format("exec storescp -v -aet RECORD -od {0}/received +tls {0}/{1}.key {0}/{1}.pem +cf "
-                                      "{0}/ca.pem {2} > {0}/log 2>&1",
-                                      folder, certificate, port)},
-                         60s);
+    const Process receiver(
+        {"sh", "-c",
+         fmt::format("exec storescp -v -aet RECORD -od {0}/received +tls {0}/{1}.key {0}/{1}.pem +cf "
+                     "{0}/ca.pem {2} > {0}/log 2>&1",
+                     folder, certificate, port)});
     wait_for_listener(port);
     try {
       send_object(file_, sha256_, peer_at(host, port, pinned), false);
@@ -197,11 +197,10 @@ TEST_F(DicomSendTest, ACipherThatBcp195DoesNotAllowIsRefused) {
        {std::pair("AES128-SHA", false), std::pair("ECDHE-RSA-AES128-GCM-SHA256", true)}) {
     const std::uint16_t port = free_port();
     // It ends after two connections: wait_for_listener(), and the peer's.
-    Child server({"sh", "-c",
-                  fmt::format("cd {} && exec openssl s_server -naccept 2 -accept 127.0.0.1:{} -tls1_2 -cipher {} "
-                              "-key server.key -cert server.pem < /dev/zero",
-                              folder_.path().string(), port, cipher)},
-                 60s);
+    Process server({"sh", "-c",
+                    fmt::format("cd {} && exec openssl s_server -naccept 2 -accept 127.0.0.1:{} -tls1_2 -cipher {} "
+                                "-key server.key -cert server.pem < /dev/zero",
+                                folder_.path().string(), port, cipher)});
     wait_for_listener(port);
     EXPECT_THROW(send_object(file_, sha256_, peer_at("127.0.0.1", port, ""), false),
                  PeerError);  // it is no DICOM peer

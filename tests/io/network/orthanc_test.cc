@@ -7,7 +7,7 @@
 #include <chrono>
 #include <optional>
 
-#include "base/child_process.h"
+#include "base/process.h"
 #include "tests/support/certificates.h"
 #include "tests/support/temporary_folder.h"
 
@@ -28,11 +28,10 @@ class OrthancTest : public testing::Test {
   // What comes of asking a server with this certificate, called by this host.
   std::string error_of_asking(const std::string& certificate, const std::string& host) const {
     const std::uint16_t port = free_port();
-    const Child server({"sh", "-c",
-                        fmt::format("cd {0} && exec openssl s_server -www -accept 127.0.0.1:{1} -key {2}.key -cert "
-                                    "{2}.pem",
-                                    folder_.path().string(), port, certificate)},
-                       std::chrono::minutes(1));
+    const Process server({"sh", "-c",
+                          fmt::format("cd {0} && exec openssl s_server -www -accept 127.0.0.1:{1} -key {2}.key -cert "
+                                      "{2}.pem",
+                                      folder_.path().string(), port, certificate)});
     wait_for_listener(port);
     const RestOrthanc orthanc({.url = fmt::format("https://{}:{}", host, port), .ca = folder_ / "ca.pem"});
     try {

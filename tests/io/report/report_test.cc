@@ -15,11 +15,10 @@
 #include "base/output_folder.h"
 #include "io/report/canvas.h"
 #include "io/report/formats.h"
-#include "io/report/result_folder.h"
 #include "io/report/rounding.h"
-#include "io/report/view_picture.h"
 #include "setup/shown_shift.h"
 #include "tests/support/command.h"
+#include "tests/support/oblique_report.h"
 #include "tests/support/temporary_folder.h"
 
 namespace isoshift {
@@ -27,61 +26,6 @@ namespace {
 
 using testing::HasSubstr;
 using testing::Not;
-
-// A view of another size than its picture.
-SetupResult::View view_with_picture(const std::string& label) {
-  SetupResult::View view{.label = label,
-                         .sop_class_uid = "1.2.840.10008.5.1.4.1.1.481.1",
-                         .sop_instance_uid = "1.2.3.4",
-                         .sha256 = std::string(64, 'a'),
-                         .gantry_deg = 45,
-                         .columns = 120,
-                         .rows = 90};
-  ViewPicture& picture = view.picture;
-  for (auto* image : {&picture.xray, &picture.drr_planned, &picture.drr_found}) {
-    *image = Image<std::uint8_t>(60, 45, 30);
-    for (int row = 10; row < 30; ++row)
-      for (int column = 15; column < 40; ++column) image->at(column, row) = 200;
-  }
-  picture.isocenter_px = {29.5, 22.0};
-  picture.pixels_per_mm = 0.4;
-  picture.directions = {"R", "L", "H", "F"};
-  picture.field = {{{1, 1}, {58, 1}, {58, 43}, {1, 43}}};
-  picture.structures = {
-      {.name = "PTV", .planned = {{{20, 20}, {30, 20}, {25, 30}}}, .found = {{{21, 20}, {31, 20}, {26, 30}}}}};
-  return view;
-}
-
-// head-oblique at its truth, the worked example of docs/conventions.md.
-SetupResult oblique_report(Verdict verdict) {
-  SetupResult report;
-  report.made_on = "2026-03-01T10:16:02+0100";
-  report.version = "0.1.0";
-  report.commit = "abc";
-  report.verdict = verdict;
-  report.reasons.clear();
-  report.identity = {.character_set = "ISO_IR 192",
-                     .patient_id = "ID-1",
-                     .patient_name = "Example",
-                     .study_instance_uid = "1.2.3",
-                     .study_date = "20260301"};
-  report.plan_uid = "1.2.9";
-  report.plan_class_uid = "1.2.840.10008.5.1.4.1.1.481.5";
-  report.patient_position = "HFS";
-  report.table.support_rad = rad_from_deg(10.0);
-  report.setup_error.translation() = Eigen::Vector3d(-7.4, 3.9, -5.2);
-  report.setup_error.linear() = rotation_from_zxy({rad_from_deg(-2.9), rad_from_deg(-2.3), rad_from_deg(1.7)});
-  report.views = {view_with_picture("KV_45")};
-  return report;
-}
-
-SiteRules small_couch() {
-  return {.name = "Linac 3",
-          .sha256 = std::string(64, 'b'),
-          .level = ActionLevel{.translation_mm = 5.0, .rotation_deg = 3.0},
-          .couch_dof = CouchDof::kFour,
-          .couch_scale = ValidatedScale{CouchScale::kVarianIec, "J. Doe", "2026-03-01"}};
-}
 
 std::string text_of(const SetupResult& report) { return text_report(report_page(report)); }
 std::string html_of(const SetupResult& report) { return html_report(report, report_page(report)); }
@@ -414,95 +358,6 @@ TEST(Report, FirstPageHoldsAllThatIsSigned) {
        at = all.find("Not for clinical", at + 1))
     ++disclaimers;
   EXPECT_EQ(disclaimers, pages + 1);  // on every page, on the first one twice
-}
-
-class ResultFolderTest : public testing::Test {
- protected:
-  ResultFolderTest() {
-    report_.site = small_couch();
-    report_.uncertainty = {.translation_mm = {0.1, 0.2, 0.3}, .rotation_rad = {0.001, 0.002, 0.003}};
-    report_.stages = {{.name = "fine",
-                       .similarity = "ncc",
-                       .optimizer = "bobyqa",
-                       .parameters = {{"pixel_mm", 1.0}},
-                       .evaluations = 3,
-                       .termination = "converged",
-                       .best = {0.1, 0.4, 0.9}}};
-    report_.points = {{"centroid of PTV", {1, 2, 3}}};
-    report_.table_position_mm = Eigen::Vector3d(1, 2, 3);
-    report_.spatial_registration_uid = "2.25.1";
-    report_.views.front().match.consistency.parts = {{.center_px = {20, 20}, .width_px = 10, .disagrees = true}};
-    write_result(report_, folder_.path());
-  }
-  TemporaryFolder folder_;
-  SetupResult report_ = oblique_report(Verdict::kAccepted);
-};
-
-TEST_F(ResultFolderTest, IsReadBackWhole) {
-  const SetupResult read = read_result(folder_.path());
-  EXPECT_EQ(json_report(read), json_report(report_));
-  EXPECT_EQ(read.views[0].picture.drr_found.pixels, report_.views[0].picture.drr_found.pixels);
-  EXPECT_EQ(csv_report(read), csv_report(report_));
-  EXPECT_EQ(text_of(read), text_of(report_));
-}
-
-TEST_F(ResultFolderTest, ThePdfIsADicomObjectToo) {
-  const CommandOutcome checked = run_shell("dciodvfy -new " + (folder_ / "report.dcm").string());
-  EXPECT_THAT(checked.out, Not(HasSubstr("Error"))) << checked.out;
-  const CommandOutcome read = run_shell(fmt::format(
-      "/usr/bin/python3 -c \"import pydicom, sys; d = pydicom.dcmread('{0}/report.dcm'); "
-      "sys.exit(0 if d.EncapsulatedDocument[:d.EncapsulatedDocumentLength] == open('{0}/report.pdf', 'rb').read() "
-      "and "
-      "[s.ReferencedSOPInstanceUID for s in d.SourceInstanceSequence] == ['1.2.9', '1.2.3.4', '2.25.1'] and "
-      "d.StudyInstanceUID == '1.2.3' and d.PatientID == 'ID-1' and d.BurnedInAnnotation == 'YES' else 1)\"",
-      folder_.path().string()));
-  EXPECT_EQ(read.exit_status, 0) << read.out;
-}
-
-TEST_F(ResultFolderTest, WhatIsMissingOrSpoiledIsNamed) {
-  std::filesystem::remove(folder_ / "view1_found.png");
-  EXPECT_THROW(
-      {
-        try {
-          read_result(folder_.path());
-        } catch (const Error& error) {
-          EXPECT_THAT(error.what(), HasSubstr("view1_found.png: cannot be read as a PNG"));
-          throw;
-        }
-      },
-      Error);
-  EXPECT_THROW(report_from_json("{\"schema\": 2}", "result.json"), Error);
-  EXPECT_THROW(report_from_json("no json", "result.json"), Error);
-  EXPECT_THROW(read_result(folder_ / "nowhere"), Error);
-}
-
-// Opened, slid and seen in a browser.
-TEST_F(ResultFolderTest, ThePageWorksInABrowser) {
-  const CommandOutcome outcome =
-      run_shell(fmt::format("/usr/bin/python3 {}/tests/io/report/html_report_in_browser.py {}", ISOSHIFT_SOURCE_DIR,
-                            (folder_ / "report.html").string()));
-  EXPECT_EQ(outcome.exit_status, 0) << outcome.out;
-}
-
-TEST(ViewPicture, DirectionsAreTheStrongestFirst) {
-  EXPECT_EQ(orientation_letters({1, 0, 0}), "L");
-  EXPECT_EQ(orientation_letters({-0.2, 0, -1}), "F");
-  EXPECT_EQ(orientation_letters({-0.6, -0.8, 0}), "AR");
-  EXPECT_EQ(orientation_letters({0, 1, 0.5}), "PH");
-}
-
-TEST(ViewPicture, GraysAreThoseOfTheXrayForADrrOfAnotherScale) {
-  Image<float> xray(20, 20), drr(20, 20);
-  for (std::size_t n = 0; n < xray.pixels.size(); ++n) {
-    drr.pixels[n] = static_cast<float>(n);
-    xray.pixels[n] = 3.0F * drr.pixels[n] + 50.0F;
-  }
-  ViewPicture picture;
-  put_grays(picture, xray, drr, drr, Image<std::uint8_t>(20, 20, 1));
-  for (std::size_t n = 0; n < xray.pixels.size(); ++n)
-    EXPECT_NEAR(picture.drr_found.pixels[n], picture.xray.pixels[n], 1);
-  const auto gray = overlay(picture.xray, picture.drr_found);
-  EXPECT_NEAR(gray.at(10, 10)[0], gray.at(10, 10)[1], 1);
 }
 
 }  // namespace

@@ -24,12 +24,13 @@ class StudyFilesTest : public testing::Test {
     std::filesystem::copy(other.path(), study_.path() / name, std::filesystem::copy_options::recursive);
   }
 
-  StudyParts find(NamedParts named = {}) {
+  StudyParts find(StudyParts named = {}) {
     named.study = study_.path();
-    return find_parts(named);
+    notes_ = {};
+    return find_parts(named, false, notes_);
   }
 
-  std::string error_of_finding(NamedParts named = {}) {
+  std::string error_of_finding(StudyParts named = {}) {
     try {
       find(std::move(named));
     } catch (const Error& error) {
@@ -39,6 +40,7 @@ class StudyFilesTest : public testing::Test {
   }
 
   SmallStudy study_;
+  Notes notes_;  // of the last find()
 };
 
 TEST_F(StudyFilesTest, FindsThePartsOfOneStudy) {
@@ -46,7 +48,7 @@ TEST_F(StudyFilesTest, FindsThePartsOfOneStudy) {
   EXPECT_EQ(parts.ct.size(), 36U);
   EXPECT_EQ(parts.plan, study_.plan());
   EXPECT_THAT(parts.images, ElementsAre(study_.image(0), study_.image(1)));
-  EXPECT_THAT(parts.left_aside, ElementsAre(HasSubstr("truth.json: not a DICOM file")));
+  EXPECT_THAT(notes_.left_aside, ElementsAre(HasSubstr("truth.json: not a DICOM file")));
 }
 
 TEST_F(StudyFilesTest, TakesTheCtInThePlansFrameOfReferenceAndSaysWhatItLeft) {
@@ -55,7 +57,7 @@ TEST_F(StudyFilesTest, TakesTheCtInThePlansFrameOfReferenceAndSaysWhatItLeft) {
   std::filesystem::remove_all(study_.path() / "other" / "RTIMAGE");
   const StudyParts parts = find();
   EXPECT_EQ(parts.ct.front(), study_.ct_slice(0));
-  EXPECT_THAT(parts.left_aside, Contains(HasSubstr("CT0000.dcm and 35 more: CT series")));
+  EXPECT_THAT(notes_.left_aside, Contains(HasSubstr("CT0000.dcm and 35 more: CT series")));
 }
 
 TEST_F(StudyFilesTest, TakesThePlanThatTheXraysReferTo) {
@@ -63,7 +65,7 @@ TEST_F(StudyFilesTest, TakesThePlanThatTheXraysReferTo) {
   std::filesystem::remove_all(study_.path() / "other" / "RTIMAGE");
   const StudyParts parts = find();
   EXPECT_EQ(parts.plan, study_.plan());
-  EXPECT_THAT(parts.left_aside, Contains(HasSubstr("other/RTPLAN.dcm: an RT Plan that no X-ray refers to")));
+  EXPECT_THAT(notes_.left_aside, Contains(HasSubstr("other/RTPLAN.dcm: an RT Plan that no X-ray refers to")));
 }
 
 TEST_F(StudyFilesTest, TwoWholeStudiesNeedAName) {
@@ -78,8 +80,8 @@ TEST_F(StudyFilesTest, ANamedPlanLeavesTheOtherStudyAside) {
   EXPECT_EQ(parts.ct.front(), study_.path() / "other" / "CT" / "CT0000.dcm");
   EXPECT_EQ(parts.images.size(), 2U);
   EXPECT_THAT(parts.images.front().string(), HasSubstr("/other/"));
-  EXPECT_THAT(parts.left_aside, Contains(study_.image(0).string() + ": an X-ray of another plan"));
-  EXPECT_THAT(parts.left_aside, Contains(study_.plan().string() + ": an RT Plan that was not named"));
+  EXPECT_THAT(notes_.left_aside, Contains(study_.image(0).string() + ": an X-ray of another plan"));
+  EXPECT_THAT(notes_.left_aside, Contains(study_.plan().string() + ": an RT Plan that was not named"));
 }
 
 TEST_F(StudyFilesTest, OfSeveralCtsInOneFrameTheStructureSetDecides) {
@@ -114,7 +116,7 @@ TEST_F(StudyFilesTest, OfSeveralCtsInOneFrameTheStructureSetDecides) {
 }
 
 TEST_F(StudyFilesTest, TakesTheOnlyStructureSetDrawnOnTheCt) {
-  EXPECT_EQ(find().structures, std::nullopt);
+  EXPECT_EQ(find().structures, std::filesystem::path());
   draw(study_, {{"Spine", {}}});
   EXPECT_EQ(find().structures, study_.structures());
   // Drawn on other images, although in the same frame of reference.
@@ -125,8 +127,8 @@ TEST_F(StudyFilesTest, TakesTheOnlyStructureSetDrawnOnTheCt) {
         .put(DCM_SeriesInstanceUID, "1.2.3");
   });
   const StudyParts parts = find();
-  EXPECT_EQ(parts.structures, std::nullopt);
-  EXPECT_THAT(parts.left_aside,
+  EXPECT_EQ(parts.structures, std::filesystem::path());
+  EXPECT_THAT(notes_.left_aside,
               Contains(study_.structures().string() + ": an RT Structure Set that was not drawn on the CT"));
 }
 
@@ -136,16 +138,17 @@ TEST_F(StudyFilesTest, OfSeveralStructureSetsThePlanOrAPersonDecides) {
   std::filesystem::copy(study_.structures(), second);
   edit(second, [](DicomItem d) { d.put(DCM_SOPInstanceUID, "1.2.3.5"); });
   StudyParts parts = find();
-  EXPECT_EQ(parts.structures, std::nullopt);
+  EXPECT_EQ(parts.structures, std::filesystem::path());
   for (const std::filesystem::path& file : {study_.structures(), second})
-    EXPECT_THAT(parts.left_aside, Contains(file.string() + ": one of 2 RT Structure Sets drawn on the CT; name the one "
-                                                           "meant: --structures FILE"));
+    EXPECT_THAT(notes_.left_aside,
+                Contains(file.string() + ": one of 2 RT Structure Sets drawn on the CT; name the one "
+                                         "meant: --structures FILE"));
 
-  NamedParts named;
+  StudyParts named;
   named.structures = study_.structures();
   parts = find(named);
   EXPECT_EQ(parts.structures, study_.structures());
-  EXPECT_THAT(parts.left_aside, Contains(second.string() + ": an RT Structure Set that was not named"));
+  EXPECT_THAT(notes_.left_aside, Contains(second.string() + ": an RT Structure Set that was not named"));
 
   edit(study_.plan(), [](DicomItem d) {
     d.append_item(DCM_ReferencedStructureSetSequence).put(DCM_ReferencedSOPInstanceUID, "1.2.3.5");
@@ -153,9 +156,9 @@ TEST_F(StudyFilesTest, OfSeveralStructureSetsThePlanOrAPersonDecides) {
   std::filesystem::copy(second, copy);
   parts = find();
   EXPECT_EQ(parts.structures, second);
-  EXPECT_THAT(parts.left_aside,
+  EXPECT_THAT(notes_.left_aside,
               Contains(study_.structures().string() + ": an RT Structure Set that the plan does not refer to"));
-  EXPECT_THAT(parts.left_aside, Contains(copy.string() + ": the same RT Structure Set as " + second.string()));
+  EXPECT_THAT(notes_.left_aside, Contains(copy.string() + ": the same RT Structure Set as " + second.string()));
 }
 
 TEST_F(StudyFilesTest, ACtInNoPlansFrameIsRefused) {
@@ -171,8 +174,8 @@ TEST_F(StudyFilesTest, LocalizersAndOtherObjectsAreLeftAside) {
   edit(study_.ct_slice(35), [](DicomItem d) { d.put(DCM_SOPClassUID, "1.2.840.10008.5.1.4.1.1.4"); });
   const StudyParts parts = find();
   EXPECT_EQ(parts.ct.size(), 34U);
-  EXPECT_THAT(parts.left_aside, Contains(HasSubstr("CT0000.dcm: a CT localizer")));
-  EXPECT_THAT(parts.left_aside, Contains(HasSubstr("CT0035.dcm: MRImageStorage")));
+  EXPECT_THAT(notes_.left_aside, Contains(HasSubstr("CT0000.dcm: a CT localizer")));
+  EXPECT_THAT(notes_.left_aside, Contains(HasSubstr("CT0035.dcm: MRImageStorage")));
 }
 
 TEST_F(StudyFilesTest, WhatWasNamedIsWhatTheMessageNames) {
@@ -180,7 +183,7 @@ TEST_F(StudyFilesTest, WhatWasNamedIsWhatTheMessageNames) {
             "no RT Image found (searched " + study_.truth().string() + ").\n       Name the X-rays: --image FILE");
   EXPECT_EQ(error_of_finding({.study = {}, .ct = {}, .images = {}, .plan = study_.truth()}),
             study_.truth().string() + ": holds no RT Plan");
-  NamedParts named;
+  StudyParts named;
   named.structures = study_.plan();
   EXPECT_EQ(error_of_finding(named), study_.plan().string() +
                                          ": holds no RT Structure Sets, expected one.\n       Name the file: "

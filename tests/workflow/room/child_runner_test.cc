@@ -1,5 +1,6 @@
 #include "workflow/room/child_runner.h"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <signal.h>
@@ -10,6 +11,7 @@
 
 #include "base/output_folder.h"
 #include "tests/support/temporary_folder.h"
+#include "workflow/register/registration_messages.h"
 
 namespace isoshift {
 namespace {
@@ -18,7 +20,7 @@ namespace fs = std::filesystem;
 using namespace std::chrono_literals;
 using testing::HasSubstr;
 
-// A shell script stands in for isoshift register.
+// A shell script stands in for isoshift.
 class ChildRunnerTest : public testing::Test {
  protected:
   ChildRunnerTest() {
@@ -29,10 +31,11 @@ class ChildRunnerTest : public testing::Test {
 
   void begin(Runner& runner, const std::string& script) {
     const fs::path program = folder_ / "program";
+    fs::remove(program);
     write_text(program, "#!/bin/sh\ncd " + folder_.path().string() + "\n" + script + "\n");
     fs::permissions(program, fs::perms::owner_all);
     use_program(program);
-    runner.begin({.ct = {"/in/ct1", "/in/ct2"}, .images = {"/in/ap", "/in/lat"}, .plan = "/in/plan"}, folder_ / "out");
+    runner.begin(parts_, folder_ / "out");
   }
   static Runner::End end_of(Runner& runner) {
     for (;;) {
@@ -47,32 +50,54 @@ class ChildRunnerTest : public testing::Test {
 
   TemporaryFolder folder_;
   WatchFile file_;
+  const StudyParts parts_ = {.ct = {"/in/ct1", "/in/ct2"}, .images = {"/in/ap", "/in/lat"}, .plan = "/in/plan"};
 };
 
 TEST_F(ChildRunnerTest, RegistersThePartsUnderTheSiteFile) {
   ChildRunner runner(file_);
-  begin(runner, "echo $* >words; mkdir out; echo {} >out/result.json; exit 3");
+  begin(runner, "echo $* >words; cat >order; mkdir out; echo {} >out/result.json; exit 3");
   EXPECT_FALSE(end_of(runner).failure);
-  EXPECT_EQ(text_of("words"), "register --ct /in/ct1 /in/ct2 --image /in/ap /in/lat --plan /in/plan --site " +
-                                  file_.site.path.string() + " --output " + (folder_ / "out").string() +
-                                  " --preset=fast\n");
+  EXPECT_EQ(text_of("words"), "__child register\n");
+  EXPECT_EQ(
+      registration_order_from(text_of("order"), "the order"),
+      (RegistrationOrder{
+          .parts = parts_, .flags = {"--preset=fast"}, .site = folder_ / "site.json", .output = folder_ / "out"}));
 }
 
-TEST_F(ChildRunnerTest, TheErrorThatWasPrintedIsTheReason) {
+TEST_F(ChildRunnerTest, TheFailureThatIsAnsweredIsTheReason) {
   ChildRunner runner(file_);
-  begin(runner, "echo warning: x; echo 'error: no CT\n       Name its folder' >&2; exit 1");
+  write_text(folder_ / "answer", to_line(RegistrationMessage(Ready())) +
+                                     to_line(RegistrationMessage(Failed{"no CT\n       Name its folder"})));
+  begin(runner, "echo 'error: of a library' >&2; cat answer");
   const Runner::End end = end_of(runner);
   ASSERT_TRUE(end.failure);
   EXPECT_EQ(end.failure->why, "error: no CT\n       Name its folder");
   EXPECT_TRUE(end.failure->may_be_over_soon);
 }
 
+TEST_F(ChildRunnerTest, AnAnswerThatIsNoneIsAFailureThatNamesTheChild) {
+  ChildRunner runner(file_);
+  begin(runner, "echo hello");
+  EXPECT_THAT(end_of(runner).failure.value().why, HasSubstr("the message of the registration: is no JSON"));
+  begin(runner, "echo '{\"begun\":{}}'");
+  EXPECT_THAT(end_of(runner).failure.value().why, HasSubstr("the message of the registration: there is no key begun"));
+}
+
+// The program itself answers, not a script.
+TEST_F(ChildRunnerTest, TheErrorOfTheProgramIsTheReason) {
+  use_program(ISOSHIFT_PROGRAM);
+  ChildRunner runner(file_);
+  runner.begin(parts_, folder_ / "out");
+  EXPECT_EQ(end_of(runner).failure.value().why,
+            fmt::format("error: {}: cannot be read", (folder_ / "site.json").string()));
+}
+
 TEST_F(ChildRunnerTest, AnEndWithoutAResultIsAFailure) {
   ChildRunner runner(file_);
-  begin(runner, "kill -SEGV $$");
+  begin(runner, "echo 'driver: lost' >&2; kill -SEGV $$");
   const Runner::End end = end_of(runner);
   ASSERT_TRUE(end.failure);
-  EXPECT_THAT(end.failure->why, HasSubstr("ended with status 139 and left no result"));
+  EXPECT_THAT(end.failure->why, HasSubstr("ended with status 139 and left no result: driver: lost"));
 }
 
 TEST_F(ChildRunnerTest, ARegistrationThatDoesNotEndIsEnded) {

@@ -1,0 +1,92 @@
+// The folder of a result: written, read back, and seen by other programs.
+
+#include "io/report/result_folder.h"
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "base/error.h"
+#include "io/report/formats.h"
+#include "tests/support/command.h"
+#include "tests/support/oblique_report.h"
+#include "tests/support/temporary_folder.h"
+
+namespace isoshift {
+namespace {
+
+using testing::HasSubstr;
+using testing::Not;
+
+std::string text_of(const SetupResult& report) { return text_report(report_page(report)); }
+
+class ResultFolderTest : public testing::Test {
+ protected:
+  ResultFolderTest() {
+    report_.site = small_couch();
+    report_.uncertainty = {.translation_mm = {0.1, 0.2, 0.3}, .rotation_rad = {0.001, 0.002, 0.003}};
+    report_.stages = {{.name = "fine",
+                       .similarity = "ncc",
+                       .optimizer = "bobyqa",
+                       .parameters = {{"pixel_mm", 1.0}},
+                       .evaluations = 3,
+                       .termination = "converged",
+                       .best = {0.1, 0.4, 0.9}}};
+    report_.points = {{"centroid of PTV", {1, 2, 3}}};
+    report_.table_position_mm = Eigen::Vector3d(1, 2, 3);
+    report_.spatial_registration_uid = "2.25.1";
+    report_.views.front().match.consistency.parts = {{.center_px = {20, 20}, .width_px = 10, .disagrees = true}};
+    write_result(report_, folder_.path());
+  }
+  TemporaryFolder folder_;
+  SetupResult report_ = oblique_report(Verdict::kAccepted);
+};
+
+TEST_F(ResultFolderTest, IsReadBackWhole) {
+  const SetupResult read = read_result(folder_.path());
+  EXPECT_EQ(json_report(read), json_report(report_));
+  EXPECT_EQ(read.views[0].picture.drr_found.pixels, report_.views[0].picture.drr_found.pixels);
+  EXPECT_EQ(csv_report(read), csv_report(report_));
+  EXPECT_EQ(text_of(read), text_of(report_));
+}
+
+TEST_F(ResultFolderTest, ThePdfIsADicomObjectToo) {
+  const CommandOutcome checked = run_shell("dciodvfy -new " + (folder_ / "report.dcm").string());
+  EXPECT_THAT(checked.out, Not(HasSubstr("Error"))) << checked.out;
+  const CommandOutcome read = run_shell(fmt::format(
+      "/usr/bin/python3 -c \"import pydicom, sys; d = pydicom.dcmread('{0}/report.dcm'); "
+      "sys.exit(0 if d.EncapsulatedDocument[:d.EncapsulatedDocumentLength] == open('{0}/report.pdf', 'rb').read() "
+      "and "
+      "[s.ReferencedSOPInstanceUID for s in d.SourceInstanceSequence] == ['1.2.9', '1.2.3.4', '2.25.1'] and "
+      "d.StudyInstanceUID == '1.2.3' and d.PatientID == 'ID-1' and d.BurnedInAnnotation == 'YES' else 1)\"",
+      folder_.path().string()));
+  EXPECT_EQ(read.exit_status, 0) << read.out;
+}
+
+TEST_F(ResultFolderTest, WhatIsMissingOrSpoiledIsNamed) {
+  std::filesystem::remove(folder_ / "view1_found.png");
+  EXPECT_THROW(
+      {
+        try {
+          read_result(folder_.path());
+        } catch (const Error& error) {
+          EXPECT_THAT(error.what(), HasSubstr("view1_found.png: cannot be read as a PNG"));
+          throw;
+        }
+      },
+      Error);
+  EXPECT_THROW(report_from_json("{\"schema\": 2}", "result.json"), Error);
+  EXPECT_THROW(report_from_json("no json", "result.json"), Error);
+  EXPECT_THROW(read_result(folder_ / "nowhere"), Error);
+}
+
+// Opened, slid and seen in a browser.
+TEST_F(ResultFolderTest, ThePageWorksInABrowser) {
+  const CommandOutcome outcome =
+      run_shell(fmt::format("/usr/bin/python3 {}/tests/io/report/html_report_in_browser.py {}", ISOSHIFT_SOURCE_DIR,
+                            (folder_ / "report.html").string()));
+  EXPECT_EQ(outcome.exit_status, 0) << outcome.out;
+}
+
+}  // namespace
+}  // namespace isoshift

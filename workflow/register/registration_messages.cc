@@ -1,0 +1,113 @@
+#include "workflow/register/registration_messages.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <optional>
+
+#include "base/error.h"
+#include "base/json_file.h"
+#include "base/message.h"
+
+namespace isoshift {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::json;
+
+constexpr const char* kText = "a text";
+constexpr const char* kTexts = "a list of texts";
+
+RawText raw(const fs::path& path) { return {path.string()}; }
+RawText raw(const std::string& text) { return {text}; }
+
+template <class T>
+std::vector<RawText> raw(const std::vector<T>& texts) {
+  std::vector<RawText> all;
+  for (const T& text : texts) all.push_back(raw(text));
+  return all;
+}
+
+template <class T>
+std::vector<T> texts_in(JsonSection& section, const char* key) {
+  std::vector<T> texts;
+  for (RawText& text : section.required<std::vector<RawText>>(key, kTexts)) texts.emplace_back(std::move(text.bytes));
+  return texts;
+}
+
+std::string text_in(JsonSection& section, const char* key) { return section.required<RawText>(key, kText).bytes; }
+
+Verdict verdict_in(JsonSection& section) {
+  const std::string word = section.required<std::string>("verdict", "a verdict");
+  for (const Verdict verdict : {Verdict::kAccepted, Verdict::kReview, Verdict::kRejected})
+    if (to_string(verdict) == word) return verdict;
+  section.refuse("verdict", "a verdict");
+}
+
+struct ToJson {
+  Json operator()(const Ready&) const { return {{"ready", Json::object()}}; }
+  Json operator()(const Ended& ended) const { return {{"ended", {{"verdict", to_string(ended.verdict)}}}}; }
+  Json operator()(const Failed& failed) const {
+    return {{"failed", {{"why", raw(failed.why)}, {"is_of_disk", failed.is_of_disk}}}};
+  }
+};
+
+}  // namespace
+
+std::string to_line(const RegistrationOrder& order) {
+  const StudyParts& parts = order.parts;
+  return line_of({{"register",
+                   {{"study", raw(parts.study)},
+                    {"ct", raw(parts.ct)},
+                    {"images", raw(parts.images)},
+                    {"plan", raw(parts.plan)},
+                    {"structures", raw(parts.structures)},
+                    {"flags", raw(order.flags)},
+                    {"site", raw(order.site)},
+                    {"anatomy", raw(order.anatomy)},
+                    {"output", raw(order.output)},
+                    {"at_a_time", order.at_a_time}}}});
+}
+
+std::string to_line(const RegistrationMessage& message) { return line_of(std::visit(ToJson(), message)); }
+
+RegistrationOrder registration_order_from(const std::string& line, const std::string& name) {
+  const Json json = json_from(line, name);
+  JsonSection message(json, name);
+  std::optional<JsonSection> section = message.section("register");
+  if (!section) message.refuse_missing("register", "an order");
+  message.end();
+  RegistrationOrder order{.parts = {.study = text_in(*section, "study"),
+                                    .ct = texts_in<fs::path>(*section, "ct"),
+                                    .images = texts_in<fs::path>(*section, "images"),
+                                    .plan = text_in(*section, "plan"),
+                                    .structures = text_in(*section, "structures")},
+                          .flags = texts_in<std::string>(*section, "flags"),
+                          .site = text_in(*section, "site"),
+                          .anatomy = text_in(*section, "anatomy"),
+                          .output = text_in(*section, "output"),
+                          .at_a_time = section->required<int>("at_a_time", "a number of registrations")};
+  if (order.at_a_time < 1) section->refuse("at_a_time", "at least 1");
+  section->end();
+  return order;
+}
+
+RegistrationMessage registration_message_from(const std::string& line, const std::string& name) {
+  const Json json = json_from(line, name);
+  JsonSection message(json, name);
+  std::optional<JsonSection> ready = message.section("ready"), ended = message.section("ended"),
+                             failed = message.section("failed");
+  message.end();
+  if (json.size() != 1) throw Error(fmt::format("{}: expected ready, ended or failed", message.where()));
+  JsonSection& section = ready ? *ready : ended ? *ended : *failed;
+  RegistrationMessage result = Ready();
+  if (ended) result = Ended{verdict_in(section)};
+  if (failed)
+    result =
+        Failed{.why = text_in(section, "why"), .is_of_disk = section.required<bool>("is_of_disk", "true or false")};
+  section.end();
+  return result;
+}
+
+}  // namespace isoshift

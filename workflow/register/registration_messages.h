@@ -1,0 +1,50 @@
+#pragma once
+// What a program that registers in child processes says to them, and what they answer.
+
+#include <filesystem>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "io/study/study_files.h"
+#include "setup/verdict.h"
+
+namespace isoshift {
+
+// One registration that a child shall do.
+struct RegistrationOrder {
+  StudyParts parts;
+  std::vector<std::string> flags;  // of isoshift register, without those that name parts, or the output
+  std::filesystem::path site;      // site file; empty: that of the flags, if any
+  std::string anatomy;             // empty: that of the flags, if any
+  std::filesystem::path output;
+  int at_a_time = 1;  // orders that are worked on at the same time, by children that share the cores
+
+  bool operator==(const RegistrationOrder&) const = default;
+};
+
+// A child says Ready once, and then Ended or Failed in answer to every order.
+struct Ready {
+  bool operator==(const Ready&) const = default;
+};
+struct Ended {
+  Verdict verdict = Verdict::kRejected;  // of the result, which is in the output folder
+
+  bool operator==(const Ended&) const = default;
+};
+struct Failed {
+  std::string why;
+  bool is_of_disk = false;  // WriteError: the same order may succeed later
+
+  bool operator==(const Failed&) const = default;
+};
+using RegistrationMessage = std::variant<Ready, Ended, Failed>;
+
+std::string to_line(const RegistrationOrder& order);
+std::string to_line(const RegistrationMessage& message);
+
+// `name` is how an Error calls a message that is damaged or unknown, with its sender: "the message of a worker".
+RegistrationOrder registration_order_from(const std::string& line, const std::string& name);
+RegistrationMessage registration_message_from(const std::string& line, const std::string& name);
+
+}  // namespace isoshift
