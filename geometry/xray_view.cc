@@ -34,6 +34,20 @@ XrayView XrayView::downscaled(int factor) const {
   return view;
 }
 
+namespace {
+
+// An image plane in the patient is where pixel sizes refer to, not where the panel stood: with SID = SAD, as files have
+// it whose panel's distance is not known, half of the patient lies behind the plane. Rays go on to where no patient is.
+// The camera is the same: a projection matrix has no scale.
+void lengthen_rays(XrayView& view, double sad_mm) {
+  constexpr double kLeastBehindMm = 250.0, kBehindMm = 1000.0;
+  const double of_isocenter = view.pixel_from_room(2, 3);
+  if ((1.0 / of_isocenter - 1.0) * sad_mm < kLeastBehindMm)
+    view.pixel_from_room *= sad_mm / (sad_mm + kBehindMm) / of_isocenter;
+}
+
+}  // namespace
+
 XrayView make_xray_view(const CarmGeometry& geometry, Beam beam) {
   const Eigen::Vector3d& u = geometry.row_direction;
   const Eigen::Vector3d& v = geometry.column_direction;
@@ -61,6 +75,7 @@ XrayView make_xray_view(const CarmGeometry& geometry, Beam beam) {
   view.columns = geometry.columns;
   view.rows = geometry.rows;
   view.beam = beam;
+  lengthen_rays(view, geometry.sad_mm);
   return view;
 }
 

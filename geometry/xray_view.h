@@ -11,14 +11,15 @@ namespace isoshift {
 enum class Beam { kKilovoltage, kMegavoltage };
 inline constexpr std::array kBeams = {Beam::kKilovoltage, Beam::kMegavoltage};
 
-// From the source to the center of a pixel on the receptor, both in mm in the room.
+// From the source to the center of a pixel on the receptor, both in mm in the room. Where the image plane lies within
+// 250 mm behind the isocenter, thus in the patient, the ray ends 1 m behind the isocenter instead.
 struct Ray {
   Eigen::Vector3d source_room_mm;
   Eigen::Vector3d pixel_room_mm;
 };
 
 // The camera of one X-ray image. Pixel centers lie at integer (column, row). The matrix is scaled so that the third
-// homogeneous coordinate is the fraction of the way from source to receptor plane (0 source, 1 receptor).
+// homogeneous coordinate is the fraction of the ray (0 source, 1 end of the ray).
 struct XrayView {
   Eigen::Matrix<double, 3, 4> pixel_from_room = Eigen::Matrix<double, 3, 4>::Zero();
   Eigen::Vector3d source_room_mm = Eigen::Vector3d::Zero();

@@ -45,7 +45,7 @@ void run_phantom(PhantomCommandOptions options, Console& console) {
 
 }  // namespace
 
-// Long because the command has many flags, one after the other.
+// NOLINTNEXTLINE(readability-function-size): long because the command has many flags, one after the other
 void add_phantom_command(CLI::App& app, Console& console, int&) {
   auto options = std::make_shared<PhantomCommandOptions>();
   CLI::App* command = app.add_subcommand("phantom", "Make a digital phantom study whose setup error is known");

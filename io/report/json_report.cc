@@ -200,7 +200,7 @@ Json references_json(const SetupResult& report) {
 
 }  // namespace
 
-// Long because result.json is: one line per key, in the order of the file.
+// NOLINTNEXTLINE(readability-function-size): long because result.json is: one line per key, in the order of the file
 std::string json_report(const SetupResult& report) {
   const ShownShift shown = shown_shift(report);
   Json json = {{"schema", 1},

@@ -154,7 +154,7 @@ Verdict verdict_from(const std::string& word) {
   return Verdict::kRejected;  // and what no version of isoshift says
 }
 
-// Long because result.json is: each key into its field.
+// NOLINTNEXTLINE(readability-function-size): long because result.json is: each key into its field
 SetupResult report_from(const Json& json) {
   SetupResult report;
   report.made_on = json.at("made_on");

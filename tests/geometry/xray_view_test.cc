@@ -169,6 +169,23 @@ TEST(XrayView, RayHitsWhatItsPixelShows) {
   }
 }
 
+// SID = SAD: pixel sizes refer to the isocenter's plane, and half of the patient lies behind it.
+TEST(XrayView, RaysPassThroughThePatientWhereTheImagePlaneDoesNot) {
+  CarmGeometry at_isocenter = base_geometry(30.0);
+  at_isocenter.receptor_translation_mm = Vector3d::Zero();
+  at_isocenter.column_spacing_mm = at_isocenter.row_spacing_mm = 0.4 / 1.5;
+  at_isocenter.position_mm /= 1.5;
+  const XrayView view = make_xray_view(at_isocenter, Beam::kKilovoltage);
+  const XrayView behind = make_xray_view(base_geometry(30.0), Beam::kKilovoltage);
+  EXPECT_THAT(view.project(Vector3d(30, 20, 10)).value(),
+              VectorNear(behind.project(Vector3d(30, 20, 10)).value(), 1e-9));
+  const Ray ray = view.ray(100.0, 700.0);
+  EXPECT_THAT(view.project(ray.pixel_room_mm).value(), VectorNear(Vector2d(100.0, 700.0), 1e-9));
+  EXPECT_NEAR((ray.pixel_room_mm - view.source_room_mm).dot(view.central_direction_room()), 2000.0, 1e-6);
+  const Ray to_receptor = behind.ray(100.0, 700.0);
+  EXPECT_NEAR((to_receptor.pixel_room_mm - behind.source_room_mm).dot(behind.central_direction_room()), 1500.0, 1e-6);
+}
+
 TEST(XrayView, RefusesPointsBehindTheSource) {
   const XrayView view = make_xray_view(base_geometry(0), Beam::kKilovoltage);
   EXPECT_EQ(view.project(Vector3d(0, 0, 1200)), std::nullopt);
