@@ -25,6 +25,7 @@ RawText raw(const std::string& text) { return {text}; }
 template <class T>
 std::vector<RawText> raw(const std::vector<T>& texts) {
   std::vector<RawText> all;
+  all.reserve(texts.size());
   for (const T& text : texts) all.push_back(raw(text));
   return all;
 }
