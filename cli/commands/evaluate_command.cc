@@ -85,9 +85,10 @@ void add_evaluate_command(CLI::App& app, Console& console, int&) {
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
   command
-      ->add_option("--jobs", options.jobs,
-                   "Registrations at the same time, each on one thread; with 1, each uses all cores, as when its time "
-                   "is measured (default: cores)")
+      ->add_option(
+          "--jobs", options.jobs,
+          "Registrations at the same time, each on one thread [one per core]; with 1, a registration uses all cores: "
+          "use this to measure its time")
       ->check(CLI::PositiveNumber);
   command->add_option("--table", flags->table, "Print a table of evaluations made earlier")->type_name("FOLDER...");
   add_registration_switches(*command, options.registration);

@@ -110,7 +110,7 @@ TEST_F(BatchCommandTest, NoCaseIsWorkedOnTwice) {
 TEST_F(BatchCommandTest, ATruncatedFileBesideMakesNoCase) {
   fs::resize_file(exported() / "1" / "RTIMAGE" / "KV_G090.dcm", 300);
   const CommandOutcome outcome = batch();
-  EXPECT_THAT(outcome.err, HasSubstr("make no case: a file beside them may be theirs"));
+  EXPECT_THAT(outcome.err, HasSubstr("belong to no case: a file beside these X-rays may belong to them"));
   EXPECT_EQ(summary()["cases"].size(), 3U);
 }
 

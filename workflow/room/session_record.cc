@@ -44,7 +44,7 @@ SessionRecord record_of(const std::string& session, const fs::path& folder) {
     throw Error(fmt::format("{}: is no result of isoshift register", (folder / kResultFile).string()));
   }
   if (const std::string name = session_name(xrays); name != session)
-    throw Error(fmt::format("{}: is the result of other X-rays: they make session {}, expected {}",
+    throw Error(fmt::format("{}: is the result of other X-rays: those of session {}, expected {}",
                             (folder / kResultFile).string(), name, session));
   return record;
 }
