@@ -42,7 +42,8 @@ struct StartPose {
   double mtre_mm = 0.0;
 };
 
-// The same for the same seed. Every start is drawn from a generator of its own, so that fewer are the first of more.
+// The same seed gives the same starts. Every start is drawn from a generator of its own, so that the first 50 of 200
+// starts are the same as 50 starts.
 std::vector<StartPose> start_poses(const Eigen::Isometry3d& truth, const StartProtocol& protocol);
 
 // One registration of an evaluation. Errors are found * truth^-1: translation at the isocenter and rotation vector.

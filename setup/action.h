@@ -1,5 +1,5 @@
 #pragma once
-// Whether a shift is larger than the site's action level: what a person decides by, apart from the verdict.
+// Whether a shift is larger than the site's action level, so that a person must act. Independent of the verdict.
 
 #include <array>
 #include <optional>

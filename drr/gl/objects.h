@@ -1,6 +1,6 @@
 #pragma once
-// Move-only OpenGL objects: buffers, textures, a render target, programs, a timer. All need a current GlContext, at
-// their end too.
+// Move-only OpenGL objects: buffers, textures, a render target, programs, a timer. All need a current GlContext, also
+// when they are destroyed.
 
 #include <Eigen/Core>
 #include <cstddef>

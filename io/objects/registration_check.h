@@ -1,6 +1,6 @@
 #pragma once
-// Whether a Spatial Registration object, of any program, says what it means, and who would read it otherwise: what
-// dciodvfy cannot know (docs/dicom.md, 4.5 and 6.3).
+// Checks a Spatial Registration object of any program for faults that dciodvfy cannot see: objects that contradict
+// themselves, and objects that some programs read differently (docs/dicom.md, 4.5 and 6.3).
 
 #include <Eigen/Geometry>
 #include <filesystem>

@@ -1,5 +1,5 @@
 #pragma once
-// Where a moving target will be: filters that bridge the time between an X-ray and the beam (docs/algorithms.md,
+// Filters that predict where a moving target will be when the beam reacts to an X-ray (docs/algorithms.md,
 // "Following a moving target").
 //
 //   auto predictor = make_predictor(PredictorKind::kRls, {.latency_s = 0.3});

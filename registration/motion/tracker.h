@@ -39,7 +39,7 @@ std::string_view to_string(FrameStatus status);
 struct TrackedFrame {
   double time_s = 0.0;
   FrameStatus status = FrameStatus::kBridged;
-  bool is_known = false;                       // the target has been found by now; else no number below is one
+  bool is_known = false;                       // the target has been found by now; else the numbers below mean nothing
   bool is_lost = false;                        // for several moments
   std::optional<Eigen::Vector3d> measured_mm;  // components along an unseen direction are the filter's
   Eigen::Vector3d filtered_mm = Eigen::Vector3d::Zero();
