@@ -24,7 +24,7 @@ std::vector<Finding> session_findings(std::span<const RtImage> images, Notes& no
 // Reasons to doubt that the views show one setup, so that a person must review the result:
 // - if not all views have read-outs of the table's position: views more than `max_span_s` apart, views with unknown
 //   times, and a view that was taken twice;
-// - in any case: views of two machines, and a table angle other than 0 that only some views have.
+// - in any case: views of two machines, and a table angle that is not 0 in one view and missing in another.
 std::vector<Finding> session_doubts(std::span<const RtImage> images, double max_span_s);
 
 // The differences between the table read-outs of `image` and `reference`, as far as both have them.
