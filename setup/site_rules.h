@@ -1,6 +1,6 @@
 #pragma once
-// What a site decided about its results: from which shift a person must act, which motions its couch can make, and
-// which scale the couch's display uses.
+// What a site decided about its results: from which setup error a person must act, which motions its couch can make,
+// and which scale the couch's display uses.
 
 #include <optional>
 #include <string>

@@ -36,7 +36,7 @@ struct CheckOptions {
 void CheckOptions::check() const {
   const auto check_finite = [](const char* flag, const auto& values) {
     for (const double value : values)
-      if (!std::isfinite(value)) throw UsageError(fmt::format("{}: {} is no finite number", flag, value));
+      if (!std::isfinite(value)) throw UsageError(fmt::format("{}: {} is not a finite number", flag, value));
   };
   check_finite("--isocenter", isocenter);
   check_finite("--source-isocenter", source_isocenter);

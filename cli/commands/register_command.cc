@@ -92,7 +92,8 @@ RegisterOptions register_options_from(const std::vector<std::string>& flags) {
 
 void add_register_command(CLI::App& app, Console& console, int& exit_status) {
   auto options = std::make_shared<RegisterOptions>();
-  CLI::App* command = app.add_subcommand("register", "Find the setup shift of an exported study");
+  CLI::App* command =
+      app.add_subcommand("register", "Find the setup error in an exported study, and the couch shift that undoes it");
   command->footer(
       "\nExample:\n  isoshift register exported/ -o result\n"
       "  isoshift register images/ --ct planning_ct/ --plan RTPLAN.dcm -o result --couch-angle 0\n\n"

@@ -34,7 +34,7 @@ struct CheckedRegistration {
   bool has_errors() const;
 };
 
-// Throws Error for a file that is no Spatial Registration.
+// Throws Error for a file that is not a Spatial Registration.
 CheckedRegistration check_registration(const std::filesystem::path& path);
 
 }  // namespace isoshift

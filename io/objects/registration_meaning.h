@@ -1,7 +1,7 @@
 #pragma once
 // What a Spatial Registration object of any program means for the couch, and how far two such objects lie apart. Both
-// need the position of the machine's isocenter in the source frame of the object. If this position is not known, there
-// is no number (docs/commands/check.md).
+// need the position of the machine's isocenter in the source frame of the object. If this position is not known, no
+// number is given (docs/commands/check.md).
 
 #include <Eigen/Geometry>
 #include <optional>

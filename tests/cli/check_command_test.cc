@@ -412,7 +412,7 @@ TEST_F(CheckCommandTest, TheShiftNeedsIsocenterAndPosition) {
   EXPECT_EQ(run_command({"check", plan()}).exit_status, 1);
   const CommandOutcome endless = run_command({"check", ours(), "--isocenter", "nan,2,3", "--patient-position", "HFS"});
   EXPECT_EQ(endless.exit_status, 2);
-  EXPECT_THAT(endless.err, HasSubstr("--isocenter: nan is no finite number"));
+  EXPECT_THAT(endless.err, HasSubstr("--isocenter: nan is not a finite number"));
   EXPECT_EQ(run_command({"check", ours(), "--source-isocenter", "nan,2,3"}).exit_status, 2);
   EXPECT_EQ(run_command({"check", ours(), "--plan", plan(), "--couch-roll", "inf"}).exit_status, 2);
   const CommandOutcome unused = run_command({"check", ours(), "--couch-pitch", "1"});

@@ -44,7 +44,7 @@ std::vector<std::string> parts_of(const std::string& cell) {
 
 void check_column(const std::string& name, const std::string& where) {
   if (std::ranges::find(kColumns, name) == kColumns.end())
-    throw Error(fmt::format("{}: \"{}\" is no column; expected {}", where, name, fmt::join(kColumns, ", ")));
+    throw Error(fmt::format("{}: \"{}\" is not a column; expected {}", where, name, fmt::join(kColumns, ", ")));
 }
 
 // libcsv calls back for every cell and every end of a line.

@@ -164,7 +164,7 @@ std::optional<Release> ResultsTree::release_of(const std::string& session) const
   try {
     release = release_from(file.json);
   } catch (const nlohmann::json::exception& error) {
-    throw Error(fmt::format("{}: is no release: {}", path.string(), error.what()));
+    throw Error(fmt::format("{}: is not a release: {}", path.string(), error.what()));
   }
   if (release.record != registered(session).sha256)
     throw Error(

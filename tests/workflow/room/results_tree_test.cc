@@ -425,7 +425,7 @@ TEST_F(ResultsTreeTest, DamagedFilesAreNamed) {
   replace_text(record(a_), "{");
   EXPECT_THAT(error_of_release(a_), HasSubstr(a_ + ".json"));
   replace_text(record(a_), "{\"session\": 7}");
-  EXPECT_THAT(error_of_release(a_), HasSubstr(a_ + ".json: is no record of a registered session"));
+  EXPECT_THAT(error_of_release(a_), HasSubstr(a_ + ".json: is not a record of a registered session"));
   write_text(released(a_), "[]");
   EXPECT_THAT(tree_.pending().refused[a_], HasSubstr("released/" + a_ + ".json"));
 }
