@@ -55,7 +55,7 @@ class JsonSection {
     refuse_missing(key, expected);
   }
   std::optional<double> number(const char* key, double low, double high);
-  // An object within; nothing where there is none.
+  // The object under a key; nothing if the key is missing.
   std::optional<JsonSection> section(const char* key);
 
   [[noreturn]] void refuse(const char* key, const char* expected) const;

@@ -73,7 +73,7 @@ struct EvaluationSummary {
   double rotation_share_of_failures = 0.0;  // mean
   double median_seconds = 0.0, mean_evaluations = 0.0;
   double rendering_share = 0.0, similarity_share = 0.0;  // of all time
-  int within_1_mm = 0, within_1_mm_accepted = 0;         // runs that ended there, and those of them accepted
+  int within_1_mm = 0, within_1_mm_accepted = 0;         // runs that ended there, and how many of them were accepted
   int beyond_2_mm = 0, beyond_2_mm_accepted = 0;
   // Share of runs whose true error lies within one and two sigma, per axis; nothing without sigmas.
   std::optional<std::array<double, 6>> within_one_sigma, within_two_sigma;
