@@ -15,7 +15,7 @@ class GracefulEnd {
   bool is_asked_for() const;
 };
 
-// For the thread that waits for signals: asks the run to end. Returns false if no run listens, or if it has been asked
+// For the thread that waits for signals: asks the run to end. Returns false if no run listens, or if one was asked
 // before.
 bool ask_for_end();
 

@@ -13,7 +13,7 @@ namespace isoshift {
 //   write_text(output.path() / "report.txt", report);
 //   output.commit();
 //
-// The folder holds one more file, .isoshift, which lists the others: a later run may replace only a folder with that
+// The folder holds one more file, .isoshift, which lists the others: a later run may replace only the files on this
 // list.
 class OutputFolder {
  public:

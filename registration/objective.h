@@ -43,8 +43,7 @@ class Objective {
   // Indices (row * columns + column) of the pixels compared in a view.
   std::span<const std::uint32_t> compared_pixels(std::size_t view) const { return compared_[view]; }
 
-  // Where the time went so far. The rendering time of a GPU is measured by its own clock; all other time counts as
-  // similarity.
+  // Where the time went so far. A GPU measures its rendering by its own clock; all other time counts as similarity.
   struct Seconds {
     double rendering = 0.0, similarity = 0.0;
   };

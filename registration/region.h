@@ -1,6 +1,5 @@
 #pragma once
-// Which pixels of the views are compared: those whose rays meet the volume of interest and meet nothing that is
-// excluded.
+// Which pixels of the views are compared: those whose rays meet the volume of interest and nothing that is excluded.
 
 #include <memory>
 #include <optional>

@@ -38,8 +38,7 @@ struct RtPlan {
 
 RtPlan read_rt_plan(const std::filesystem::path& path);
 
-// The beams with the given numbers; if the list is empty, all beams. Throws Error for a number that no beam of the plan
-// has.
+// The beams with the given numbers; if the list is empty, all beams. Throws Error for a number that no beam has.
 std::vector<RtPlan::Beam> selected_beams(const RtPlan& plan, std::span<const int> beam_numbers);
 
 // The isocenter that the beams share within 0.01 mm. Throws Error where they differ or none has one.
