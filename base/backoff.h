@@ -1,5 +1,5 @@
 #pragma once
-// When to try again what failed: after longer and longer times.
+// When to try again after a failure: after longer and longer pauses.
 
 #include <algorithm>
 #include <chrono>

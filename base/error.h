@@ -19,7 +19,7 @@ class UsageError : public Error {
   using Error::Error;
 };
 
-// The disk, not the work: what cannot be written now may be later.
+// A file cannot be written, for example because the disk is full. The same work may succeed later.
 class WriteError : public Error {
  public:
   using Error::Error;

@@ -8,8 +8,8 @@ namespace isoshift {
 
 class FileLock {
  public:
-  // Nothing where another process holds it. The file remains. Throws Error if it cannot be made.
-  // Shared: others may share it, and none may have it alone.
+  // Takes the lock; returns nothing if another process holds it. The file remains. Throws Error if the file cannot be
+  // made. kShared: other processes may share the lock, but none can take it alone.
   enum class Kind { kAlone, kShared };
   static std::optional<FileLock> try_take(const std::filesystem::path& path, Kind kind = Kind::kAlone);
   ~FileLock();

@@ -1,10 +1,10 @@
 #pragma once
-// Long runs that end in good order when they are interrupted: SIGINT or SIGTERM asks them to, a second one ends the
-// program at once.
+// Lets a long run end in good order when it is interrupted: the first SIGINT or SIGTERM asks the run to end, the second
+// ends the program at once.
 
 namespace isoshift {
 
-// While one exists, the first signal asks instead of ending the program. Not more than one at a time.
+// While an object of this class exists, the first signal does not end the program. Not more than one at a time.
 class GracefulEnd {
  public:
   GracefulEnd();
@@ -15,7 +15,8 @@ class GracefulEnd {
   bool is_asked_for() const;
 };
 
-// For the thread that waits for signals: asks, and returns whether anybody listens who had not been asked before.
+// For the thread that waits for signals: asks the run to end. Returns false if no run listens, or if one was asked
+// before.
 bool ask_for_end();
 
 }  // namespace isoshift

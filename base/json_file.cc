@@ -26,7 +26,7 @@ nlohmann::json json_from(const std::string& text, const std::string& where) {
   try {
     return nlohmann::json::parse(text, check_keys);
   } catch (const nlohmann::json::exception& error) {
-    throw Error(fmt::format("{}: is no JSON: {}", where, error.what()));
+    throw Error(fmt::format("{}: is not JSON: {}", where, error.what()));
   }
 }
 

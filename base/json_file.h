@@ -17,7 +17,7 @@ struct JsonFile {
   std::string sha256;  // of the file, hexadecimal
 };
 
-// Throws Error naming `where` for a text that is no JSON, or says a key of an object twice.
+// Throws Error naming `where` for a text that is not JSON, or in which an object has a key twice.
 nlohmann::json json_from(const std::string& text, const std::string& where);
 
 // Throws Error for a file that cannot be read, or whose text does what json_from() refuses.
@@ -28,7 +28,7 @@ inline constexpr bool is_array = false;
 template <class T, std::size_t N>
 inline constexpr bool is_array<std::array<T, N>> = true;
 
-// An object in such a file. Every key must be asked for: what is left at end() is a mistake. Throws Error.
+// An object in such a file. The reader asks for every key that it knows; end() throws Error for any other key.
 class JsonSection {
  public:
   // `where`: the file, and the place in it. The JSON must outlive the section.
@@ -55,7 +55,7 @@ class JsonSection {
     refuse_missing(key, expected);
   }
   std::optional<double> number(const char* key, double low, double high);
-  // An object within; nothing where there is none.
+  // The object under a key; nothing if the key is missing.
   std::optional<JsonSection> section(const char* key);
 
   [[noreturn]] void refuse(const char* key, const char* expected) const;

@@ -1,6 +1,6 @@
 #pragma once
-// Messages between processes: a JSON object per line. Each message is a struct with a to_line() and a reader beside it,
-// which uses JsonSection (base/json_file.h) and so names every mistake.
+// Messages between processes: a JSON object per line. Each message is a struct with a function to_line() and a reader.
+// The reader uses JsonSection (base/json_file.h), so that its errors name every mistake.
 
 #include <nlohmann/json_fwd.hpp>
 #include <string>

@@ -13,7 +13,8 @@ namespace isoshift {
 //   write_text(output.path() / "report.txt", report);
 //   output.commit();
 //
-// It lists its files in one of its own, .isoshift, by which a later run knows what it may replace.
+// The folder holds one more file, .isoshift, which lists the others: a later run may replace only the files on this
+// list.
 class OutputFolder {
  public:
   // Throws Error if `destination` holds anything and `overwrite` is false, if it holds anything that no output folder
@@ -26,7 +27,7 @@ class OutputFolder {
   const std::filesystem::path& path() const { return staging_; }
   const std::filesystem::path& destination() const { return destination_; }
 
-  // Flushes all files to the disk and puts the folder in its place, where an earlier output goes as a whole.
+  // Flushes all files to the disk and puts the folder in its place. An earlier output there is removed as a whole.
   void commit();
 
  private:
@@ -38,16 +39,16 @@ class OutputFolder {
   bool replaces_ = false;
 };
 
-// Removes what uncommitted output folders of this process hold so far. For a process that is told to end.
+// Removes all uncommitted output folders of this process. For a process that is told to end.
 void abandon_outputs() noexcept;
 
 // Waits until a file, or the names in a folder, are on the disk.
 void flush(const std::filesystem::path& path);
 
-// The whole text in place of what is there, flushed; with an Error what was there before remains.
+// Replaces the file by the whole text, and flushes it. After an Error the file is as it was before.
 void replace_text(const std::filesystem::path& path, std::string_view text);
 
-// The whole text or an Error naming the file.
+// Writes the whole text. Throws Error naming the file.
 void write_text(const std::filesystem::path& path, std::string_view text);
 
 }  // namespace isoshift

@@ -1,6 +1,6 @@
 #pragma once
-// Another program that runs beside this one: it is started, spoken with, limited in time, ended and waited for here and
-// nowhere else.
+// Another program that runs beside this one. Only this class starts programs, exchanges messages with them, limits
+// their time, ends them and waits for their end.
 //
 //   Process process({"isoshift", "__child", "register"}, {.program = this_program(), .limit = 30min});
 //   process.channel().send(order);
@@ -27,7 +27,7 @@ void use_program(std::filesystem::path program);
 // that a message of a library is never taken for a message of the child.
 int parent_socket();
 
-// What a registration may take. One that takes longer hangs.
+// The longest time that a registration may take: one that takes longer is taken to hang.
 inline constexpr std::chrono::minutes kLongestRegistration(30);
 
 struct ProcessOptions {
@@ -45,7 +45,7 @@ struct ProcessEnd {
   std::string output;    // what it printed and nobody took, without the last line's end
   std::string errors;    // the same of its standard error, where it was kept
 
-  // Whether it was killed from outside: by a signal that programs do not send to themselves.
+  // Whether another program killed it: it ended by a signal that programs do not send to themselves.
   bool is_from_outside() const;
 };
 

@@ -1,5 +1,5 @@
 #pragma once
-// SHA-256, hexadecimal: by what name results call the files they come from.
+// SHA-256, hexadecimal: results name the files they were made from by it.
 
 #include <filesystem>
 #include <string>

@@ -4,10 +4,10 @@
 
 namespace isoshift {
 
-// Whom the operating system takes for the user of this process.
+// The user of this process, as the operating system knows it.
 struct SystemUser {
   std::string name;       // of the account; its number where it has no name
-  std::string sudo_user;  // who became that account by sudo; empty: nobody
+  std::string sudo_user;  // the user who became that account by sudo; empty: none
 };
 
 SystemUser system_user();

@@ -78,7 +78,7 @@ int run_isoshift(int argc, const char* const* argv, Console& console) {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() == 0) return app.exit(error, console.out, console.err);
-    console.err << "error: " << error.what() << "\n       isoshift COMMAND --help says how it is meant\n";
+    console.err << "error: " << error.what() << "\n       isoshift COMMAND --help explains the flags\n";
     return kExitUsage;
   } catch (const UsageError& error) {
     return say(console, error, kExitUsage);

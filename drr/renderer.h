@@ -47,7 +47,7 @@ bool uses_gl(RendererKind kind);
 bool is_oracle(RendererKind kind);
 bool is_splatting(RendererKind kind);
 
-// Which OpenGL to render on: a GPU, or Mesa's llvmpipe on the CPU, which is never taken unless asked for.
+// Which OpenGL to render on: a GPU, or Mesa's llvmpipe on the CPU, which is used only if a person asks for it.
 enum class GlDevice { kHardware, kSoftware };
 
 // Wobbled splatting (docs/renderers.md, "Splatting").
@@ -135,9 +135,10 @@ class Renderer {
   virtual RaycastGlRenderer* on_gpu() { return nullptr; }
 };
 
-// A renderer for views of the given beam qualities; rendering another one is a logic error. Keeps its own copy of the
-// volume. Throws UsageError for a model or options that fail their check, and Error with the reason where there is no
-// such OpenGL or the volume exceeds its limits: never another renderer instead.
+// A renderer for views of the given beam qualities; to render a view of another quality is a logic error. Keeps its own
+// copy of the volume. Throws UsageError for a model or options that fail their check. Throws Error with the reason if
+// the OpenGL that the renderer needs is not available, or if the volume exceeds its limits: no other renderer is ever
+// used instead.
 std::unique_ptr<Renderer> make_renderer(RendererKind kind, const Volume<float>& ct_hu, const AttenuationModel& model,
                                         std::span<const Beam> beams, const RendererOptions& options = {});
 

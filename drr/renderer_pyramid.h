@@ -19,14 +19,15 @@ CoarserCt coarser_ct(const Volume<float>& ct_hu, const AttenuationModel& model, 
 
 class RendererPyramid {
  public:
-  // As make_renderer(), for the CT itself and for voxels of about 1, 2 and 4 mm where the CT's are finer.
+  // Makes renderers as make_renderer() does: one for the CT itself, and one each for voxels of about 1, 2 and 4 mm if
+  // the CT's voxels are finer.
   RendererPyramid(RendererKind kind, const Volume<float>& ct_hu, const AttenuationModel& model,
                   std::span<const Beam> beams, const RendererOptions& options = {});
 
   // Of the CT itself.
   Renderer& finest() const { return *levels_.front().renderer; }
 
-  // The coarsest whose voxels have edges up to `edge_mm`; the finest where there is none.
+  // The coarsest renderer whose voxels have edges of at most `edge_mm`; if there is none, the finest.
   Renderer& with_voxels_up_to(double edge_mm) const;
 
   // Edge of a cube as large as a voxel of the CT.

@@ -11,7 +11,7 @@ namespace isoshift {
 // sheared ones too. Throws UsageError for a margin that is negative or not finite.
 Volume<std::uint8_t> dilated(const Volume<std::uint8_t>& mask, double margin_mm);
 
-// Where the middle of its voxels lies. Precondition: one is not 0.
+// The mean position of the voxels that are 1. Precondition: there is one.
 Eigen::Vector3d centroid_patient_mm(const Volume<std::uint8_t>& mask);
 
 }  // namespace isoshift

@@ -12,7 +12,8 @@ struct MotionSample {
   Eigen::Vector3d position_mm = Eigen::Vector3d::Zero();
 };
 
-// Between the samples around a moment, linearly; nothing outside the trace. Precondition: times increase.
+// The position at a time, interpolated linearly between the samples before and after it; nothing outside the trace.
+// Precondition: times increase.
 std::optional<Eigen::Vector3d> position_at(std::span<const MotionSample> trace, double time_s);
 
 }  // namespace isoshift

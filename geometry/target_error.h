@@ -22,13 +22,13 @@ double mean_target_registration_error_mm(const Eigen::Isometry3d& found, const E
 double mean_projection_distance_mm(const Eigen::Isometry3d& found, const Eigen::Isometry3d& truth,
                                    std::span<const Eigen::Vector3d> targets_mm, const XrayView& view);
 
-// mRPD, mean reprojection distance: the mean of the shortest distance between a target at the truth and the ray that
-// meets it where it was found, mm: what one view can see of an error.
+// mRPD, mean reprojection distance: the mean distance between a target at its true place and the ray through the place
+// where it was found, mm. This is the part of an error that one view can see.
 double mean_reprojection_distance_mm(const Eigen::Isometry3d& found, const Eigen::Isometry3d& truth,
                                      std::span<const Eigen::Vector3d> targets_mm, const XrayView& view);
 
-// How much of an error comes from rotation: the mean distance over which the rotation about the isocenter alone moves
-// the targets, as a share of that and the translation. 0 for no error.
+// How much of an error comes from rotation: r / (r + t), where r is the mean distance over which the rotation about the
+// isocenter alone moves the targets, and t the length of the translation. 0 for no error.
 double rotation_share(const Eigen::Isometry3d& found, const Eigen::Isometry3d& truth,
                       std::span<const Eigen::Vector3d> targets_mm);
 

@@ -60,7 +60,7 @@ XrayView make_xray_view(const CarmGeometry& geometry, Beam beam);
 
 // The view of any other imager, by its projection matrix (up to scale) and the distance of its receptor plane from the
 // source. Throws Error for a matrix without a source, if the isocenter does not lie between source and receptor, or for
-// pixels that no receptor has: not of 0.05 to 6 mm, not at right angles, or more than twice as long as wide.
+// pixels that no receptor has: smaller than 0.05 mm, larger than 6 mm, oblique, or more than twice as long as wide.
 XrayView xray_view_from_matrix(const Eigen::Matrix<double, 3, 4>& pixel_from_room, double sid_mm, int columns, int rows,
                                Beam beam);
 

@@ -42,7 +42,8 @@ struct StartPose {
   double mtre_mm = 0.0;
 };
 
-// The same for the same seed. Every start is drawn from a generator of its own, so that fewer are the first of more.
+// The same seed gives the same starts. Every start is drawn from a generator of its own, so that the first 50 of 200
+// starts are the same as 50 starts.
 std::vector<StartPose> start_poses(const Eigen::Isometry3d& truth, const StartProtocol& protocol);
 
 // One registration of an evaluation. Errors are found * truth^-1: translation at the isocenter and rotation vector.
@@ -72,7 +73,7 @@ struct EvaluationSummary {
   double rotation_share_of_failures = 0.0;  // mean
   double median_seconds = 0.0, mean_evaluations = 0.0;
   double rendering_share = 0.0, similarity_share = 0.0;  // of all time
-  int within_1_mm = 0, within_1_mm_accepted = 0;         // runs that ended there, and those of them accepted
+  int within_1_mm = 0, within_1_mm_accepted = 0;         // runs that ended there, and how many of them were accepted
   int beyond_2_mm = 0, beyond_2_mm_accepted = 0;
   // Share of runs whose true error lies within one and two sigma, per axis; nothing without sigmas.
   std::optional<std::array<double, 6>> within_one_sigma, within_two_sigma;

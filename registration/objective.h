@@ -30,8 +30,8 @@ class Objective {
             const ObjectiveOptions& options);
   ~Objective();
 
-  // Similarity per view. Result [pose][view]. Computed where the renderer has its line integrals: on the GPU, if it can
-  // leave them there.
+  // Similarity per view. Result [pose][view]. If the renderer can leave its line integrals on the GPU, the similarity
+  // is computed there.
   std::vector<std::vector<double>> per_view(std::span<const Eigen::Isometry3d> room_from_patient);
 
   // What the similarities are computed from.
@@ -43,7 +43,7 @@ class Objective {
   // Indices (row * columns + column) of the pixels compared in a view.
   std::span<const std::uint32_t> compared_pixels(std::size_t view) const { return compared_[view]; }
 
-  // Where the time went so far. A GPU's rendering is by its own clock; what else is waited for counts as similarity.
+  // Where the time went so far. A GPU measures its rendering by its own clock; all other time counts as similarity.
   struct Seconds {
     double rendering = 0.0, similarity = 0.0;
   };

@@ -1,6 +1,6 @@
 #pragma once
-// Local optimization within a box, by NLopt. Points come in batches: the differences of a gradient, and of several
-// searches the steps of all, so that one call of the objective fills a machine.
+// Local optimization within a box, by NLopt. Points come in batches, so that one call of the objective keeps all cores
+// busy: the points for the differences of a gradient, and the next points of several searches.
 
 #include <array>
 #include <functional>
@@ -43,9 +43,9 @@ struct OptimizerResult {
 // One value per point.
 using BatchObjective = std::function<std::vector<double>(std::span<const std::vector<double>>)>;
 
-// The largest value of `objective` found by each of several searches, which go on in step: every call of the objective
-// holds what each of them asks for next. What one finds does not depend on the others. Exceptions of the objective pass
-// through.
+// Runs several searches at the same time and returns the largest value of `objective` that each of them found. Every
+// call of the objective holds the next points of all searches. The result of a search does not depend on the others.
+// Exceptions of the objective pass through.
 std::vector<OptimizerResult> maximize(const BatchObjective& objective, std::span<const OptimizerOptions> searches);
 
 }  // namespace isoshift

@@ -1,5 +1,5 @@
 #pragma once
-// What of the views is compared: pixels whose rays meet a volume of interest, and none that meet what is left out.
+// Which pixels of the views are compared: those whose rays meet the volume of interest and nothing that is excluded.
 
 #include <memory>
 #include <optional>
@@ -32,17 +32,18 @@ std::vector<CutEnds> beyond_the_ct(const Volume<float>& ct_hu, double threshold_
 Volume<float> only_inside(const Volume<float>& ct_hu, const Volume<std::uint8_t>& mask);
 Volume<float> without(const Volume<float>& ct_hu, const Volume<std::uint8_t>& mask);
 
-// Its projections. May be used from several threads.
+// The projections of a region of interest. May be used from several threads.
 class ProjectedRegion {
  public:
   // Everything is compared.
   ProjectedRegion() = default;
   explicit ProjectedRegion(const RegionOfInterest& region);
 
-  // Takes out of the field of an image what is not compared with the patient at a pose known to within `slack_mm`.
-  // None of what is left out takes more than nine tenths of the field: that stays, and the image says so. Ends of the
-  // CT stay without a word, and where the view looks along them also if they would take more than a quarter: all of a
-  // body too thick for the CT lies between them.
+  // Removes the pixels that are not compared from the field of an image. The patient's pose is known to within
+  // `slack_mm`. If an excluded volume would remove more than nine tenths of the field, it removes nothing, and the
+  // image says so (has_all_excluded). The space beyond the ends of the CT is removed in the same way, but the image
+  // does not say if it stays. If the view looks toward these ends, the limit is a quarter instead of nine tenths: with
+  // a body too thick for the CT, every ray passes through that space.
   void restrict(FixedImage& image, const Eigen::Isometry3d& room_from_patient, double slack_mm) const;
 
   // Whether a volume was chosen: X-rays then show what lies before and behind it, and DRRs do not.

@@ -20,8 +20,9 @@ namespace isoshift {
 
 enum class Dof { kRigid, kTranslation };
 
-// One stage. It begins where the one before ended, at one pose or the several that it kept, and at the best of
-// `candidates` poses drawn around within `reach`: `starts` in all, searched from in step. The best `keep` ends go on.
+// One stage. It searches from `starts` poses at the same time: from the poses that the stage before kept, and from the
+// best of `candidates` poses that are drawn around the first of them, within `reach`. It keeps the best `keep` poses at
+// which these searches end.
 struct Stage {
   std::string name;
   SimilarityKind similarity = SimilarityKind::kNcc;
@@ -64,8 +65,8 @@ struct FixedViews {
   std::vector<FixedImage> images;
   const ProjectedRegion& region;
 
-  // As a stage compares them: reduced as far as the pixel size allows, but to no fewer pixels than a small field needs,
-  // and restricted to the region with the patient at a pose known to within `slack_mm`.
+  // The images as a stage compares them: reduced to pixels of at most `pixel_mm` (smaller ones if the field is small),
+  // and restricted to the region, with the patient at a pose that is known to within `slack_mm`.
   std::vector<FixedImage> reduced_to(double pixel_mm, const Eigen::Isometry3d& room_from_patient,
                                      double slack_mm) const;
 };
@@ -74,7 +75,7 @@ SearchResult search(const RendererPyramid& renderers, const FixedViews& views,
                     const Eigen::Isometry3d& start_room_from_patient, const SearchOptions& options,
                     const SearchProgress& progress = {});
 
-// The same for a pose or images that may be nonsense; nothing where they leave too little to compare.
+// The same for a start or images that may make no sense; nothing if too few pixels are left to compare.
 std::optional<SearchResult> search_if_possible(const RendererPyramid& renderers, const FixedViews& views,
                                                const Eigen::Isometry3d& start_room_from_patient,
                                                const SearchOptions& options);

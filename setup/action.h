@@ -1,5 +1,5 @@
 #pragma once
-// Whether a shift is larger than the site's action level: what a person decides by, apart from the verdict.
+// Whether a setup error is larger than the site's action level, so that a person must act. Independent of the verdict.
 
 #include <array>
 #include <optional>
@@ -11,7 +11,7 @@
 
 namespace isoshift {
 
-// kUnset: there is no level, or the shift is not known well enough to tell.
+// kUnset: there is no action level, or the setup error is not known well enough to tell.
 enum class Action { kUnset, kWithin, kExceeds };
 std::string_view to_string(Action action);
 

@@ -12,8 +12,8 @@ namespace isoshift {
 Eigen::Isometry3d setup_error_from_poses(const Eigen::Isometry3d& planned_room_from_patient,
                                          const Eigen::Isometry3d& actual_room_from_patient);
 
-// What the couch must do about it: translate, then rotate about the isocenter. IEC 61217 table-top axes at imaging:
-// lateral + to the viewer's right facing the gantry, longitudinal + toward the gantry, vertical + up.
+// The motion of the couch that undoes it: a translation, then a rotation about the isocenter. IEC 61217 table-top axes
+// at imaging: lateral + to the viewer's right facing the gantry, longitudinal + toward the gantry, vertical + up.
 struct CouchShift {
   Eigen::Vector3d translation_mm = Eigen::Vector3d::Zero();  // lateral, longitudinal, vertical
   ZxyAngles change;  // yaw (z), pitch (x), roll (y): target angles minus the read-outs at imaging

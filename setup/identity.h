@@ -1,5 +1,5 @@
 #pragma once
-// Whom and which study something belongs to: attributes of PS3.3 C.7.1.1 and C.7.2.1.
+// To which patient and study an object belongs: attributes of PS3.3 C.7.1.1 and C.7.2.1.
 
 #include <string>
 

@@ -19,7 +19,7 @@ struct ViewPart {
   double correlation = 0.0;                                   // of X-ray and DRR where the pose puts it
   double best_correlation = 0.0;                              // where it matches best
   bool has_signal = false;                                    // it matches clearly somewhere
-  bool disagrees = false;                                     // and that is not where the pose puts it
+  bool disagrees = false;  // it has signal, and matches elsewhere than the pose puts it
 };
 
 struct ViewConsistency {
@@ -34,21 +34,21 @@ struct LeftOutView {
   double angle_rad = 0.0;
 };
 
-// Gradient correlation of one view over all that is compared, in pixels twice as large as those of the last stage.
+// How well one view matches: gradient correlation over all compared pixels, twice as large as those of the last stage.
 struct ViewMatch {
   std::string label;  // of the X-ray
   double similarity_start = -1.0;
   double similarity_final = -1.0;
-  bool has_all_excluded = true;         // what was excluded, with the patient at the pose found
-  ViewConsistency consistency;          // of its parts with the pose found
+  bool has_all_excluded = true;  // false: what should be excluded covers nearly all of the view, and was compared
+  ViewConsistency consistency;   // of its parts with the pose found
   std::optional<LeftOutView> left_out;  // with three or more views
 };
 
-// What the images would match like if they were not what they say they are.
+// How well the images would match if they were not what they say they are.
 struct Alternative {
   std::string description;   // "view 1 mirrored"
-  double similarity = 0.0;   // gradient correlation that the search reaches with it,
-  double as_is = 0.0;        // and in the same way with the images as they are
+  double similarity = 0.0;   // gradient correlation that the search reaches with this alternative,
+  double as_is = 0.0;        // and that the same search reaches with the images as they are
   double distance_mm = 0.0;  // between the poses found: translation at the isocenter,
   double angle_rad = 0.0;    // and rotation
 };
@@ -69,8 +69,8 @@ struct StageReport {
   double value = 0.0;  // the similarity reached
   std::string termination = "not run";
   bool reached_limit = false;  // the evaluations ran out before the search converged
-  // Between the poses that the starts ended at, where there were several: the largest distance of those that leave not
-  // clearly more unexplained than the best one from that.
+  // If the stage searched from several starts: how far the poses at which they ended lie from the best of these poses,
+  // at most. Poses that match clearly worse than the best one (a tenth more is unexplained) do not count.
   std::optional<double> spread_mm, spread_rad;
   std::vector<double> best;  // the similarity reached after each evaluation
 };
@@ -83,7 +83,7 @@ struct Registration {
   std::vector<Eigen::Vector3d> unobservable_room;  // unit directions along which the views cannot tell
   std::optional<Uncertainty> uncertainty;          // nothing: the images do not determine the pose
   std::vector<StageReport> stages;
-  std::vector<Alternative> alternatives;                                    // empty: the preset leaves them out
+  std::vector<Alternative> alternatives;                                    // empty: the preset does not check them
   double seconds = 0.0, seconds_rendering = 0.0, seconds_similarity = 0.0;  // in all, and of that in the search
 
   // Makes the verdict `to`, if that is worse than what it was, and adds the reason.

@@ -22,7 +22,7 @@ struct PatientErrors {
 };
 
 struct PopulationErrors {
-  std::size_t patients = 0;      // of them those with two fractions or more
+  std::size_t patients = 0;      // number of patients with two fractions or more
   ErrorComponents mean{};        // M
   ErrorComponents systematic{};  // Sigma
   ErrorComponents random{};      // sigma

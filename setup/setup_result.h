@@ -62,7 +62,7 @@ struct SetupResult : Registration {
   std::string attenuation;
   double threshold_hu = 0.0;
   std::optional<std::array<double, 2>> window_hu;                      // low, high; where attenuation is windowed
-  std::vector<std::pair<std::string, std::string>> renderer_settings;  // name and value of what it was asked to do
+  std::vector<std::pair<std::string, std::string>> renderer_settings;  // name and value of each setting of the renderer
   double seconds_load = 0.0, seconds_total = 0.0;
 
   struct Machine {
@@ -75,7 +75,7 @@ struct SetupResult : Registration {
   std::vector<std::string> overrides, warnings, left_aside;
 };
 
-// A setup error without what lies along directions that were not measured: no number is made from that.
+// A setup error without its part along directions that were not measured, since no number may be made from that part.
 Eigen::Isometry3d known_setup_error(Eigen::Isometry3d setup_error,
                                     const std::vector<Eigen::Vector3d>& unobservable_room);
 inline Eigen::Isometry3d known_setup_error(const SetupResult& result) {

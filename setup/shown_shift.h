@@ -11,8 +11,8 @@
 
 namespace isoshift {
 
-// What may be shown of the result: components along an unobservable direction are absent, and without a shift
-// (rejected) all of the couch's are.
+// What may be shown of the result. Components along an unobservable direction are absent. If the shift is withheld (the
+// result is rejected), all components of the couch shift are absent.
 struct ShownShift {
   std::array<std::optional<double>, 3> setup_error_mm;  // x, y, z, IEC 61217 fixed
   std::array<double, 3> setup_error_deg;                // rx, ry, rz of R = Rz Rx Ry
@@ -24,8 +24,8 @@ struct ShownShift {
   std::array<double, 3> couch_deg;         // yaw, pitch, roll: change of the read-outs
   std::array<double, 3> couch_target_deg;  // yaw, pitch, roll: resulting read-outs
   std::array<bool, 3> can_rotate;          // yaw, pitch, roll: whether the site's couch can
-  // What remains when it has applied what it can: at the isocenter, 50 mm from it along the patient, and at the points
-  // of the result. Nothing where a component is not determined.
+  // The error that remains after the couch has applied what it can of the shift: at the isocenter, 50 mm superior and
+  // inferior of it, and at the points of the result. Empty if a component is not determined.
   struct LeftOver {
     std::string at;
     Eigen::Vector3d mm = Eigen::Vector3d::Zero();  // IEC 61217 fixed

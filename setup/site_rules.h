@@ -1,5 +1,6 @@
 #pragma once
-// What a site decided about its results: from which shift a person must act, what its couch can do, how it counts.
+// What a site decided about its results: from which setup error a person must act, which motions its couch can make,
+// and which scale the couch's display uses.
 
 #include <optional>
 #include <string>
@@ -11,14 +12,14 @@ namespace isoshift {
 
 enum class LengthUnit { kMm, kCm };
 
-// From which a person must act. At least one is set.
+// The setup error from which a person must act. At least one limit is set.
 struct ActionLevel {
   std::optional<double> translation_mm;  // along any axis
   std::optional<double> vector_mm;       // length of the translation
   std::optional<double> rotation_deg;    // about any axis
 };
 
-// How the couch's display counts, and who compared it with the couch.
+// The scale of the couch's display, and who compared this scale with the couch.
 struct ValidatedScale {
   CouchScale scale = CouchScale::kIec61217;
   std::string validated_by, validated_on;  // the day as YYYY-MM-DD

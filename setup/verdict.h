@@ -1,6 +1,6 @@
 #pragma once
-// Whether the numbers of a registration can be trusted: the word that registration finds, every output repeats and the
-// exit status tells.
+// Whether the numbers of a registration can be trusted. Registration finds the verdict, every output shows it, and the
+// exit status depends on it.
 
 #include <string_view>
 

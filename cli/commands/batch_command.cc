@@ -25,7 +25,7 @@ struct BatchFlags {
   bool scan = false, merge = false, json = false;
 };
 
-// Those that say which part of a batch runs, and how it is told.
+// The options that say which cases of a batch run, and how the outcome is printed.
 const std::set<std::string> kOfOneRun = {"cases", "output", "jobs", "shard", "merge", "slurm", "scan", "json", "help"};
 
 std::vector<std::string> kept_options(const CLI::App& command) {
@@ -123,7 +123,8 @@ void add_batch_command(CLI::App& app, Console& console, int& exit_status) {
       ->check(CLI::Range(1, 256))
       ->capture_default_str();
   const char* parts = "Beyond one machine";
-  command->add_option("--shard", flags->shard, "Register only part I of N; --merge then makes the summary of all parts")
+  command
+      ->add_option("--shard", flags->shard, "Register only shard I of N; --merge then makes the summary of all shards")
       ->type_name("I/N")
       ->group(parts);
   command->add_flag("--merge", flags->merge, "Only make the summary of the cases that have been registered")

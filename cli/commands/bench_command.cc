@@ -276,7 +276,7 @@ void add_bench_command(CLI::App& app, Console& console, int&) {
   std::vector<std::string> kinds;
   for (const RendererKind kind : kRendererKinds)
     if (!is_oracle(kind)) kinds.emplace_back(to_string(kind));
-  drr_command->add_option("--renderer", drr->renderers, "Predictors to measure; may be repeated [all]")
+  drr_command->add_option("--renderer", drr->renderers, "Renderers to measure; may be repeated [all]")
       ->check(CLI::IsMember(kinds));
   drr_command->add_option("--every", drr->every, "Of the 27,000 poses take every N-th")
       ->check(CLI::Range(1, kBenchPoses))

@@ -36,7 +36,7 @@ struct CheckOptions {
 void CheckOptions::check() const {
   const auto check_finite = [](const char* flag, const auto& values) {
     for (const double value : values)
-      if (!std::isfinite(value)) throw UsageError(fmt::format("{}: {} is no finite number", flag, value));
+      if (!std::isfinite(value)) throw UsageError(fmt::format("{}: {} is not a finite number", flag, value));
   };
   check_finite("--isocenter", isocenter);
   check_finite("--source-isocenter", source_isocenter);
@@ -46,7 +46,7 @@ void CheckOptions::check() const {
         std::pair("--couch-roll", couch_roll_deg)})
     if (angle_deg && !asks_for_shift)
       throw UsageError(
-          fmt::format("{} belongs to a couch shift: add --plan FILE, or --isocenter X,Y,Z and "
+          fmt::format("{} is used only for a couch shift: add --plan FILE, or --isocenter X,Y,Z and "
                       "--patient-position HFS",
                       flag));
   check_couch_angles(couch_angle_deg, couch_pitch_deg, couch_roll_deg);
@@ -151,12 +151,15 @@ Json describe(const RegistrationComparison& comparison, bool same_source_frame, 
   text += fmt::format("difference: {:.3f} mm at the isocenter, {:.3f} deg\n", difference.translation_mm,
                       deg_from_rad(difference.angle_rad));
   if (!same_source_frame)
-    text += "  note   their source frames differ: each was moved to begin at the machine's isocenter\n";
+    text +=
+        "  note   the objects have different source frames: for the comparison, the origin of each was moved to the "
+        "machine's isocenter\n";
   if (!comparison.has_patient_ids)
     text +=
         "  note   a PatientID (0010,0020) is empty: only their common frame of reference says that both are of one "
         "patient\n";
-  if (difference.other_is_inverted) text += "  error  the second one looks inverted: its inverse lies near the first\n";
+  if (difference.other_is_inverted)
+    text += "  error  the second object looks inverted: its inverse lies near the first object\n";
   return {{"translation_mm", difference.translation_mm},
           {"rotation_deg", deg_from_rad(difference.angle_rad)},
           {"looks_inverted", difference.other_is_inverted},
@@ -200,8 +203,8 @@ void add_check_command(CLI::App& app, Console& console, int& exit_status) {
       "\nExample:\n  isoshift check result/spatial_registration.dcm --plan exported/RTPLAN.dcm\n"
       "  isoshift check result/spatial_registration.dcm clinic.dcm --source-isocenter 0,0,0\n"
       "  isoshift check from_room.dcm --plan RTPLAN.dcm --couch-angle 10 --couch-pitch 1.5 --couch-roll -0.5\n\n"
-      "Works with objects of any program. The exit status is 0 if all is right, and 1 if anything is wrong, or if the\n"
-      "couch shift or the difference that was asked for cannot be told.");
+      "Works with objects of any program. The exit status is 0 if no error was found. It is 1 if an error was found,\n"
+      "or if the couch shift or the difference was asked for and cannot be determined.");
   command->add_option("REGISTRATION", options->registrations, "One or two Spatial Registration objects")
       ->required()
       ->expected(1, 2)
@@ -220,12 +223,13 @@ void add_check_command(CLI::App& app, Console& console, int& exit_status) {
           "from the room's axes")
       ->type_name("DEG");
   command
-      ->add_option("--couch-pitch", options->couch_pitch_deg,
-                   "Table top pitch angle at imaging, IEC 61217; without it taken as 0, with a note")
+      ->add_option(
+          "--couch-pitch", options->couch_pitch_deg,
+          "Table top pitch angle at imaging, IEC 61217; without this flag the angle is taken as 0, with a note")
       ->type_name("DEG");
   command
       ->add_option("--couch-roll", options->couch_roll_deg,
-                   "Table top roll angle at imaging, IEC 61217; without it taken as 0, with a note")
+                   "Table top roll angle at imaging, IEC 61217; without this flag the angle is taken as 0, with a note")
       ->type_name("DEG");
   command
       ->add_option("--source-isocenter", options->source_isocenter,

@@ -64,7 +64,7 @@ void run_evaluate(EvaluateFlags& flags, Console& console) {
 void add_evaluate_command(CLI::App& app, Console& console, int&) {
   auto flags = std::make_shared<EvaluateFlags>();
   EvaluateOptions& options = flags->evaluation;
-  CLI::App* command = app.add_subcommand("evaluate", "Measure the accuracy of registration from many starting poses");
+  CLI::App* command = app.add_subcommand("evaluate", "Measure the accuracy of registration from many starts");
   command->footer(
       "\nExample:\n  isoshift evaluate exported/ --truth exported/truth.json -o evaluation\n"
       "  isoshift evaluate --table evaluation other_evaluation\n\n"
@@ -81,13 +81,14 @@ void add_evaluate_command(CLI::App& app, Console& console, int&) {
   command->add_option("--starts", flags->starts, "How many starts")->type_name("N");
   command->add_option("--distance", flags->distance_mm, "bins: the largest mTRE at the start; paper: the translation")
       ->type_name("MM");
-  command->add_option("--start-seed", flags->start_seed, "Seed of the random starting poses")
+  command->add_option("--start-seed", flags->start_seed, "Seed of the random starts")
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
   command
-      ->add_option("--jobs", options.jobs,
-                   "Registrations at the same time, each on one thread; with 1, each uses all cores, as when its time "
-                   "is measured (default: cores)")
+      ->add_option(
+          "--jobs", options.jobs,
+          "Registrations at the same time, each on one thread [one per core]; with 1, a registration uses all cores: "
+          "use this to measure its time")
       ->check(CLI::PositiveNumber);
   command->add_option("--table", flags->table, "Print a table of evaluations made earlier")->type_name("FOLDER...");
   add_registration_switches(*command, options.registration);

@@ -167,7 +167,7 @@ void run_inspect(const std::vector<std::filesystem::path>& paths, const std::opt
     throw Error(fmt::format("{} of the files cannot be read; see above", files.unreadable.size()));
   if (files.cts.empty() && files.images.empty() && files.other_xrays.empty() && files.plans.empty() &&
       files.structures.empty())
-    throw Error(fmt::format("{}: nothing that isoshift reads", paths.front().string()));
+    throw Error(fmt::format("{}: holds nothing that isoshift can read", paths.front().string()));
 }
 
 }  // namespace

@@ -96,12 +96,12 @@ void add_phantom_command(CLI::App& app, Console& console, int&) {
       ->capture_default_str();
   command
       ->add_option("--mv-angles", options->phantom.megavoltage_angles_deg,
-                   "Of the gantry angles, those taken with 6 MV")
+                   "Gantry angles at which the X-rays are taken with 6 MV")
       ->delimiter(',')
       ->type_name("DEG,...");
   command
       ->add_option("--breathing", options->phantom.breathing.seconds,
-                   "Let a thorax breathe for this time: an X-ray per moment, a 4D CT and truth.csv")
+                   "Let a thorax breathe for this time: X-rays over time, a 4D CT and truth.csv")
       ->type_name("S");
   command->add_option("--rate", options->phantom.breathing.rate_hz, "Moments per second")
       ->type_name("HZ")
@@ -110,9 +110,9 @@ void add_phantom_command(CLI::App& app, Console& console, int&) {
       ->check(CLI::Range(0, 20))
       ->capture_default_str();
   command
-      ->add_option(
-          "--trace", options->trace,
-          "Recorded motion for the target (t_s or Timestamp; x, y, z in patient axes, mm), from its first position")
+      ->add_option("--trace", options->trace,
+                   "Move the target as recorded in this trace (t_s or Timestamp; x, y, z in patient axes, mm), "
+                   "relative to the trace's first position")
       ->type_name("CSV");
   command
       ->add_option("--fractions", options->phantom.fractions,

@@ -87,8 +87,9 @@ Scores scores_of(const PredictOptions& options, Console& console) {
   });
   for (std::size_t trace = 0; trace < traces.size(); ++trace)
     if (scores.at(trace, 0, 0).samples == 0)
-      throw Error(fmt::format("{}: ends before the training does; nothing can be scored (--train-s)",
-                              options.traces[trace].string()));
+      throw Error(fmt::format(
+          "{}: is shorter than the training time, so that nothing can be scored; choose a shorter --train-s",
+          options.traces[trace].string()));
   return scores;
 }
 
@@ -163,8 +164,8 @@ void add_predict_command(CLI::App& app, Console& console, int&) {
   command->footer(
       "\nExample:\n  isoshift predict traces/*.csv\n  isoshift predict trace.csv --latency 115,450,630 -o "
       "prediction\n\n"
-      "A trace is CSV with the columns t_s (or Timestamp, ms) and x, y, z in mm; trace.csv of track is one.\n"
-      "Every sample after the training is predicted from the samples that are older than it by one latency.");
+      "A trace is CSV with the columns t_s (or Timestamp, ms) and x, y, z in mm, such as the trace.csv of track.\n"
+      "Every sample after the training time is predicted from the samples that are at least one latency older.");
   command->add_option("trace", options->traces, "Recorded traces")->required()->type_name("CSV...");
   command->add_option("--method", options->methods, "Predictors to measure; may be repeated [all]")
       ->check(CLI::IsMember(predictor_names()));

@@ -58,10 +58,11 @@ void add_result_options(CLI::App& command, RegisterOptions& options) {
   command.add_option("--anatomy", options.anatomy, "Anatomy of the site file whose action level applies")
       ->type_name("NAME");
   command.add_flag("--write-reg-for-review", options.write_reg_for_review,
-                   "Write the registration object for a result that needs review, too, marked as not accepted");
-  command.add_flag("--accept-unobservable", options.accept_unobservable,
-                   "Write the registration object, too, if the views cannot measure a direction; the error along it is "
-                   "then taken as 0");
+                   "Also write the registration object of a result for review, marked as not accepted");
+  command.add_flag(
+      "--accept-unobservable", options.accept_unobservable,
+      "Also write the registration object if the views cannot measure a direction; the setup error along it is "
+      "then taken as 0");
   command
       .add_option_function<std::string>(
           "--source-for",
@@ -91,7 +92,8 @@ RegisterOptions register_options_from(const std::vector<std::string>& flags) {
 
 void add_register_command(CLI::App& app, Console& console, int& exit_status) {
   auto options = std::make_shared<RegisterOptions>();
-  CLI::App* command = app.add_subcommand("register", "Find the setup shift of an exported study");
+  CLI::App* command =
+      app.add_subcommand("register", "Find the setup error in an exported study, and the couch shift that undoes it");
   command->footer(
       "\nExample:\n  isoshift register exported/ -o result\n"
       "  isoshift register images/ --ct planning_ct/ --plan RTPLAN.dcm -o result --couch-angle 0\n\n"

@@ -38,11 +38,12 @@ void run_release(const std::filesystem::path& file, const std::string& session, 
                  Console& console) {
   check_name(by);
   const WatchFile watch = read_watch_file(file);
-  // What another user writes the watch could not read.
+  // The user who runs watch could not read files that another user writes.
   struct stat of_results{};
   if (::stat(watch.results.c_str(), &of_results) == 0 && of_results.st_uid != ::geteuid())
-    throw Error(fmt::format("{}: belongs to another user, who runs isoshift watch: release as that one (sudo -u USER)",
-                            watch.results.string()));
+    throw Error(fmt::format(
+        "{}: belongs to another user, who runs isoshift watch: release the session as that user (sudo -u USER)",
+        watch.results.string()));
   ResultsTree tree(watch.results);
   const SystemUser user = system_user();
   const Release release =
@@ -62,9 +63,10 @@ void run_release(const std::filesystem::path& file, const std::string& session, 
   if (tree.pending_of(release).empty())
     console.out << "sent\n";
   else if (lock)
-    console.out << "not sent yet: isoshift watch, which does not run now, sends it, as often as it takes\n";
+    console.out
+        << "not sent yet, and isoshift watch is not running: once it runs, it tries until every peer has confirmed\n";
   else
-    console.out << "isoshift watch sends it, as often as it takes\n";
+    console.out << "isoshift watch sends it, and tries until every peer has confirmed\n";
 }
 
 }  // namespace
@@ -79,10 +81,14 @@ void add_release_command(CLI::App& app, Console& console, int& exit_status) {
       app.add_subcommand("release", "Release a result that watch holds, and send it to the DICOM peers");
   command->footer(
       "\nExample:\n  isoshift release 3fa94c1e02b7 --by \"J. Doe\"\n\n"
-      "Checks that the session is what was registered, records who released what, as which user of the system, then\n"
-      "sends spatial_registration.dcm, where there is one, and report.dcm.");
-  command->add_option("session", options->session, "As index.html names it")->required()->type_name("SESSION");
-  command->add_option("--by", options->by, "Who has looked at it and releases it")->required()->type_name("NAME");
+      "Checks that the result was not changed after the registration, and records who released it, as which\n"
+      "user of the system. Then sends report.dcm and, if the result has one, spatial_registration.dcm.");
+  command->add_option("session", options->session, "Name of the session, as index.html shows it")
+      ->required()
+      ->type_name("SESSION");
+  command->add_option("--by", options->by, "Name of the person who has looked at the report and releases the result")
+      ->required()
+      ->type_name("NAME");
   command->add_option("--watch", options->watch, "The watch file")->type_name("FILE")->capture_default_str();
   command->callback([options, &console, &exit_status] {
     run_release(options->watch, options->session, options->by, console);

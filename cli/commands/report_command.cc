@@ -50,9 +50,9 @@ void add_report_command(CLI::App& app, Console& console, int&) {
       ->type_name("FILE");
   command
       ->add_option("--anatomy", options->anatomy,
-                   "Anatomy of the site file whose action level applies [that of before]")
+                   "Anatomy of the site file whose action level applies [the one that was applied before]")
       ->type_name("NAME");
-  command->add_flag("--overwrite", options->overwrite, "Replace what is there");
+  command->add_flag("--overwrite", options->overwrite, "Replace an earlier output in that folder");
   command->callback([options, &console] { run_report(*options, console); });
 }
 

@@ -24,9 +24,10 @@ struct TrackFlags {
 void run_track(TrackFlags& flags, Console& console) {
   TrackOptions& options = flags.track;
   options.registration.settle();
-  if (!options.phases.empty() && flags.predictor != "model") throw UsageError("--phases are for --predictor model");
+  if (!options.phases.empty() && flags.predictor != "model")
+    throw UsageError("--phases works only with --predictor model");
   if (!options.phases.empty() && options.phases.size() < 4)
-    throw UsageError(fmt::format("{} phases: a cycle needs at least 4", options.phases.size()));
+    throw UsageError(fmt::format("--phases: {} folders, expected at least 4 phases of a cycle", options.phases.size()));
   options.tracking.latency_s = flags.latency_ms / 1000.0;
   options.tracking.predictor = predictor_kind_from(flags.predictor).value();
   options.tracking.dof = flags.six_dof ? Dof::kRigid : Dof::kTranslation;
@@ -57,8 +58,9 @@ void add_track_command(CLI::App& app, Console& console, int&) {
   add_study_options(*command, options.study);
   command->add_option("-o,--output", options.output, "Folder for the results")->required()->type_name("FOLDER");
   command
-      ->add_option("--follow", options.follow,
-                   "Folder into which X-rays arrive; tracking ends when none have come for a while, or with Ctrl-C")
+      ->add_option(
+          "--follow", options.follow,
+          "Folder into which X-rays arrive; tracking ends when no X-ray has arrived for --idle, or with Ctrl-C")
       ->type_name("FOLDER");
   command->add_option("--idle", options.idle_s, "With --follow: end after this time without an X-ray")
       ->type_name("S")
@@ -80,7 +82,9 @@ void add_track_command(CLI::App& app, Console& console, int&) {
       ->type_name("MS")
       ->check(CLI::Range(0.0, 1000.0))
       ->capture_default_str();
-  command->add_option("--budget", flags->budget_ms, "Moments whose registration takes longer are counted")
+  command
+      ->add_option("--budget", flags->budget_ms,
+                   "Time that a moment may take; the summary says how many moments took no longer")
       ->type_name("MS")
       ->capture_default_str();
   command->add_flag("--rigid", flags->six_dof, "Six degrees of freedom instead of the three translations");

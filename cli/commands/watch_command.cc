@@ -19,13 +19,14 @@
 namespace isoshift {
 namespace {
 
-// Flags of isoshift register that a watch file names must be some, and none of those that watch sets itself.
+// The flags in a watch file must be flags of isoshift register, without those that watch itself sets.
 RegisterOptions checked_registration_flags(const WatchFile& watch) {
   try {
     RegisterOptions options = register_options_from(watch.registration);
-    options.study.parts.study = watch.results;  // any: its words are what is checked
+    options.study.parts.study = watch.results;  // any folder will do: only the flags are checked
     (void)options.study.request();
-    if (!options.site.empty()) throw UsageError("--site is named by site, not here");
+    if (!options.site.empty())
+      throw UsageError("--site does not belong here: the key site of the watch file names the site file");
     (void)chosen_site(watch.site, options.anatomy);
     return options;
   } catch (const UsageError& error) {
@@ -43,7 +44,7 @@ void run_watch(const std::filesystem::path& file, Console& console) {
   const WatchFile watch = read_watch_file(file);
   const RegisterOptions flags = checked_registration_flags(watch);
   const GracefulEnd end;
-  std::signal(SIGPIPE, SIG_IGN);  // a peer or server that goes is told by what is called
+  std::signal(SIGPIPE, SIG_IGN);  // if a peer or a server closes a connection, the function that uses it reports that
   SystemClock clock;
   const auto server = watch.orthanc ? std::make_unique<RestOrthanc>(*watch.orthanc) : nullptr;
   const auto source = source_of(watch, server.get(), clock);
@@ -70,8 +71,8 @@ void add_watch_command(CLI::App& app, Console& console, int& exit_status) {
       app.add_subcommand("watch", "Register X-rays as they arrive from a treatment room, and hold the results");
   command->footer(
       "\nExample:\n  isoshift watch /etc/isoshift/watch.json\n\n"
-      "Follows a folder or an Orthanc server until it is stopped. index.html among the results lists the sessions.\n"
-      "Nothing is sent before it is released. The file: docs/commands/watch.md.");
+      "Follows a folder or an Orthanc server until it is stopped. index.html in the folder of the results lists the\n"
+      "sessions. Nothing is sent before it is released. docs/commands/watch.md describes the watch file.");
   command
       ->add_option(
           "file", *file,

@@ -6,17 +6,17 @@ void add_region_switches(CLI::App& command, RegionOptions& options) {
   const char* group = "Region of interest";
   command
       .add_option("--structure", options.structures,
-                  "Register this structure of the RT Structure Set only (may be given more than once)")
+                  "Register only this structure of the RT Structure Set; may be repeated")
       ->type_name("NAME")
       ->group(group);
   command
       .add_option("--around-isocenter", options.around_isocenter_mm,
-                  "Register what lies within this distance of the isocenter only")
+                  "Register only what lies within this distance of the isocenter")
       ->type_name("MM")
       ->group(group);
   command
       .add_option("--exclude", options.excluded,
-                  "Leave out a structure that moves on its own, such as the mandible, or the couch")
+                  "Exclude a structure that moves on its own, such as the mandible, or the couch")
       ->type_name("NAME")
       ->group(group);
   command

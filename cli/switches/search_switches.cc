@@ -15,7 +15,7 @@ std::vector<std::string> names_of(const Kinds& kinds) {
 }  // namespace
 
 void add_search_switches(CLI::App& command, SearchRequest& options) {
-  command.add_option("--preset", options.preset, "How to search: docs/presets.md says what is in each")
+  command.add_option("--preset", options.preset, "How poses are searched; docs/presets.md describes each preset")
       ->check(CLI::IsMember(std::vector<std::string>(kPresets.begin(), kPresets.end())))
       ->capture_default_str();
   command.add_option("--similarity", options.similarity, "With --preset paper: similarity [src]")
@@ -30,10 +30,10 @@ void add_search_switches(CLI::App& command, SearchRequest& options) {
       ->check(CLI::IsMember({"rigid", "translation"}))
       ->capture_default_str();
   command.add_flag("--check-vertebrae", options.check_vertebrae,
-                   "Compare with the patient one vertebra further to the head and to the feet");
+                   "Also try poses with the patient one vertebra further toward the head and toward the feet");
   command
       .add_option("--seed", options.seed,
-                  "Seed of the random choice of the pixels that are compared; nothing else is random")
+                  "Seed of the random choice of compared pixels and of candidates; nothing else is random")
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
 }

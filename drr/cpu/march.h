@@ -25,8 +25,8 @@ struct PlaneLattice {
 };
 
 // Rays from one source, all with or all against their main axis. In plane p, ray n meets column[n] + (p - plane) *
-// column_slope[n], and likewise its row. A ray counts from first_plane to last_plane; none does for a ray that is not
-// there.
+// column_slope[n], and likewise its row. A ray counts from first_plane to last_plane. If a packet has fewer than
+// sixteen rays, its other places repeat the first ray.
 struct RayPacket {
   int plane = 0;
   bool forward = true;  // with the main axis

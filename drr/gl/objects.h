@@ -1,6 +1,6 @@
 #pragma once
-// Move-only OpenGL objects: buffers, textures, a render target, programs, a timer. All need a current GlContext, at
-// their end too.
+// Move-only OpenGL objects: buffers, textures, a render target, programs, a timer. All need a current GlContext, also
+// when they are destroyed.
 
 #include <Eigen/Core>
 #include <cstddef>
@@ -74,7 +74,8 @@ class RenderTarget {
   enum class Depth { kNone, kFloat };
   RenderTarget(Pixel pixel, Depth depth);
 
-  // Makes it what is rendered into. What it held is lost. Throws Error where the driver's limit is smaller.
+  // Makes this image the target of rendering, with that size; its content is lost. Throws Error if the size exceeds the
+  // driver's limit.
   void resize_and_use(int columns, int rows);
   void clear(float depth) const;                 // all colors to 0
   void download(std::span<float> pixels) const;  // row by row; all of them or the first ones

@@ -1,5 +1,5 @@
 #pragma once
-// What a site knows about a machine and its files do not say, or say wrongly: a JSON file (docs/machine-profile.md).
+// What a site knows about a machine and the machine's files lack or say wrongly: a JSON file (docs/machine-profile.md).
 
 #include <filesystem>
 #include <map>
@@ -32,8 +32,8 @@ struct MachineProfile {
 // Throws Error naming the file, the place in it and what is expected there.
 MachineProfile read_machine_profile(const std::filesystem::path& path);
 
-// The image with the first rule that fits it applied, each change noted as an override. What the command line will
-// replace afterwards counts already where a rule needs SAD and SID. Throws Error if no rule fits.
+// Applies the first rule that fits the image, and notes each change as an override. If a rule needs SAD or SID and the
+// command line will replace them afterwards, the values of the command line are used. Throws Error if no rule fits.
 RtImage with_machine(RtImage image, const MachineProfile& profile, const RtImageSwitches& command_line, Notes& notes);
 
 }  // namespace isoshift

@@ -17,8 +17,8 @@ constexpr double kDefaultUntoldSpanS = 120.0;  // between those without table re
 struct SiteFile {
   // When a session of X-rays is complete.
   struct Sessions {
-    int views = 2;                            // so many X-rays are there,
-    double quiet_s = 0.0;                     // and nothing of the patient has come for so long
+    int views = 2;                            // this number of X-rays has arrived,
+    double quiet_s = 0.0;                     // and nothing of the patient has arrived for this time
     double max_span_s = kDefaultUntoldSpanS;  // between X-rays without table read-outs, or the result needs a review
   };
 
@@ -36,8 +36,8 @@ struct SiteFile {
 // Throws Error naming the file, the place in it and what is expected there.
 SiteFile read_site_file(const std::filesystem::path& path);
 
-// The level for an anatomy; without one, for "default", and nothing where the site has none of that name. Throws
-// UsageError, with the names there are, for an anatomy the site does not know.
+// The action level of an anatomy. If `anatomy` is empty: the level "default", or nothing if the file has no such level.
+// Throws UsageError, with the names in the file, for any other anatomy that the file does not have.
 std::optional<ActionLevel> action_level(const SiteFile& site, std::string_view anatomy);
 
 }  // namespace isoshift

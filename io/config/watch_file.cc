@@ -119,7 +119,7 @@ WatchFile read_watch_file(const fs::path& path) {
     if (watch.orthanc) throw Error(fmt::format("{}: folder and orthanc: expected one of them", path.string()));
     watch.folder = read.place(section, "folder", "the name of a folder");
     if (!fs::is_directory(watch.folder))
-      throw Error(fmt::format("{}: folder: {} is no folder", path.string(), watch.folder.string()));
+      throw Error(fmt::format("{}: folder: {} is not a folder", path.string(), watch.folder.string()));
   } else if (!watch.orthanc) {
     section.refuse_missing("folder", "the folder to follow, or orthanc: the server");
   }

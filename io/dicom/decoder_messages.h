@@ -1,5 +1,5 @@
 #pragma once
-// What is said to the child that decodes compressed pixels, and what it answers.
+// Messages to the child that decodes compressed pixels, and its answers.
 
 #include <cstdint>
 #include <filesystem>
@@ -16,7 +16,7 @@ struct FrameToDecode {
   bool operator==(const FrameToDecode&) const = default;
 };
 
-// Either the error, or the number of bytes; these follow after the line.
+// Either an error, or the number of bytes that follow after the line.
 struct DecodedFrame {
   std::optional<std::string> error;
   std::uint64_t bytes = 0;
@@ -27,7 +27,7 @@ struct DecodedFrame {
 std::string to_line(const FrameToDecode& request);
 std::string to_line(const DecodedFrame& answer);
 
-// `name` is how an Error calls a message that is damaged or unknown, with its sender: "the message of a worker".
+// Throws Error for a message that is damaged or unknown. `name` is what the Error calls it: "the message of a worker".
 FrameToDecode frame_to_decode_from(const std::string& line, const std::string& name);
 DecodedFrame decoded_frame_from(const std::string& line, const std::string& name);
 

@@ -1,7 +1,7 @@
 #pragma once
 // Compressed pixels of unknown origin are decoded in a child process with limits on memory, CPU and wall time: a
 // decoder that crashes or never ends costs one file, not the program (docs/dicom.md, 6.6). A child answers many
-// requests, one after the other; idle ones wait for the next.
+// requests, one after the other; between requests it waits.
 
 #include <cstdint>
 #include <filesystem>

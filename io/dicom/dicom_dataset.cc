@@ -65,7 +65,7 @@ std::vector<std::string> DicomItem::texts(const DcmTagKey& tag) const {
   DcmElement* element = nullptr;
   if (!has_value(tag) || item_->findAndGetElement(tag, element).bad()) return {};
   OFString whole;
-  if (element->getOFStringArray(whole).bad()) throw Error(fmt::format("{}: {} is no text", where_, described(tag)));
+  if (element->getOFStringArray(whole).bad()) throw Error(fmt::format("{}: {} is not text", where_, described(tag)));
   std::vector<std::string> values;
   std::string_view rest = whole;
   for (;;) {
@@ -87,7 +87,7 @@ std::optional<std::string> DicomItem::raw_text(const DcmTagKey& tag) const {
   DcmElement* element = nullptr;
   if (!has_value(tag) || item_->findAndGetElement(tag, element).bad()) return std::nullopt;
   OFString whole;
-  if (element->getOFStringArray(whole).bad()) throw Error(fmt::format("{}: {} is no text", where_, described(tag)));
+  if (element->getOFStringArray(whole).bad()) throw Error(fmt::format("{}: {} is not text", where_, described(tag)));
   const std::string_view value = trimmed(whole);
   if (value.empty()) return std::nullopt;
   return std::string(value);
@@ -104,7 +104,7 @@ std::vector<double> DicomItem::numbers(const DcmTagKey& tag) const {
       double value = 0.0;
       const auto [end, error] = std::from_chars(digits.begin(), digits.end(), value);
       if (error != std::errc() || end != digits.end() || !std::isfinite(value))
-        throw Error(fmt::format("{}: {} holds \"{}\", which is no finite number", where_, described(tag), written));
+        throw Error(fmt::format("{}: {} holds \"{}\", which is not a finite number", where_, described(tag), written));
       values.push_back(value);
     }
     return values;
@@ -129,7 +129,7 @@ std::vector<double> DicomItem::numbers(const DcmTagKey& tag) const {
     else if (element->getSint32(whole_signed, n).good())
       values.push_back(whole_signed);
     else
-      throw Error(fmt::format("{}: {} is no number", where_, described(tag)));
+      throw Error(fmt::format("{}: {} is not a number", where_, described(tag)));
     if (!std::isfinite(values.back()))
       throw Error(fmt::format("{}: {} is not a finite number", where_, described(tag)));
   }

@@ -68,7 +68,7 @@ class DicomFile {
   enum class Extent { kHeader, kWhole };  // kHeader stops before the pixel data
 
   DicomFile();  // a new, empty object
-  // Reads the file once: all that is told of it, its SHA-256 too, is of the same bytes.
+  // Reads the file once: header, pixels and SHA-256 come from the same bytes.
   static DicomFile read(const std::filesystem::path& path, Extent extent);
   DicomFile(DicomFile&&) noexcept;
   DicomFile& operator=(DicomFile&&) noexcept;

@@ -33,7 +33,7 @@ inline constexpr AllowKey kAllowKeys[] = {
     {"table-moved", "a table that moved between the views"},
 };
 
-// A check that failed. Where its key is allowed it becomes an override, else it must stop the run.
+// A check that failed. If its key is allowed, the finding becomes an override; else it must stop the run.
 struct Finding {
   std::string_view key;
   std::string message;

@@ -65,7 +65,7 @@ struct RtImage {
   std::optional<Eigen::Vector3d> isocenter_mm;  // IsocenterPosition, in this image's own frame of reference
 
   std::map<std::string, std::string, std::less<>> equipment;   // what machine profiles tell images apart by, by keyword
-  std::optional<Eigen::Matrix<double, 3, 4>> pixel_from_room;  // instead of all that follows from the attributes above
+  std::optional<Eigen::Matrix<double, 3, 4>> pixel_from_room;  // replaces the geometry of the attributes above
 
   int columns = 0, rows = 0;
   std::optional<std::string> intensity_relationship;
@@ -82,10 +82,10 @@ inline constexpr double kMaxAngleNoiseDeg = 0.01;  // read-outs such as 359.998 
 // The attributes that machine profiles may tell images apart by.
 extern const std::map<std::string, DcmTagKey, std::less<>> kEquipmentAttributes;
 
-// The frames of a file. Where items of the Exposure Sequence name frames (PS3.3 C.8.8.2.8), one that none names has no
-// geometry: it is left out, with a warning.
+// The frames of a file. If the items of the Exposure Sequence name frames (PS3.3 C.8.8.2.8), a frame that no item names
+// has no geometry: it is not used, with a warning.
 std::vector<RtImage> read_rt_images(const DicomFile& file, Notes& notes);
-// The same of a file that is read up to its pixels.
+// The same for a path: the file is read up to its pixels.
 inline std::vector<RtImage> read_rt_images(const std::filesystem::path& path, Notes& notes) {
   return read_rt_images(DicomFile::read(path, DicomFile::Extent::kHeader), notes);
 }
@@ -93,7 +93,7 @@ inline std::vector<RtImage> read_rt_images(const std::filesystem::path& path, No
 // Date and time of acquisition, else of the content.
 void read_acquisition_time(const DicomItem& dataset, RtImage& image);
 
-// What a person supplies for what the files lack; a value given here replaces a file's too, and that is noted.
+// Values that a person supplies because the files lack them. They also replace values of the files; this is noted.
 struct RtImageSwitches {
   std::map<std::string, double> gantry_angle_deg;  // by label
   std::optional<double> couch_angle_deg, couch_pitch_deg, couch_roll_deg, sad_mm, sid_mm;
@@ -108,7 +108,7 @@ struct RtImageSwitches {
 // command line.
 RtImage with_switches(RtImage image, const RtImageSwitches& switches, Notes& notes, const std::string& origin = "");
 
-// A required attribute without value: what it is for, and the switch that supplies it (empty: none does).
+// A required attribute without value, and the switch that supplies it (empty: no switch does).
 struct MissingAttribute {
   DcmTagKey tag;
   std::string supplied_by;
@@ -117,8 +117,8 @@ struct MissingAttribute {
 // Everything that registration needs and `image` lacks, all at once.
 std::vector<MissingAttribute> missing_attributes(const RtImage& image);
 
-// Findings about image type and origin of its angles; throws Error for what no one can allow (BLANK, FLUENCE, a tilted
-// gantry, values out of range).
+// Findings about the image type and the origin of the angles. Throws Error for faults that nobody may allow (BLANK,
+// FLUENCE, a tilted gantry, values out of range).
 std::vector<Finding> rt_image_findings(const RtImage& image);
 
 // The beam quality: KVP above 1000 is MV; without KVP by image type (PORTAL is MV), with a warning.
@@ -134,8 +134,8 @@ std::string acquired(const RtImage& image);
 // The label without the number of its frame.
 std::string imager_label(const RtImage& image);
 
-// Table read-outs at imaging, each from the first image that has it. Warns of angles that none has, taken as 0, and of
-// the switch that supplies them.
+// Table read-outs at imaging, each from the first image that has it. An angle that no image has is taken as 0, with a
+// warning that names the switch that supplies it.
 TableAngles table_angles(std::span<const RtImage> images, Notes& notes);
 
 // The imager's geometry in IEC terms. Precondition: nothing missing. Throws Error where values contradict each other.

@@ -114,7 +114,7 @@ std::vector<Finding> rt_image_findings(const RtImage& image) {
   const std::string where = image.path.string();
   std::vector<Finding> findings;
   if (image.image_type == "DRR")
-    findings.push_back({"drr", fmt::format("{}: {} says DRR: this is no X-ray", where, described(DCM_ImageType))});
+    findings.push_back({"drr", fmt::format("{}: {} says DRR: this is not an X-ray", where, described(DCM_ImageType))});
   else if (image.is_rt_image() && image.image_type != "PORTAL" && image.image_type != "SIMULATOR" &&
            image.image_type != "RADIOGRAPH")
     throw Error(fmt::format("{}: {} says \"{}\", expected PORTAL, SIMULATOR or RADIOGRAPH as its third value", where,

@@ -18,7 +18,8 @@ struct RtPlan {
     std::string name;
     std::optional<Eigen::Vector3d> isocenter_patient_mm;  // IsocenterPosition of the first control point
     std::optional<double> support_angle_deg;              // PatientSupportAngle of the first control point
-    // Of the patient setup that the beam refers to; without one what all setups agree on, and the largest displacement.
+    // Of the patient setup to which the beam refers. If it refers to none: the position that all setups share, and the
+    // largest displacement.
     std::optional<std::string> patient_position;
     Eigen::Vector3d setup_displacement_mm = Eigen::Vector3d::Zero();  // vertical, longitudinal, lateral (300A,01D2..6)
   };
@@ -37,7 +38,7 @@ struct RtPlan {
 
 RtPlan read_rt_plan(const std::filesystem::path& path);
 
-// The beams with the given numbers; all beams where the list is empty. Throws Error for a number the plan lacks.
+// The beams with the given numbers; if the list is empty, all beams. Throws Error for a number that no beam has.
 std::vector<RtPlan::Beam> selected_beams(const RtPlan& plan, std::span<const int> beam_numbers);
 
 // The isocenter that the beams share within 0.01 mm. Throws Error where they differ or none has one.

@@ -37,8 +37,9 @@ struct RtStructures {
 
 RtStructures read_rt_structures(const std::filesystem::path& path);
 
-// The structure of this name; where none is spelt so, the only one that differs in upper and lower case alone. Throws
-// Error, with the names there are, where none or several are meant, or where it has no closed contour.
+// The structure with this name; if there is none, the only structure whose name differs only in upper and lower case.
+// Throws Error, with the names in the file, if no structure or several structures fit, or if the structure has no
+// closed contour.
 const Structure& structure_named(const RtStructures& structures, std::string_view name);
 
 }  // namespace isoshift

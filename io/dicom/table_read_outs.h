@@ -30,7 +30,7 @@ struct TableReadOuts {
 // `number` gives the value of an attribute of the X-ray.
 TableReadOuts read_table_read_outs(const std::function<std::optional<double>(const DcmTagKey&)>& number);
 
-// A read-out with its attribute, for whoever goes through all of them.
+// A read-out with its attribute, for loops over all read-outs.
 struct TableReadOut {
   std::optional<double> TableReadOuts::* value;
   DcmTagKey tag;

@@ -19,7 +19,7 @@ std::size_t append(char* bytes, std::size_t size, std::size_t count, void* to) {
 std::string id_of(const nlohmann::json& one) {
   auto id = one.at("ID").get<std::string>();
   if (id.empty() || id.find_first_not_of("0123456789abcdef-") != std::string::npos)
-    throw Error(fmt::format("Orthanc: {} is no identifier of Orthanc's", id));
+    throw Error(fmt::format("Orthanc: {} is not an identifier of Orthanc", id));
   return id;
 }
 

@@ -1,5 +1,6 @@
 #pragma once
-// An Orthanc server: which instances have come, and their files. RestOrthanc asks by HTTP; tests answer by themselves.
+// An Orthanc server: the instances that it has received, and their files. RestOrthanc asks a server by HTTP; tests have
+// an Orthanc of their own.
 
 #include <cstdint>
 #include <string>
@@ -10,7 +11,7 @@
 
 namespace isoshift {
 
-// No answer, or one that was cut off.
+// The server gave no answer, or its answer was cut off.
 class ServerError : public Error {
  public:
   using Error::Error;
@@ -21,19 +22,19 @@ class Orthanc {
   virtual ~Orthanc() = default;
 
   struct Changes {
-    std::vector<std::string> instances;  // Orthanc's identifiers of those that are new
-    std::string mark;                    // tells the last change from that of another database; empty: no change
-    std::int64_t last = 0;               // to ask from next time
-    bool done = true;                    // no more for now
+    std::vector<std::string> instances;  // Orthanc's identifiers of the new instances
+    std::string mark;                    // of the last change: another database has another mark; empty: no change
+    std::int64_t last = 0;               // the change from which to ask next time
+    bool done = true;                    // there are no more changes for now
   };
-  // All three throw ServerError for a server that does not answer, Error for one that refuses or answers something
-  // else; both name it.
+  // The functions throw ServerError if the server does not answer, and Error if it refuses or answers something else.
+  // The messages name the server.
   virtual Changes changes_since(std::int64_t last, int limit) const = 0;
 
-  // The file as it was received; empty for one that has been deleted since.
+  // The file of an instance, as the server received it; empty if the instance has been deleted since.
   virtual std::string file_of(const std::string& instance) const = 0;
 
-  // All instances of the patient whose one of them is; none if it has been deleted since.
+  // All instances of the patient to whom this instance belongs; none if the instance has been deleted since.
   virtual std::vector<std::string> instances_beside(const std::string& instance) const = 0;
 };
 

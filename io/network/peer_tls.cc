@@ -73,7 +73,7 @@ void PeerTls::expect_host() {
   if (X509_VERIFY_PARAM_set1_ip_asc(expected, peer_.host.c_str()) == 1) return;
   ERR_clear_error();
   if (X509_VERIFY_PARAM_set1_host(expected, peer_.host.c_str(), 0) != 1)
-    throw PeerError(fmt::format("peer {}: host {}: is no name that a certificate can have", peer_.name, peer_.host));
+    throw PeerError(fmt::format("peer {}: host {}: is not a name that a certificate can have", peer_.name, peer_.host));
 }
 
 int PeerTls::check(X509_STORE_CTX* presented, void* self) {

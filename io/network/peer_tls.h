@@ -1,7 +1,7 @@
 #pragma once
 // TLS with a DICOM peer: PS3.15 B.10 (non-downgrading BCP 195), both sides with certificates. The handshake fails,
-// before anything of DICOM is sent, unless the peer's certificate is one that `ca` vouches for, and is the peer's: it
-// names the host, or it is the certificate that the watch file pins.
+// before anything of DICOM is sent, unless the peer's certificate is signed by an authority of `ca` and belongs to the
+// peer: it names the host, or it is the certificate that the watch file pins.
 
 #include <dcmtk/config/osconfig.h>
 // After osconfig.h.

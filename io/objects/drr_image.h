@@ -1,5 +1,5 @@
 #pragma once
-// DRRs as DICOM RT Images (PS3.3 A.17; image type DRR): what the room should have seen.
+// DRRs as DICOM RT Images (PS3.3 A.17; image type DRR): the X-rays that should have been taken.
 
 #include <filesystem>
 

@@ -1,5 +1,5 @@
 #pragma once
-// What every object that isoshift writes begins with: whose it is, its series, its equipment, when it was made.
+// The attributes of every object that isoshift writes: patient, study, series, equipment, and when it was made.
 
 #include <string>
 

@@ -56,7 +56,7 @@ class Checker {
     if (uid.empty())
       error(fmt::format("{}: {} is missing", name, described(tag)));
     else if (!is_uid(uid))
-      error(fmt::format("{}: {} is \"{}\", which is no UID", name, described(tag), uid));
+      error(fmt::format("{}: {} is \"{}\", which is not a UID", name, described(tag), uid));
     return uid;
   }
 
@@ -107,7 +107,8 @@ class Checker {
     }
     if (result_.registered_frame_uid == kIecFixedFrameUid) {
       error(
-          "dataset: registers the room (IEC 61217 Fixed), which is no CT's frame: the matrix takes the CT to the room");
+          "dataset: registers the room (IEC 61217 Fixed), which is not the frame of a CT: the matrix takes the CT to "
+          "the room");
       means_one_matrix_ = false;
     }
     if (!means_one_matrix_) result_.registered_from_source.reset();

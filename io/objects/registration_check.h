@@ -1,6 +1,6 @@
 #pragma once
-// Whether a Spatial Registration object, of any program, says what it means, and who would read it otherwise: what
-// dciodvfy cannot know (docs/dicom.md, 4.5 and 6.3).
+// Checks a Spatial Registration object of any program for faults that dciodvfy cannot see: objects that contradict
+// themselves, and objects that some programs read differently (docs/dicom.md, 4.5 and 6.3).
 
 #include <Eigen/Geometry>
 #include <filesystem>
@@ -34,7 +34,7 @@ struct CheckedRegistration {
   bool has_errors() const;
 };
 
-// Throws Error for a file that is no Spatial Registration.
+// Throws Error for a file that is not a Spatial Registration.
 CheckedRegistration check_registration(const std::filesystem::path& path);
 
 }  // namespace isoshift

@@ -1,7 +1,7 @@
 #pragma once
-// What a Spatial Registration object, of any program, means for the couch, and how far two of them lie apart. Both need
-// the machine's isocenter in the frame that the object starts from. Where nobody says where it lies, no number is given
-// (docs/commands/check.md).
+// What a Spatial Registration object of any program means for the couch, and how far two such objects lie apart. Both
+// need the position of the machine's isocenter in the source frame of the object. If this position is not known, no
+// number is given (docs/commands/check.md).
 
 #include <Eigen/Geometry>
 #include <optional>
@@ -29,8 +29,8 @@ struct PlannedSetup {
 // The matrix of an object as a rigid motion; nothing where the object holds none.
 std::optional<Eigen::Isometry3d> rigid_of(const CheckedRegistration& checked);
 
-// Throws UsageError where every object is known to start at the machine's isocenter and `source_isocenter_mm` says that
-// it lies elsewhere.
+// Throws UsageError if the source frame of every object is known to have its origin at the machine's isocenter, but
+// `source_isocenter_mm` names another point.
 void refuse_contradicting_isocenter(std::span<const CheckedRegistration> all,
                                     const Eigen::Vector3d& source_isocenter_mm);
 
@@ -43,7 +43,8 @@ struct RegistrationMeaning {
   std::optional<CouchShift> couch_shift;  // where `setup` was given and nothing stands in the way
 };
 
-// Adds to the findings what stands in the way, an error where `setup` asks for the couch shift, and what was assumed.
+// Adds findings: notes on what was assumed and on what prevents a number. If `setup` asks for the couch shift, what
+// prevents it is an error.
 RegistrationMeaning meaning_of(CheckedRegistration& checked, const std::optional<PlannedSetup>& setup,
                                const std::optional<Eigen::Vector3d>& source_isocenter_mm);
 

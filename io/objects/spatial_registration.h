@@ -44,7 +44,7 @@ std::string write_spatial_registration(const Study& study, const Eigen::Isometry
 // A Spatial Registration object of any program. Throws Error for anything else.
 DicomFile open_spatial_registration(const std::filesystem::path& path);
 
-// What R'R of a rotation may be off the identity per entry, as that of rounded numbers is.
+// How far the entries of R'R may lie from those of the identity, since the numbers of a stored rotation R are rounded.
 inline constexpr double kRigidTolerance = 1e-4;
 
 // A matrix as a rigid motion; nothing if it is none.

@@ -24,7 +24,7 @@ std::optional<double> number_from(const Json& json) {
   return json.is_null() ? std::nullopt : std::optional(json.get<double>());
 }
 
-// What is no number is written as null.
+// What is not a number is written as null.
 double or_nan(const Json& json) { return number_from(json).value_or(std::numeric_limits<double>::quiet_NaN()); }
 
 std::string text_from(const Json& json) { return json.is_null() ? "" : json.get<std::string>(); }
@@ -235,7 +235,7 @@ SetupResult report_from_json(const std::string& json, const std::string& where) 
   } catch (const Error& error) {
     throw Error(fmt::format("{}: {}", where, error.what()));
   } catch (const Json::exception& error) {
-    throw Error(fmt::format("{}: is no result of this program: {}", where, error.what()));
+    throw Error(fmt::format("{}: is not a result of this program: {}", where, error.what()));
   }
 }
 

@@ -68,7 +68,7 @@ SetupResult read_report(const std::filesystem::path& folder) {
   const std::filesystem::path path = folder / kResultFile;
   std::ifstream file(path, std::ios::binary);
   const std::string json{std::istreambuf_iterator<char>(file), {}};
-  if (!file) throw Error(fmt::format("{}: cannot be read: this is no folder of a result", path.string()));
+  if (!file) throw Error(fmt::format("{}: cannot be read: this is not the folder of a result", path.string()));
   return report_from_json(json, path.string());
 }
 

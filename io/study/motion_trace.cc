@@ -65,7 +65,7 @@ std::vector<MotionSample> read_motion_trace(const std::filesystem::path& path, N
       double value = 0.0;
       const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
       if (error != std::errc() || end != text.data() + text.size() || !std::isfinite(value))
-        throw Error(fmt::format("{}, line {}: \"{}\" is no number", path.string(), number, cells[column]));
+        throw Error(fmt::format("{}, line {}: \"{}\" is not a number", path.string(), number, cells[column]));
       return value;
     };
     const auto time = value_of(seconds ? *seconds : *milliseconds);

@@ -21,10 +21,10 @@ std::vector<Finding> patient_findings(const Identity& reference, const Identity&
 // that has the attribute. If only some views have the attribute, a warning names the others.
 std::vector<Finding> session_findings(std::span<const RtImage> images, Notes& notes);
 
-// Why it is not known that the views show one setup. Read-outs of the table's position in all views tell that it stood
-// still; without them, views more than `max_span_s` apart or of unknown times, and a view that was taken twice, are in
-// doubt. So are, in any case, views of two machines, and a table angle that only some views have. Results of such views
-// need a person's review.
+// Reasons to doubt that the views show one setup, so that a person must review the result:
+// - if not all views have read-outs of the table's position: views more than `max_span_s` apart, views with unknown
+//   times, and a view that was taken twice;
+// - in any case: views of two machines, and a table angle that is not 0 in one view and missing in another.
 std::vector<Finding> session_doubts(std::span<const RtImage> images, double max_span_s);
 
 // The differences between the table read-outs of `image` and `reference`, as far as both have them.

@@ -1,5 +1,5 @@
 #pragma once
-// From a folder to the checked input of one registration. The code that uses a Study needs no DICOM.
+// Makes the checked input of one registration from a folder. Code that uses a Study needs no DICOM.
 
 #include <memory>
 #include <optional>

@@ -207,7 +207,7 @@ StudyParts chosen(StudyFiles files, std::vector<StudyFiles::Plan> other_plans, c
       files.images.push_back(xray);
     else
       files.left_aside.push_back(
-          fmt::format("{}: an X-ray that is no RT Image; a machine profile can supply its geometry: --machine FILE",
+          fmt::format("{}: an X-ray that is not an RT Image; a machine profile can supply its geometry: --machine FILE",
                       xray.file.string()));
   }
   if (files.cts.empty())

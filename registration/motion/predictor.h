@@ -1,5 +1,5 @@
 #pragma once
-// Where a moving target will be: filters that bridge the time between an X-ray and the beam (docs/algorithms.md,
+// Filters that predict where a moving target will be when the beam reacts to an X-ray (docs/algorithms.md,
 // "Following a moving target").
 //
 //   auto predictor = make_predictor(PredictorKind::kRls, {.latency_s = 0.3});
@@ -26,14 +26,15 @@ class Predictor {
  public:
   virtual ~Predictor() = default;
 
-  // A measurement, later than all before. Its covariance says how well each direction was seen: huge along one that was
-  // not. Throws UsageError for another dimension, numbers that are not finite, or a time that does not advance.
+  // Takes a measurement that is later than all before. Its covariance says how well each direction was measured, and is
+  // huge along a direction that was not measured. Throws UsageError for another dimension, numbers that are not finite,
+  // or a time that does not advance.
   void add(double time_s, const Eigen::VectorXd& position_mm, const Eigen::MatrixXd& covariance_mm2);
 
   // At a moment that is not before the last measurement. Precondition: there is a measurement.
   virtual Prediction predict(double time_s) const = 0;
 
-  // Whether it has seen enough; until then it answers as hold-last does.
+  // Whether the predictor has seen enough measurements; until then it answers as hold-last does.
   virtual bool is_warm() const = 0;
 
  protected:

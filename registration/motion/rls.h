@@ -15,7 +15,8 @@ class RecursiveLeastSquares final : public Predictor {
   Prediction predict(double time_s) const override;
   bool is_warm() const override;
 
-  // One column per axis: the weights of the taps, the newest first and of each all axes, then of 1; for tests.
+  // For tests. A column per axis: the weights of the taps, newest first, with all axes of a tap together; then the
+  // weight of a constant 1.
   const Eigen::MatrixXd& weights() const { return weights_; }
 
  protected:

@@ -21,7 +21,7 @@ struct TrackingOptions {
   double first_reach_mm = 25.0;       // about the planned position, until the target is found, and after it is lost
   double pixel_mm = 1.0;              // at the isocenter
   double measurement_sigma_mm = 0.3;  // of a registration, per axis that is seen
-  double lost_share = 0.6;            // of the usual similarity: less is no measurement
+  double lost_share = 0.6;            // of the usual similarity: with less, the registration has failed
   double latency_s = 0.3;             // from an X-ray to the beam
   PredictorKind predictor = PredictorKind::kRls;
   PredictorOptions predictor_options;
@@ -30,8 +30,8 @@ struct TrackingOptions {
 
 enum class FrameStatus {
   kMeasured,  // in all directions
-  kPartly,    // along the view's direction nothing was seen: the filter carries that
-  kBridged,   // the registration failed: the filter carries all
+  kPartly,    // not along the direction of the views: the filter predicts that component
+  kBridged,   // the registration failed: the filter predicts all components
 };
 std::string_view to_string(FrameStatus status);
 
@@ -39,9 +39,9 @@ std::string_view to_string(FrameStatus status);
 struct TrackedFrame {
   double time_s = 0.0;
   FrameStatus status = FrameStatus::kBridged;
-  bool is_known = false;                       // the target has been found by now; else no number below is one
+  bool is_known = false;                       // the target has been found by now; else the numbers below mean nothing
   bool is_lost = false;                        // for several moments
-  std::optional<Eigen::Vector3d> measured_mm;  // components along an unseen direction are the filter's
+  std::optional<Eigen::Vector3d> measured_mm;  // components along an unseen direction come from the filter
   Eigen::Vector3d filtered_mm = Eigen::Vector3d::Zero();
   Eigen::Vector3d predicted_mm = Eigen::Vector3d::Zero();  // for one latency later
   Eigen::Vector3d sigma_mm = Eigen::Vector3d::Zero();      // of filtered_mm, one standard deviation
@@ -57,8 +57,8 @@ class Tracker {
           const Eigen::Isometry3d& planned_room_from_patient, const Eigen::Vector3d& target_patient_mm,
           TrackingOptions options);
 
-  // The views of one moment, later than all before; none: they could not be used, and the moment is bridged. Throws
-  // UsageError for a time that does not advance.
+  // Registers the views of one moment, which is later than all before. If there are no views, because none could be
+  // used, the filter bridges the moment. Throws UsageError for a time that does not advance.
   TrackedFrame track(double time_s, std::vector<FixedImage> views);
 
  private:

@@ -11,8 +11,9 @@
 
 namespace isoshift {
 
-// Searches with short stages, each time from the start; where an alternative comes close, more closely, at last with
-// the last of `options.stages`, and for the images as they are from the pose that registration found.
+// Searches for the pose of every alternative, with short stages and from the start. If an alternative matches nearly as
+// well as the images as they are, both are searched for more closely, at last with the last of `options.stages`. The
+// closer search of the images as they are begins at the pose that registration found.
 std::vector<Alternative> compare_alternatives(const RendererPyramid& renderers, const FixedViews& views,
                                               const Eigen::Isometry3d& start_room_from_patient,
                                               const SearchOptions& options, const SearchResult& found);

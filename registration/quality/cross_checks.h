@@ -1,5 +1,5 @@
 #pragma once
-// Searches again from the pose found, with something changed: less views, or one vertebra further.
+// Searches again from the pose found, with one view less, or with the patient one vertebra further.
 
 #include <span>
 #include <vector>
@@ -9,13 +9,14 @@
 
 namespace isoshift {
 
-// One per view; nothing where fewer than two would remain. `found` is what a search with `options` came to.
+// How far the pose moves without each of the views; empty if fewer than two views would remain. `found` is the result
+// of a search with `options`.
 std::vector<LeftOutView> leave_out_views(const RendererPyramid& renderers, const FixedViews& views,
                                          const Eigen::Isometry3d& start_room_from_patient, const SearchOptions& options,
                                          const SearchResult& found);
 
-// Vertebrae look alike: the best poses some 15 to 45 mm from the one found along the patient's head-feet axis, one per
-// direction, beside the pose found.
+// Vertebrae look alike. Compares the pose found with the best pose that lies about 15 to 45 mm away from it along the
+// patient's head-feet axis, in each direction.
 std::vector<Alternative> compare_vertebrae(const RendererPyramid& renderers, const FixedViews& views,
                                            const Eigen::Isometry3d& start_room_from_patient,
                                            const SearchOptions& options, const SearchResult& found);

@@ -11,7 +11,8 @@ namespace isoshift {
 // rays lie within 30 degrees of each other, as with a single view.
 std::vector<Eigen::Vector3d> unobservable_directions(std::span<const XrayView> views);
 
-// Sets verdict and reasons from all else in the result, and from the parameters found (PoseParameters).
+// Sets verdict and reasons from everything else in the result, and from the parameters of the pose found
+// (pose_parameters.h).
 void judge(std::span<const double> parameters, const RegistrationOptions& options, RegistrationResult& result);
 
 }  // namespace isoshift

@@ -27,8 +27,9 @@ struct UncertaintyOptions {
 std::optional<Uncertainty> estimated_uncertainty(Objective& objective, const Eigen::Isometry3d& room_from_patient,
                                                  const UncertaintyOptions& options);
 
-// Restarts that end further apart than four sigma say more than the curvature does: sigma is then a quarter of their
-// spread. Turning a ball, say, changes the voxels' edges in its DRRs, which bends the similarity for nothing.
+// If restarts end farther apart than four sigma, sigma becomes a quarter of their spread: the curvature was misleading.
+// For example, a ball looks the same however it is turned, but the edges of its voxels in the DRR do not, so that the
+// similarity has a curvature that says nothing about the pose.
 Uncertainty widened_to_spread(const Uncertainty& uncertainty, double spread_mm, double spread_rad);
 
 }  // namespace isoshift

@@ -110,7 +110,7 @@ TEST_F(BatchCommandTest, NoCaseIsWorkedOnTwice) {
 TEST_F(BatchCommandTest, ATruncatedFileBesideMakesNoCase) {
   fs::resize_file(exported() / "1" / "RTIMAGE" / "KV_G090.dcm", 300);
   const CommandOutcome outcome = batch();
-  EXPECT_THAT(outcome.err, HasSubstr("make no case: a file beside them may be theirs"));
+  EXPECT_THAT(outcome.err, HasSubstr("belong to no case: a file beside these X-rays may belong to them"));
   EXPECT_EQ(summary()["cases"].size(), 3U);
 }
 
@@ -148,7 +148,7 @@ exec sleep 600
   fs::remove_all(results());
   EXPECT_EQ(batch().exit_status, 4);
   for (const auto& one : summary()["cases"])
-    EXPECT_THAT(one["error"].get<std::string>(), HasSubstr("the message of a worker: is no JSON"));
+    EXPECT_THAT(one["error"].get<std::string>(), HasSubstr("the message of a worker: is not JSON"));
 
   std::ofstream(program) << "#!/bin/sh\nexit 3\n";
   fs::remove_all(results());
@@ -243,7 +243,7 @@ TEST_F(ManifestTest, TablesAndJsonLinesSayTheSame) {
 }
 
 TEST_F(ManifestTest, MistakesAreNamed) {
-  EXPECT_THAT(error_of("case,foo\n"), HasSubstr("\"foo\" is no column"));
+  EXPECT_THAT(error_of("case,foo\n"), HasSubstr("\"foo\" is not a column"));
   EXPECT_THAT(error_of("case,study\na,s\na,t\n"), HasSubstr("line 3: case a is there twice"));
   EXPECT_THAT(error_of("case,study\n../a,s\n"), HasSubstr("line 2: case \"../a\""));
   EXPECT_THAT(error_of("case,study\na\n"), HasSubstr("line 2: 1 cells, expected 2"));

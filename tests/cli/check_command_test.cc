@@ -128,7 +128,7 @@ TEST_F(CheckCommandTest, AnInvertedOneIsFoundByThePlanAndByItsPair) {
   EXPECT_THAT(by_plan.out, HasSubstr("the matrix looks inverted"));
   const CommandOutcome by_pair = run_command({"check", ours(), inverted()});
   EXPECT_EQ(by_pair.exit_status, 1);
-  EXPECT_THAT(by_pair.out, HasSubstr("the second one looks inverted"));
+  EXPECT_THAT(by_pair.out, HasSubstr("the second object looks inverted"));
 }
 
 TEST_F(CheckCommandTest, OneFromTheRoomMeansTheSameShift) {
@@ -412,12 +412,12 @@ TEST_F(CheckCommandTest, TheShiftNeedsIsocenterAndPosition) {
   EXPECT_EQ(run_command({"check", plan()}).exit_status, 1);
   const CommandOutcome endless = run_command({"check", ours(), "--isocenter", "nan,2,3", "--patient-position", "HFS"});
   EXPECT_EQ(endless.exit_status, 2);
-  EXPECT_THAT(endless.err, HasSubstr("--isocenter: nan is no finite number"));
+  EXPECT_THAT(endless.err, HasSubstr("--isocenter: nan is not a finite number"));
   EXPECT_EQ(run_command({"check", ours(), "--source-isocenter", "nan,2,3"}).exit_status, 2);
   EXPECT_EQ(run_command({"check", ours(), "--plan", plan(), "--couch-roll", "inf"}).exit_status, 2);
   const CommandOutcome unused = run_command({"check", ours(), "--couch-pitch", "1"});
   EXPECT_EQ(unused.exit_status, 2);
-  EXPECT_THAT(unused.err, HasSubstr("--couch-pitch belongs to a couch shift: add --plan FILE"));
+  EXPECT_THAT(unused.err, HasSubstr("--couch-pitch is used only for a couch shift: add --plan FILE"));
 }
 
 }  // namespace

@@ -75,7 +75,8 @@ TEST_F(RegisterCommandTest, WhatNobodyMeasuredIsWrittenAsZeroOnlyOnRequest) {
   const CommandOutcome outcome = register_study(
       study_, {"--image", study_.image(0).string(), "--write-reg-for-review", "--accept-unobservable", "--json"});
   EXPECT_EQ(outcome.exit_status, 3);
-  EXPECT_THAT(result()["overrides"].dump(), HasSubstr("which was not measured, by --accept-unobservable"));
+  EXPECT_THAT(result()["overrides"].dump(),
+              HasSubstr("which was not measured, is taken as 0 by --accept-unobservable"));
   const std::string written = (study_.output() / "spatial_registration.dcm").string();
   const CommandOutcome checked = run_command({"check", written, "--plan", study_.plan().string(), "--json"});
   const auto shift = nlohmann::json::parse(checked.out)["registrations"][0]["couch_shift"];

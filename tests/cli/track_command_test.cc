@@ -178,7 +178,7 @@ TEST_F(TrackCommandTest, FollowsAFolderThatIsBeingFilled) {
   EXPECT_EQ(json["files"]["late"], 2);
   EXPECT_EQ(json["files"]["broken"], 1);
   EXPECT_THAT(outcome_.err, HasSubstr("broken.dcm"));
-  EXPECT_THAT(outcome_.err, HasSubstr("came after a later one had been processed"));
+  EXPECT_THAT(outcome_.err, HasSubstr("left aside: it arrived after a later X-ray had been processed"));
   std::ifstream trace(output() / "trace.csv");
   const std::string rows{std::istreambuf_iterator<char>(trace), {}};
   EXPECT_THAT(rows, HasSubstr("\n1.8000,,,,,,,,,,,,,,,late\n1.8000,,,,,,,,,,,,,,,late\n2.0000,"));

@@ -58,7 +58,7 @@ TEST_F(RtImageDialects, MosaiqIsRefusedByName) {
 
 TEST_F(RtImageDialects, EclipseDrrIsRefusedByName) {
   const std::string message = refusal("eclipse-drr.dcm");
-  EXPECT_THAT(message, HasSubstr("ImageType (0008,0008) says DRR: this is no X-ray"));
+  EXPECT_THAT(message, HasSubstr("ImageType (0008,0008) says DRR: this is not an X-ray"));
   EXPECT_THAT(message, HasSubstr("--allow drr=REASON"));
 }
 

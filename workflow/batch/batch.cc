@@ -79,7 +79,7 @@ bool Batch::register_all() {
       std::move(jobs), options_.jobs,
       [&](const std::string& name, const std::optional<std::string>& failure) {
         if (failure) folder_.fail(name, *failure);
-        if (!folder_.has_ended(name)) folder_.fail(name, "the worker said that it ended, and left no result");
+        if (!folder_.has_ended(name)) folder_.fail(name, "the worker reported the end of the case, but left no result");
         observer_.progress(step, ++ended, total);
       },
       [&] { return end.is_asked_for(); });

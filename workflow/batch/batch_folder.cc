@@ -41,7 +41,7 @@ BatchFolder::BatchFolder(fs::path path, const std::vector<std::string>& options)
   }
   if (fs::exists(path_) && (!fs::is_directory(path_) || holds_something(path_)))
     throw Error(
-        fmt::format("{}: is there already and holds no batch.\n       Name another output folder", path_.string()));
+        fmt::format("{}: exists already and holds no batch.\n       Name another output folder", path_.string()));
   std::error_code error;
   fs::create_directories(path_ / "cases", error);
   if (error) throw Error(fmt::format("{}: cannot be made: {}", path_.string(), error.message()));

@@ -44,7 +44,7 @@ std::vector<std::string> parts_of(const std::string& cell) {
 
 void check_column(const std::string& name, const std::string& where) {
   if (std::ranges::find(kColumns, name) == kColumns.end())
-    throw Error(fmt::format("{}: \"{}\" is no column; expected {}", where, name, fmt::join(kColumns, ", ")));
+    throw Error(fmt::format("{}: \"{}\" is not a column; expected {}", where, name, fmt::join(kColumns, ", ")));
 }
 
 // libcsv calls back for every cell and every end of a line.
@@ -218,18 +218,20 @@ std::vector<BatchCase> scan_cases(const fs::path& folder, bool other_xrays, Note
     try {
       const StudyFiles own = files_for(session, files);
       StudyParts parts = choose_parts(own);
-      if (const std::string absent = missing_ct_images(own); !absent.empty()) throw Error(absent + " are not there");
+      if (const std::string absent = missing_ct_images(own); !absent.empty()) throw Error(absent + " are missing");
       if (const std::string reason = unreadable_beside(parts, files); !reason.empty())
-        throw Error("a file beside them may be theirs: " + reason);
+        throw Error("a file beside these X-rays may belong to them: " + reason);
       parts.ct = ct_paths(top, parts.ct, files);
       cases.push_back({.name = session.name, .parts = std::move(parts), .anatomy = ""});
     } catch (const Error& error) {
-      notes.warnings.push_back(fmt::format(
-          "{} and {} more X-rays make no case: {}\n       Or a manifest says what the files do not: --scan writes one",
-          session.images.front().file.string(), session.images.size() - 1, error.what()));
+      notes.warnings.push_back(
+          fmt::format("{} and {} more X-rays belong to no case: {}\n       Or name their files in a manifest; --scan "
+                      "writes one that you can edit",
+                      session.images.front().file.string(), session.images.size() - 1, error.what()));
     }
   }
-  if (cases.empty()) throw Error(fmt::format("{}: holds no case: X-rays with a CT and a plan", folder.string()));
+  if (cases.empty())
+    throw Error(fmt::format("{}: holds no case; a case is X-rays with their CT and their plan", folder.string()));
   return cases;
 }
 

@@ -27,11 +27,11 @@ bool may_write_registration(const RegisterOptions& options, const SetupResult& r
   return result.verdict == Verdict::kAccepted || (result.verdict == Verdict::kReview && options.write_reg_for_review);
 }
 
-// The pose to be written: without setup error along directions that nobody measured, each an override.
+// The pose that is written: the setup error along a direction that no view measured is taken as 0, and is an override.
 Eigen::Isometry3d written_pose(const Study& study, const SetupResult& result, Notes& notes) {
   for (const Eigen::Vector3d& direction : result.unobservable_room)
     notes.overrides.push_back(
-        fmt::format("spatial registration: no setup error along ({:.3f}), which was not measured, by "
+        fmt::format("spatial registration: the setup error along ({:.3f}), which was not measured, is taken as 0 by "
                     "--accept-unobservable",
                     fmt::join(direction, ", ")));
   return known_setup_error(result) * study.planned_room_from_patient;

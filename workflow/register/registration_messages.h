@@ -1,5 +1,5 @@
 #pragma once
-// What a program that registers in child processes says to them, and what they answer.
+// Messages from a program to the child processes in which it registers, and their answers.
 
 #include <filesystem>
 #include <string>
@@ -43,7 +43,7 @@ using RegistrationMessage = std::variant<Ready, Ended, Failed>;
 std::string to_line(const RegistrationOrder& order);
 std::string to_line(const RegistrationMessage& message);
 
-// `name` is how an Error calls a message that is damaged or unknown, with its sender: "the message of a worker".
+// Throws Error for a message that is damaged or unknown. `name` is what the Error calls it: "the message of a worker".
 RegistrationOrder registration_order_from(const std::string& line, const std::string& name);
 RegistrationMessage registration_message_from(const std::string& line, const std::string& name);
 

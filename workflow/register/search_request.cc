@@ -8,9 +8,10 @@ namespace isoshift {
 RegistrationOptions SearchRequest::registration() const {
   RegistrationOptions options = isoshift::preset(preset);
   if ((similarity || optimizer || pixel_fraction) && !is_paper())
-    throw UsageError("--similarity, --optimizer and --pixel-fraction choose what --preset paper does in its one stage");
+    throw UsageError("--similarity, --optimizer and --pixel-fraction work only with --preset paper, for its one stage");
   if (check_vertebrae && is_paper())
-    throw UsageError("--check-vertebrae compares by gradient correlation, with which --preset paper does not end");
+    throw UsageError(
+        "--check-vertebrae needs a preset that ends with gradient correlation, and --preset paper does not");
   if (similarity) options.stages.front().similarity = similarity_kind_from(*similarity).value();
   if (optimizer) options.stages.front().optimizer = optimizer_kind_from(*optimizer).value();
   if (pixel_fraction) options.stages.front().pixel_fraction = *pixel_fraction;

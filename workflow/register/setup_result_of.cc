@@ -52,7 +52,8 @@ std::optional<SiteFile> named_site(const std::filesystem::path& file) {
 
 std::optional<SiteRules> chosen_site(const std::optional<SiteFile>& file, const std::string& anatomy,
                                      std::optional<SiteRules> before) {
-  if (!file && !anatomy.empty()) throw UsageError("--anatomy chooses an action level of a site file: --site FILE");
+  if (!file && !anatomy.empty())
+    throw UsageError("--anatomy chooses an action level of a site file: name the file with --site FILE");
   if (!file) return before;
   const SiteFile& site = *file;
   const std::string& whose = anatomy.empty() && before ? before->anatomy : anatomy;

@@ -25,7 +25,7 @@ double number_from(const std::string& text, std::string_view flag) {
   double value = 0.0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
   if (error != std::errc() || end != text.data() + text.size() || !std::isfinite(value))
-    throw UsageError(fmt::format("{}: \"{}\" is no finite number", flag, text));
+    throw UsageError(fmt::format("{}: \"{}\" is not a finite number", flag, text));
   return value;
 }
 
@@ -47,7 +47,7 @@ void check_couch_angles(const std::optional<double>& couch_angle_deg, const std:
 void StudyOptions::check_finite() const {
   const auto check = [](const char* flag, const auto& values) {
     for (const double value : values)
-      if (!std::isfinite(value)) throw UsageError(fmt::format("{}: {} is no finite number", flag, value));
+      if (!std::isfinite(value)) throw UsageError(fmt::format("{}: {} is not a finite number", flag, value));
   };
   check("--isocenter", isocenter);
   check("--rt-image-position", rt_image_position);

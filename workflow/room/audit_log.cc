@@ -109,7 +109,7 @@ const AuditLog::Proofs& AuditLog::proofs() const {
                        status.st_mtim.tv_sec == read_version_.written.tv_sec &&
                        status.st_mtim.tv_nsec == read_version_.written.tv_nsec;
   if (is_same) return proofs_;
-  if (!S_ISREG(status.st_mode)) throw Error(fmt::format("{}: cannot be read: it is no plain file", path_.string()));
+  if (!S_ISREG(status.st_mode)) throw Error(fmt::format("{}: cannot be read: it is not a plain file", path_.string()));
   std::ifstream file(path_);
   if (!file) throw Error(fmt::format("{}: cannot be read", path_.string()));
   Proofs proofs;

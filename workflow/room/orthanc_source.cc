@@ -72,7 +72,7 @@ void OrthancSource::update(Notes& notes) {
 void OrthancSource::check_server(Notes& notes) {
   if (last_change_ == 0 || server_.changes_since(last_change_ - 1, 1).mark == last_mark_) return;
   notes.warnings.push_back(
-      fmt::format("Orthanc at {}: holds other changes than before: asked for all of them again", url_));
+      fmt::format("Orthanc at {}: holds another database than before; all of it is read again", url_));
   last_change_ = 0;
 }
 
@@ -97,8 +97,8 @@ void OrthancSource::read_objects(Notes& notes) {
     if (!keep(object, notes)) unfetched_[object.stem().string()];
 }
 
-// An instance that the server does not give is tried again, after longer and longer times, and holds up no other. Of a
-// server that does not answer at all nothing else is asked in this round.
+// If the server does not deliver an instance, the instance is asked for again after longer and longer times, and the
+// others do not wait for it. If the server does not answer at all, nothing else is asked for in this round.
 void OrthancSource::fetch(const std::string& instance, Notes& notes) {
   std::string content;
   try {
@@ -113,7 +113,8 @@ void OrthancSource::fetch(const std::string& instance, Notes& notes) {
   const fs::path file = object_of(instance);
   const bool is_there = fs::exists(file);
   if (!content.empty() && (!is_there || sha256_of_file(file) != sha256_of(content))) {
-    if (is_there) notes.warnings.push_back(fmt::format("{}: the server has replaced it by another", file.string()));
+    if (is_there)
+      notes.warnings.push_back(fmt::format("{}: the server has replaced this object by another one", file.string()));
     replace_text(file, content);
     keep(file, notes);
     if (!files_.known().contains(file)) useless_.insert(instance);
@@ -126,7 +127,7 @@ void OrthancSource::put_off(const std::string& instance, const Error& error, Not
   Attempts& attempts = unfetched_[instance];
   attempts.again.fail(clock_.now());
   if (++attempts.count == kSaid)
-    notes.warnings.push_back(fmt::format("an instance that the server does not give: {}", error.what()));
+    notes.warnings.push_back(fmt::format("the server does not deliver an instance: {}", error.what()));
 }
 
 void OrthancSource::find_rest(const std::string& patient_id, Notes& notes) {

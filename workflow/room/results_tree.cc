@@ -111,8 +111,8 @@ void ResultsTree::check_is_new(const std::string& session) const {
   const fs::path folder = this->session(session);
   if (fs::exists(fs::symlink_status(folder)))
     throw Error(
-        fmt::format("{}: is there already, and holds no readable result of these X-rays. Move it away: then "
-                    "they are registered again",
+        fmt::format("{}: exists already, and holds no readable result of these X-rays. Move it away; then the X-rays "
+                    "are registered again",
                     folder.string()));
 }
 
@@ -164,7 +164,7 @@ std::optional<Release> ResultsTree::release_of(const std::string& session) const
   try {
     release = release_from(file.json);
   } catch (const nlohmann::json::exception& error) {
-    throw Error(fmt::format("{}: is no release: {}", path.string(), error.what()));
+    throw Error(fmt::format("{}: is not a release: {}", path.string(), error.what()));
   }
   if (release.record != registered(session).sha256)
     throw Error(
@@ -189,7 +189,7 @@ FileLock ResultsTree::lock_releases() const {
 void ResultsTree::check_objects_are_new(const Release& release) const {
   for (const Release::Object& object : release.objects)
     if (const auto other = audit_.session_releasing(object.sha256); other && *other != release.session)
-      throw Error(fmt::format("session {}: its {} has been released as that of session {}", release.session,
+      throw Error(fmt::format("session {}: its {} has already been released with session {}", release.session,
                               object.file, *other));
 }
 

@@ -41,10 +41,10 @@ SessionRecord record_of(const std::string& session, const fs::path& folder) {
     record.verdict = result.at("verdict").get<std::string>();
     for (const nlohmann::json& view : result.at("views")) xrays.insert(view.at("sop_instance_uid").get<std::string>());
   } catch (const nlohmann::json::exception&) {
-    throw Error(fmt::format("{}: is no result of isoshift register", (folder / kResultFile).string()));
+    throw Error(fmt::format("{}: is not a result of isoshift register", (folder / kResultFile).string()));
   }
   if (const std::string name = session_name(xrays); name != session)
-    throw Error(fmt::format("{}: is the result of other X-rays: they make session {}, expected {}",
+    throw Error(fmt::format("{}: is the result of other X-rays: those of session {}, expected {}",
                             (folder / kResultFile).string(), name, session));
   return record;
 }
@@ -73,7 +73,7 @@ SessionRecord read_session_record(const fs::path& path) {
       record.files[entry.at("file").get<std::string>()] = entry.at("sha256").get<std::string>();
     return record;
   } catch (const nlohmann::json::exception& error) {
-    throw Error(fmt::format("{}: is no record of a registered session: {}", path.string(), error.what()));
+    throw Error(fmt::format("{}: is not a record of a registered session: {}", path.string(), error.what()));
   }
 }
 

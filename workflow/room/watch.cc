@@ -175,7 +175,7 @@ std::string Watch::reason_to_wait(const SessionFiles& session, const StudyFiles&
     return "waits for " + missing.front();
   }
   const std::chrono::duration<double> quiet = seen_at_ - std::max(last, quiet_from_);
-  if (parts_.source.is_coming(patient_id) || quiet.count() < rule.quiet_s) return "more may come";
+  if (parts_.source.is_coming(patient_id) || quiet.count() < rule.quiet_s) return "more files may arrive";
   const auto failure = failures_.find(session.name);
   if (failure == failures_.end() || last != failure->second.news) return "";
   const auto& [why, news, again] = failure->second;

@@ -43,7 +43,7 @@ class Watch {
     Clock& clock;
     Observer& observer;
     Observer& sending;               // receives the messages of deliver()
-    bool takes_other_xrays = false;  // a machine profile supplies the geometry of X-rays that are no RT Images
+    bool takes_other_xrays = false;  // a machine profile supplies the geometry of X-rays that are not RT Images
   };
 
   // Continues from the files in the results tree. Throws Error if another watch uses that tree.

@@ -183,9 +183,10 @@ std::string track_text(const Json& track) {
   const std::string predictor = track["predictor"];
   text +=
       track["predictor_warm_from_s"].is_null()
-          ? fmt::format("predictor {}: had not seen enough by the end; it answered with the last position\n", predictor)
-          : fmt::format("predictor {}: had seen enough at {:.1f} s; until then it answered with the last position\n",
-                        predictor, track["predictor_warm_from_s"].get<double>());
+          ? fmt::format("predictor {}: never saw enough samples; it answered with the last position\n", predictor)
+          : fmt::format(
+                "predictor {}: had seen enough samples at {:.1f} s; until then it answered with the last position\n",
+                predictor, track["predictor_warm_from_s"].get<double>());
   if (track.contains("beside_truth"))
     for (const auto& [key, words] : {std::pair("measured", "measured"), std::pair("predicted", "predicted"),
                                      std::pair("hold_last", "hold-last")}) {
@@ -195,8 +196,8 @@ std::string track_text(const Json& track) {
                           errors["p95_mm"].get<double>());
     }
   if (track.contains("beam_holds_s"))
-    text += fmt::format("beyond {} mm the beam would wait {} times\n", track["tolerance_mm"].get<double>(),
-                        track["beam_holds_s"].size());
+    text += fmt::format("the target was farther off than {} mm, so that the beam should wait, {} times\n",
+                        track["tolerance_mm"].get<double>(), track["beam_holds_s"].size());
   return text;
 }
 

@@ -68,7 +68,7 @@ class TrackRun {
   // X-rays must be there before anything can be checked: those of the first moment.
   void wait_for_first() const {
     if (!std::filesystem::is_directory(options_.follow))
-      throw Error(fmt::format("{}: is no folder", options_.follow.string()));
+      throw Error(fmt::format("{}: is not a folder", options_.follow.string()));
     observer_.say("waiting for X-rays in " + options_.follow.string());
     const auto begin = Clock::now();
     while (files_below({options_.follow}).empty()) {

@@ -42,7 +42,7 @@ void XrayStream::take(TimedXray timed, Notes& notes) {
   if (processed_until_s_ && timed.time_s <= *processed_until_s_) {
     ++counts_.late;
     late_s_.push_back(timed.time_s);
-    notes.warnings.push_back(fmt::format("{}: came after a later one had been processed, and was left aside", where));
+    notes.warnings.push_back(fmt::format("{}: left aside: it arrived after a later X-ray had been processed", where));
     return;
   }
   const auto same_moment = [&](const TimedXray& other) {

@@ -90,7 +90,7 @@ TEST_F(WatchFileTest, MistakesAreNamed) {
   EXPECT_THAT(error_of(with(", \"peers\": [" + peer("false", "a/b") + "]")), HasSubstr("letters, digits"));
   EXPECT_THAT(error_of(with(", \"peers\": [" + peer("false") + "," + peer("false") + "]")), HasSubstr("there twice"));
   EXPECT_THAT(error_of(R"({"watch_file": 1, "folder": "no", "results": "out", "site": "site.json"})"),
-              EndsWith("/no is no folder"));
+              EndsWith("/no is not a folder"));
   std::ofstream(folder_ / "site.json") << R"({"site_file": 1, "name": "S"})";
   EXPECT_THAT(error_of(with("")), HasSubstr("sessions: is missing"));
 }

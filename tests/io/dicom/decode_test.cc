@@ -168,7 +168,7 @@ TEST_F(DecoderThatFailsTest, AnAnswerThatIsNoneIsRefused) {
   const auto names_file_and = [&](const std::string& text) {
     return testing::AllOf(testing::StartsWith(compressed_.string()), testing::HasSubstr(text));
   };
-  EXPECT_THAT(error_with_decoder("echo hello; exec sleep 5"), names_file_and("the answer of the decoder: is no JSON"));
+  EXPECT_THAT(error_with_decoder("echo hello; exec sleep 5"), names_file_and("the answer of the decoder: is not JSON"));
   EXPECT_THAT(error_with_decoder("echo '{\"bytes\": 1, \"rows\": 1}'; exec sleep 5"),
               names_file_and("the answer of the decoder: there is no key rows"));
   EXPECT_THAT(error_with_decoder("exec cat /dev/zero"),

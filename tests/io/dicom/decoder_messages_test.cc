@@ -36,8 +36,8 @@ TEST(DecoderMessages, DamagedAndUnknownOnesAreErrorsThatNameTheSender) {
     }
     return "no error";
   };
-  EXPECT_THAT(error_of(""), HasSubstr("the decoder: is no JSON"));
-  EXPECT_THAT(error_of("{\"bytes\": "), HasSubstr("the decoder: is no JSON"));
+  EXPECT_THAT(error_of(""), HasSubstr("the decoder: is not JSON"));
+  EXPECT_THAT(error_of("{\"bytes\": "), HasSubstr("the decoder: is not JSON"));
   EXPECT_EQ(error_of("[1]"), "the decoder: expected an object");
   EXPECT_THAT(error_of("{}"), HasSubstr("the decoder: bytes is missing"));
   EXPECT_THAT(error_of("{\"bytes\": 1.5}"), HasSubstr("the decoder: bytes is 1.5"));

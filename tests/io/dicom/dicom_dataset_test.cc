@@ -71,7 +71,7 @@ TEST(DicomDataset, NumbersThatAreNoneAreNamed) {
     FAIL();
   } catch (const Error& error) {
     EXPECT_STREQ(error.what(),
-                 "new DICOM object: RadiationMachineSAD (3002,0022) holds \"1000mm\", which is no finite number");
+                 "new DICOM object: RadiationMachineSAD (3002,0022) holds \"1000mm\", which is not a finite number");
   }
 }
 

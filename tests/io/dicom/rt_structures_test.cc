@@ -133,7 +133,7 @@ TEST_F(RtStructuresTest, CoordinatesThatDoNotMatchTheirCountAreRefused) {
   });
   EXPECT_THAT(error_of_reading(), HasSubstr("ContourData (3006,0050) has 10 values"));
   change_contour([](DicomItem contour) { contour.put(DCM_ContourData, "1\\2\\nan"); });
-  EXPECT_THAT(error_of_reading(), HasSubstr("holds \"nan\", which is no finite number"));
+  EXPECT_THAT(error_of_reading(), HasSubstr("holds \"nan\", which is not a finite number"));
 }
 
 TEST_F(RtStructuresTest, NumbersThatDoNotTellWhatIsMeantAreRefused) {

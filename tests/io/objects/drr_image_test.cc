@@ -81,7 +81,7 @@ TEST_F(DrrImageTest, IsRefusedAsAnXrayUnlessAllowed) {
   SmallStudy other;
   const CommandOutcome refused = register_study(other, with_drrs);
   EXPECT_EQ(refused.exit_status, 1);
-  EXPECT_THAT(refused.err, HasSubstr("says DRR: this is no X-ray"));
+  EXPECT_THAT(refused.err, HasSubstr("says DRR: this is not an X-ray"));
 }
 
 }  // namespace

@@ -100,7 +100,7 @@ TEST_F(RegistrationCheckTest, TwelveNumbersAreNoMatrix) {
 
 // A number cut to 16 characters may lose its exponent (docs/dicom.md, REG-DS rule).
 TEST_F(RegistrationCheckTest, ACutNumberIsNamed) {
-  expect_error("holds \"-4.909883469673e\", which is no finite number", [&](DicomItem d) {
+  expect_error("holds \"-4.909883469673e\", which is not a finite number", [&](DicomItem d) {
     matrix(d, 1).put(DCM_FrameOfReferenceTransformationMatrix, R"(1\-4.909883469673e\0\0\0\1\0\0\0\0\1\0\0\0\0\1)");
   });
 }
@@ -144,7 +144,7 @@ TEST_F(RegistrationCheckTest, AMissingReferenceIsNamed) {
 TEST_F(RegistrationCheckTest, MissingAndMalformedAttributesAreNamed) {
   expect_error("ContentLabel (0070,0080) is missing", [](DicomItem d) { d.erase(DCM_ContentLabel); });
   edit(path_, [](DicomItem d) { d.put(DCM_ContentLabel, "SETUP"); });
-  expect_error("\"1.02.3\", which is no UID", [](DicomItem d) { d.put(DCM_SOPInstanceUID, "1.02.3"); });
+  expect_error("\"1.02.3\", which is not a UID", [](DicomItem d) { d.put(DCM_SOPInstanceUID, "1.02.3"); });
   edit(path_, [](DicomItem d) { d.put(DCM_SOPInstanceUID, "1.2.3"); });
   expect_error("expected RIGID",
                [](DicomItem d) { matrix(d, 1).put(DCM_FrameOfReferenceTransformationMatrixType, "AFFINE"); });

@@ -62,7 +62,7 @@ TEST_F(MotionTraceTest, ASingleWrongTimeIsLeftOutWithAWarning) {
 
 TEST_F(MotionTraceTest, MistakesAreNamed) {
   EXPECT_THAT(error_of("a,b\n1,2\n"), HasSubstr("has the columns a, b; expected t_s"));
-  EXPECT_THAT(error_of("t_s,x,y,z\n0,1,2,3\n1,1,two,3\n"), HasSubstr("line 3: \"two\" is no number"));
+  EXPECT_THAT(error_of("t_s,x,y,z\n0,1,2,3\n1,1,two,3\n"), HasSubstr("line 3: \"two\" is not a number"));
   EXPECT_THAT(error_of("t_s,x,y,z\n0,1,2,3\n,1,2,3\n"), HasSubstr("line 3: has no time"));
   EXPECT_THAT(error_of("t_s,x,y,z\n5,1,2,3\n4,1,2,3\n3,1,2,3\n"),
               HasSubstr("the times of 2 of 3 rows do not increase"));

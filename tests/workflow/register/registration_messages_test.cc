@@ -50,8 +50,8 @@ TEST(RegistrationMessages, AnswersComeBackAsTheyWere) {
 }
 
 TEST(RegistrationMessages, DamagedAndUnknownOnesAreErrorsThatNameTheSender) {
-  EXPECT_THAT(error_of("ready"), HasSubstr("a worker: is no JSON"));
-  EXPECT_THAT(error_of("{\"ended\":{\"verd"), HasSubstr("a worker: is no JSON"));
+  EXPECT_THAT(error_of("ready"), HasSubstr("a worker: is not JSON"));
+  EXPECT_THAT(error_of("{\"ended\":{\"verd"), HasSubstr("a worker: is not JSON"));
   EXPECT_EQ(error_of("3"), "a worker: expected an object");
   EXPECT_EQ(error_of("{}"), "a worker: expected ready, ended or failed");
   EXPECT_EQ(error_of("{\"ready\":{},\"ended\":{}}"), "a worker: expected ready, ended or failed");

@@ -78,7 +78,7 @@ TEST_F(ChildRunnerTest, TheFailureThatIsAnsweredIsTheReason) {
 TEST_F(ChildRunnerTest, AnAnswerThatIsNoneIsAFailureThatNamesTheChild) {
   ChildRunner runner(file_);
   begin(runner, "echo hello");
-  EXPECT_THAT(end_of(runner).failure.value().why, HasSubstr("the message of the registration: is no JSON"));
+  EXPECT_THAT(end_of(runner).failure.value().why, HasSubstr("the message of the registration: is not JSON"));
   begin(runner, "echo '{\"begun\":{}}'");
   EXPECT_THAT(end_of(runner).failure.value().why, HasSubstr("the message of the registration: there is no key begun"));
 }

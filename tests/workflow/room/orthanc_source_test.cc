@@ -133,7 +133,7 @@ TEST_F(OrthancSourceTest, AnInstanceThatIsNotGivenIsAskedForAgainAndHoldsUpNoOth
     EXPECT_EQ(source_->is_coming(patient_id()), second <= 60) << second;
   }
   EXPECT_THAT(seconds, ElementsAre(1, 2, 4, 8, 16, 32, 64));
-  EXPECT_THAT(notes_.warnings, ElementsAre(HasSubstr("does not give: instance " + image)));
+  EXPECT_THAT(notes_.warnings, ElementsAre(HasSubstr("does not deliver an instance: instance " + image)));
   start();  // remembers what it has not got
   server_.refusals.clear();
   update();
@@ -182,7 +182,7 @@ TEST_F(OrthancSourceTest, AnotherDatabaseIsReadFromItsBeginning) {
   update();
   update();
   EXPECT_THAT(files().images, SizeIs(2));
-  EXPECT_THAT(notes_.warnings, testing::Contains(HasSubstr("holds other changes than before")));
+  EXPECT_THAT(notes_.warnings, testing::Contains(HasSubstr("holds another database than before")));
 }
 
 TEST_F(OrthancSourceTest, WhatWasForgottenIsFetchedAgainWhenItIsAskedFor) {

@@ -301,14 +301,14 @@ TEST_F(ResultsTreeTest, AnObjectIsReleasedWithOneSessionOnly) {
                 fs::copy_options::overwrite_existing);
   tree_.publish(b);
   tree_.release(a_, kDoe, {"record"});
-  EXPECT_THAT(error_of_release(b), HasSubstr("its report.dcm has been released as that of session " + a_));
+  EXPECT_THAT(error_of_release(b), HasSubstr("its report.dcm has already been released with session " + a_));
 }
 
 TEST_F(ResultsTreeTest, AResultOfOtherXraysIsNotRegistered) {
   const std::string b = write_registering(tree_, {"1.2.3"}, "accepted");
   const std::string c = write_registering(tree_, {"1.2.4"}, "accepted");
   replace_text(tree_.registering(b) / "result.json", text_of(tree_.registering(c) / "result.json"));
-  EXPECT_THAT(error_of_publishing(b), HasSubstr("is the result of other X-rays: they make session " + c));
+  EXPECT_THAT(error_of_publishing(b), HasSubstr("is the result of other X-rays: those of session " + c));
   EXPECT_FALSE(fs::exists(tree_.session(b)));
   EXPECT_EQ(lines_of("registered"), 1);
 }
@@ -316,7 +316,7 @@ TEST_F(ResultsTreeTest, AResultOfOtherXraysIsNotRegistered) {
 TEST_F(ResultsTreeTest, ASessionIsRegisteredOnce) {
   const std::string before = text_of(record(a_));
   write_registering(tree_, {"1.2.1", "1.2.2"}, "review");
-  EXPECT_THAT(error_of_publishing(a_), HasSubstr(a_ + ": is there already"));
+  EXPECT_THAT(error_of_publishing(a_), HasSubstr(a_ + ": exists already"));
   EXPECT_EQ(text_of(record(a_)), before);
   EXPECT_EQ(error_of_release(a_), "");
 }
@@ -425,7 +425,7 @@ TEST_F(ResultsTreeTest, DamagedFilesAreNamed) {
   replace_text(record(a_), "{");
   EXPECT_THAT(error_of_release(a_), HasSubstr(a_ + ".json"));
   replace_text(record(a_), "{\"session\": 7}");
-  EXPECT_THAT(error_of_release(a_), HasSubstr(a_ + ".json: is no record of a registered session"));
+  EXPECT_THAT(error_of_release(a_), HasSubstr(a_ + ".json: is not a record of a registered session"));
   write_text(released(a_), "[]");
   EXPECT_THAT(tree_.pending().refused[a_], HasSubstr("released/" + a_ + ".json"));
 }

@@ -97,7 +97,7 @@ TEST_F(SessionIndexTest, OneReleaseThatCannotBeReadHidesNoSession) {
   add("b", "2026-03-01 10:15:00");
   write_text(tree_.path() / "released" / "a.json", "{");
   index_.update({}, {});
-  EXPECT_THAT(page("index.html"), HasSubstr("a.json: is no JSON"));
+  EXPECT_THAT(page("index.html"), HasSubstr("a.json: is not JSON"));
   EXPECT_THAT(page("index.html"), HasSubstr("sessions/b/"));
 }
 

@@ -79,7 +79,7 @@ TEST_F(WatchTest, NothingIsRegisteredBeforeItIsQuiet) {
   bring_pair("P", second_of(10, 15));
   room_.pass(8s);
   const Clock::Time last = room_.clock.now() + 1s;
-  room_.source.bring(xray("P", "P2", "LAT", second_of(10, 15, 10)));  // once more: more may come
+  room_.source.bring(xray("P", "P2", "LAT", second_of(10, 15, 10)));  // once more: more files may arrive
   room_.pass(30s);
   EXPECT_THAT(beginnings(last), ElementsAre(10s));
 }
@@ -89,7 +89,7 @@ TEST_F(WatchTest, WhatIsOnItsWayIsWaitedFor) {
   bring_pair("P", second_of(10, 15));
   room_.pass(60s);
   EXPECT_THAT(room_.runs(), IsEmpty());
-  EXPECT_THAT(room_.index(), HasSubstr("more may come"));
+  EXPECT_THAT(room_.index(), HasSubstr("more files may arrive"));
   room_.source.set_coming(false);
   room_.pass(1s);
   EXPECT_THAT(room_.runs(), SizeIs(1));
