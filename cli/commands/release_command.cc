@@ -48,7 +48,10 @@ void run_release(const std::filesystem::path& file, const std::string& session, 
   const SystemUser user = system_user();
   const Release release =
       tree.release(session, {.by = by, .user = user.name, .sudo_user = user.sudo_user}, watch.names_of_peers());
-  console.out << fmt::format("released by {}\n", to_string(release.releaser));
+  console.out << fmt::format("released by {}; the verdict was {}\n", to_string(release.releaser), release.verdict);
+  if (release.is_again)
+    console.err << "warning: the session was released before, as the audit log says, and the file of that release is "
+                   "gone\n";
   for (const Release::Object& object : release.objects)
     console.out << fmt::format("{} goes to {}\n", object.file,
                                release.peers.empty() ? "nobody: the watch file names no peers"

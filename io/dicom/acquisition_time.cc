@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <charconv>
 #include <chrono>
 
@@ -33,28 +34,41 @@ std::optional<std::string> date_digits(const RtImage& image) {
   return digits && digits->size() == 8 ? digits : std::nullopt;
 }
 
-// "101500", without the fraction; minutes and seconds that are not there are 0 (PS3.5 6.2).
+// "101500", without the fraction. A time without seconds (PS3.5 6.2) does not tell how far two X-rays are apart.
 std::optional<std::string> time_digits(const RtImage& image) {
   if (!image.acquisition_time) return std::nullopt;
   auto digits = digits_of(image.acquisition_time->substr(0, image.acquisition_time->find('.')), ':', 2);
-  if (!digits || digits->size() > 6 || digits->size() < 2 || digits->size() % 2 != 0) return std::nullopt;
-  digits->resize(6, '0');
+  if (!digits || digits->size() != 6) return std::nullopt;
   if (number_in(*digits, 0, 2) > 23 || number_in(*digits, 2, 2) > 59 || number_in(*digits, 4, 2) > 60)
     return std::nullopt;
   return digits;
 }
 
+// "+0130" (PS3.3 C.12.1.1.8).
+std::optional<int> utc_offset_min(const std::string& text) {
+  if (text.size() != 5 || (text[0] != '+' && text[0] != '-') || !digits_of(text.substr(1), ':', 4)) return std::nullopt;
+  const int minutes = 60 * number_in(text, 1, 2) + number_in(text, 3, 2);
+  return text[0] == '-' ? -minutes : minutes;
+}
+
 }  // namespace
 
 void read_acquisition_time(const DicomItem& dataset, RtImage& image) {
+  std::string offset = dataset.text(DCM_TimezoneOffsetFromUTC).value_or("");
   image.acquisition_date = dataset.text(DCM_AcquisitionDate);
   image.acquisition_time = dataset.text(DCM_AcquisitionTime);
   if (const auto both = dataset.text(DCM_AcquisitionDateTime); both && both->size() > 8 && !image.acquisition_time) {
+    const std::size_t end = std::min(both->find_first_of("+-"), both->size());
     image.acquisition_date = both->substr(0, 8);
-    image.acquisition_time = both->substr(8, both->find_first_of("+-") - 8);
+    image.acquisition_time = both->substr(8, end - 8);
+    if (end < both->size()) offset = both->substr(end);
   }
-  if (!image.acquisition_date) image.acquisition_date = dataset.text(DCM_ContentDate);
-  if (!image.acquisition_time) image.acquisition_time = dataset.text(DCM_ContentTime);
+  // The date of an acquisition does not go with the time of an export.
+  if (!image.acquisition_time) {
+    image.acquisition_date = dataset.text(DCM_ContentDate);
+    image.acquisition_time = dataset.text(DCM_ContentTime);
+  }
+  image.utc_offset_min = utc_offset_min(offset);
 }
 
 std::optional<double> acquisition_seconds(const RtImage& image) {
@@ -71,8 +85,9 @@ std::optional<double> acquisition_seconds(const RtImage& image) {
                *end = image.acquisition_time->data() + image.acquisition_time->size();
     if (std::from_chars(begin, end, fraction).ptr != end) return std::nullopt;
   }
-  return ((days * 24 + number_in(*time, 0, 2)) * 60 + number_in(*time, 2, 2)) * 60 + number_in(*time, 4, 2) + fraction +
-         image.frame_offset_s;
+  const double minutes =
+      (days * 24 + number_in(*time, 0, 2)) * 60 + number_in(*time, 2, 2) - image.utc_offset_min.value_or(0);
+  return minutes * 60 + number_in(*time, 4, 2) + fraction + image.frame_offset_s;
 }
 
 std::string acquired(const RtImage& image) {

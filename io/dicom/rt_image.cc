@@ -76,14 +76,17 @@ std::optional<Eigen::Matrix<double, N, 1>> vector_of(const DicomItem& dataset, c
 }
 
 // Cine module (PS3.3 C.7.6.5): increments in ms, one for all frames or one for each, the first 0. Nothing where the
-// file does not say when a later frame was taken.
+// file does not say when a later frame was taken; a frame that was taken no later than the one before says nothing.
 std::optional<double> frame_offset_s(const DicomItem& d, int frame) {
   const std::vector<double> increments_ms = d.numbers(DCM_FrameTimeVector);
-  if (static_cast<int>(increments_ms.size()) > frame)
-    return std::accumulate(increments_ms.begin(), increments_ms.begin() + frame + 1, 0.0) / 1000.0;
-  if (frame == 0) return 0.0;
+  if (frame == 0) return increments_ms.empty() ? 0.0 : increments_ms.front() / 1000.0;
+  if (static_cast<int>(increments_ms.size()) > frame) {
+    const auto end = increments_ms.begin() + frame + 1;
+    const bool goes_on = std::all_of(increments_ms.begin() + 1, end, [](double ms) { return ms > 0.0; });
+    return goes_on ? std::optional(std::accumulate(increments_ms.begin(), end, 0.0) / 1000.0) : std::nullopt;
+  }
   const auto increment_ms = d.number(DCM_FrameTime);
-  return increment_ms ? std::optional(frame * *increment_ms / 1000.0) : std::nullopt;
+  return increment_ms && *increment_ms > 0.0 ? std::optional(frame * *increment_ms / 1000.0) : std::nullopt;
 }
 
 RtImage read_frame(const std::filesystem::path& path, const DicomItem& d, const PixelFormat& format, int frame,

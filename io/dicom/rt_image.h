@@ -48,7 +48,8 @@ struct RtImage {
   std::optional<std::string> plan_sop_instance_uid;
   std::optional<int> beam_number;
   std::optional<std::string> acquisition_date;
-  std::optional<std::string> acquisition_time;  // AcquisitionTime, else ContentTime
+  std::optional<std::string> acquisition_time;  // of the same attribute as the date
+  std::optional<int> utc_offset_min;            // east of Greenwich; unset: the file does not say
   double frame_offset_s = 0.0;                  // of a later frame, from the first one
   bool has_own_time = true;                     // false: a later frame of a file that does not say when it was taken
   std::optional<double> kvp;

@@ -12,6 +12,17 @@
 namespace isoshift {
 namespace {
 
+// A beam whose isocenter moves while it is delivered has none to which a patient could be set up.
+void check_same_isocenter(const RtPlan::Beam& beam, const Eigen::Vector3d& isocenter_mm, const DicomItem& point) {
+  constexpr double kSameMm = 0.01;
+  if (!beam.isocenter_patient_mm || (isocenter_mm - *beam.isocenter_patient_mm).norm() <= kSameMm) return;
+  throw Error(
+      fmt::format("{}: {} is ({}), that of the first control point is ({}) mm; beams with a moving isocenter are "
+                  "not supported",
+                  point.where(), described(DCM_IsocenterPosition), fmt::join(isocenter_mm, ", "),
+                  fmt::join(*beam.isocenter_patient_mm, ", ")));
+}
+
 RtPlan::Beam read_beam(const DicomItem& beam_item, const DcmTagKey& control_points, const DicomItem& plan) {
   RtPlan::Beam beam;
   beam.number = static_cast<int>(beam_item.required_number(DCM_BeamNumber));
@@ -20,6 +31,9 @@ RtPlan::Beam read_beam(const DicomItem& beam_item, const DcmTagKey& control_poin
     if (points.front().has_value(DCM_IsocenterPosition))
       beam.isocenter_patient_mm = Eigen::Vector3d(points.front().required_numbers(DCM_IsocenterPosition, 3).data());
     beam.support_angle_deg = points.front().number(DCM_PatientSupportAngle);
+    for (const DicomItem& point : points)
+      if (point.has_value(DCM_IsocenterPosition))
+        check_same_isocenter(beam, Eigen::Vector3d(point.required_numbers(DCM_IsocenterPosition, 3).data()), point);
   }
   const auto setup_number = beam_item.number(DCM_ReferencedPatientSetupNumber);
   std::set<std::optional<std::string>> positions;

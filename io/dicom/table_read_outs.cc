@@ -22,6 +22,22 @@ const std::vector<TableReadOut>& table_read_outs() {
   return all;
 }
 
+bool TableReadOuts::has_position() const {
+  constexpr double kFarthestMm = 3000.0, kZeroMm = 0.01;
+  int zeros = 0;
+  for (const auto& position_mm : {lateral_mm, longitudinal_mm, vertical_mm}) {
+    if (!position_mm || std::abs(*position_mm) > kFarthestMm) return false;
+    zeros += std::abs(*position_mm) < kZeroMm ? 1 : 0;
+  }
+  return zeros < 2;
+}
+
+bool TableReadOuts::has_same_read_outs(const TableReadOuts& other) const {
+  return std::ranges::all_of(table_read_outs(), [&](const TableReadOut& read_out) {
+    return (this->*read_out.value).has_value() == (other.*read_out.value).has_value();
+  });
+}
+
 TableReadOuts read_table_read_outs(const std::function<std::optional<double>(const DcmTagKey&)>& number) {
   TableReadOuts table;
   for (const TableReadOut& read_out : table_read_outs()) table.*read_out.value = number(read_out.tag);

@@ -19,11 +19,11 @@ struct TableReadOuts {
   std::optional<double> lateral_mm, longitudinal_mm, vertical_mm;
   std::optional<double> support_angle_deg, eccentric_angle_deg, pitch_deg, roll_deg;
 
-  // Whether the file says where the table stood. Three zeros do not: programs write them where they know no position.
-  bool has_position() const {
-    return lateral_mm && longitudinal_mm && vertical_mm &&
-           (*lateral_mm != 0.0 || *longitudinal_mm != 0.0 || *vertical_mm != 0.0);
-  }
+  // Whether the file says where the table stood. Two zeros, or numbers that no table reaches, do not: programs write
+  // them where they know no position.
+  bool has_position() const;
+  // Whether both have the same read-outs, so that none is missing in one of them only.
+  bool has_same_read_outs(const TableReadOuts& other) const;
   bool operator==(const TableReadOuts&) const = default;
 };
 

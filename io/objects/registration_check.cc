@@ -69,6 +69,9 @@ class Checker {
     if (const auto modality = dataset_.text(DCM_Modality); modality != "REG")
       error(fmt::format("dataset: {} is \"{}\", expected REG", described(DCM_Modality), modality.value_or("")));
     const std::string label = dataset_.text(DCM_ContentLabel).value_or("");
+    if (const auto description = dataset_.text(DCM_ContentDescription);
+        description && description->find("NOT ACCEPTED") != std::string::npos)
+      note(fmt::format("{} is \"{}\": a person has to decide", described(DCM_ContentDescription), *description));
     const auto is_code = [](char c) {
       return (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == ' ' || c == '_';
     };

@@ -7,13 +7,16 @@
 #include <array>
 
 #include "base/error.h"
+#include "geometry/rotation.h"
 #include "io/objects/spatial_registration.h"
 #include "io/study/session.h"
 
 namespace isoshift {
 namespace {
 
-constexpr double kMaxSetupErrorMm = 200.0;  // beyond it a matrix is of another frame, not of a patient's setup
+// Beyond these a matrix is of another frame or another isocenter, not of a patient's setup.
+constexpr double kMaxSetupErrorMm = 100.0, kMaxSetupErrorRad = rad_from_deg(30.0);
+constexpr double kLargeSetupErrorMm = 30.0;  // beyond it a person should look at the isocenter
 
 bool is_from_room(const CheckedRegistration& checked) { return checked.source_frame_uid == kIecFixedFrameUid; }
 
@@ -42,7 +45,11 @@ std::string why_origin_is_unknown(const CheckedRegistration& checked) {
 // Where the machine's isocenter lies in the source frame. Nothing, and a finding, where nobody says.
 std::optional<Eigen::Vector3d> source_isocenter(CheckedRegistration& checked, bool asks_for_shift,
                                                 const std::optional<Eigen::Vector3d>& supplied_mm) {
-  if (why_it_begins_at_isocenter(checked)) return Eigen::Vector3d::Zero();
+  if (const auto why = why_it_begins_at_isocenter(checked)) {
+    if (asks_for_shift && !is_from_room(checked))
+      checked.note("its source frame is taken to begin at the isocenter: " + *why);
+    return Eigen::Vector3d::Zero();
+  }
   if (supplied_mm && !checked.source_frame_uid.empty()) {
     checked.note(fmt::format(
         "the machine's isocenter lies at ({:.3f}) mm of its source frame {}, by --source-isocenter{}",
@@ -91,7 +98,18 @@ bool begins_near_isocenter(CheckedRegistration& checked, const Eigen::Isometry3d
   const auto off_mm = [&](const Eigen::Isometry3d& pose) { return (pose.translation() - isocenter_patient_mm).norm(); };
   constexpr double kFarMm = 20.0, kMuchNearer = 0.25;
   const bool looks_inverted = off_mm(matrix) > kFarMm && off_mm(inverse) < kMuchNearer * off_mm(matrix);
-  if (off_mm(matrix) < kMaxSetupErrorMm && !looks_inverted) return true;
+  if (off_mm(matrix) < kMaxSetupErrorMm && !looks_inverted) {
+    if (off_mm(matrix) > kLargeSetupErrorMm)
+      checked.note(
+          fmt::format("its origin lies {:.0f} mm from the planned isocenter: compare that of the plan with the "
+                      "isocenter that was treated",
+                      off_mm(matrix)));
+    if (off_mm(inverse) < kFarMm)
+      checked.note(
+          "its inverse begins near the planned isocenter, too: a matrix that was written the wrong way around "
+          "could not be told from a right one");
+    return true;
+  }
   checked.error(fmt::format(
       "the couch shift is not known: its origin lies {:.0f} mm from the planned isocenter: {}", off_mm(matrix),
       off_mm(inverse) < kMaxSetupErrorMm
@@ -133,6 +151,16 @@ std::optional<Eigen::Isometry3d> rigid_of(const CheckedRegistration& checked) {
 
 void refuse_contradicting_isocenter(std::span<const CheckedRegistration> all,
                                     const Eigen::Vector3d& source_isocenter_mm) {
+  const CheckedRegistration* of_another = nullptr;  // object whose isocenter the switch tells
+  for (const CheckedRegistration& checked : all) {
+    if (why_it_begins_at_isocenter(checked)) continue;
+    if (of_another != nullptr && of_another->source_frame_uid != checked.source_frame_uid)
+      throw UsageError(
+          fmt::format("--source-isocenter {}: {} and {} start from different frames, in which the machine's "
+                      "isocenter lies at different places. Check them one after the other",
+                      fmt::join(source_isocenter_mm, ","), of_another->path.string(), checked.path.string()));
+    of_another = &checked;
+  }
   const auto is_known = [](const CheckedRegistration& checked) {
     return why_it_begins_at_isocenter(checked).has_value();
   };
@@ -176,7 +204,15 @@ RegistrationMeaning meaning_of(CheckedRegistration& checked, const std::optional
   note_assumed_angles(checked, *setup);
   const Eigen::Isometry3d planned = setup->room_from_patient();
   const Eigen::Isometry3d actual = actual_room_from_patient(planned, matrix);
-  meaning.couch_shift = couch_shift_for(setup_error_from_poses(planned, actual), setup->table());
+  const Eigen::Isometry3d setup_error = setup_error_from_poses(planned, actual);
+  if (const double turn_rad = Eigen::AngleAxisd(setup_error.linear()).angle(); turn_rad > kMaxSetupErrorRad) {
+    checked.error(fmt::format(
+        "the couch shift is not known: the patient would be turned by {:.0f} degrees. Compare the axes of the source "
+        "frame, the couch angle and the patient position with those of the treatment",
+        deg_from_rad(turn_rad)));
+    return meaning;
+  }
+  meaning.couch_shift = couch_shift_for(setup_error, setup->table());
   return meaning;
 }
 

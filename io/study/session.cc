@@ -48,6 +48,13 @@ std::vector<Finding> setting_doubts(std::span<const RtImage> images) {
       doubts.push_back({"table-moved", fmt::format("{} is of machine \"{}\", {} of \"{}\" ({})", image.label,
                                                    machine_of(image), images.front().label, machine_of(images.front()),
                                                    described(DCM_RadiationMachineName))});
+  constexpr double kSameIsocenterMm = 0.5;
+  for (const RtImage& image : images)
+    if (image.isocenter_mm && images.front().isocenter_mm &&
+        (*image.isocenter_mm - *images.front().isocenter_mm).norm() > kSameIsocenterMm)
+      doubts.push_back(
+          {"table-moved", fmt::format("{} and {} have different isocenters in their frame ({})", image.label,
+                                      images.front().label, described(DCM_IsocenterPosition))});
   for (const TableReadOut& read_out : table_read_outs()) {
     const auto has_value = [&](const RtImage& image) { return (image.table.*read_out.value).has_value(); };
     const auto turned = std::ranges::find_if(images, [&](const RtImage& image) {
@@ -68,7 +75,8 @@ std::optional<Finding> time_doubt(std::span<const RtImage> images, double max_sp
   const RtImage* earliest = &images.front();
   const RtImage* latest = &images.front();
   for (const RtImage& image : images) {
-    if (!image.has_own_time || !acquisition_seconds(image))
+    if (!image.has_own_time || !acquisition_seconds(image) ||
+        image.utc_offset_min.has_value() != images.front().utc_offset_min.has_value())
       return Finding{"time-span", fmt::format("{}: when it was taken is unknown ({}), and {}", image.label,
                                               described(DCM_AcquisitionTime), kNoReadOuts)};
     if (*acquisition_seconds(image) < *acquisition_seconds(*earliest)) earliest = &image;
@@ -136,10 +144,32 @@ std::vector<Finding> session_findings(std::span<const RtImage> images, Notes& no
   return findings;
 }
 
+std::vector<Finding> switch_doubts(std::span<const RtImage> images, const RtImageSwitches& switches) {
+  std::vector<Finding> doubts;
+  const auto compare = [&](const char* flag, const std::optional<double>& supplied_deg,
+                           std::optional<double> TableReadOuts::* angle_deg, const DcmTagKey& tag) {
+    for (const RtImage& image : images)
+      if (const auto& read_deg = image.table.*angle_deg;
+          supplied_deg && read_deg &&
+          std::abs(wrapped_rad(rad_from_deg(*supplied_deg - *read_deg))) > rad_from_deg(kMaxTableTurnDeg))
+        doubts.push_back({"table-moved", fmt::format("{} {} contradicts {}: {} is {}", flag, *supplied_deg, image.label,
+                                                     described(tag), *read_deg)});
+  };
+  compare("--couch-angle", switches.couch_angle_deg, &TableReadOuts::support_angle_deg, DCM_PatientSupportAngle);
+  compare("--couch-pitch", switches.couch_pitch_deg, &TableReadOuts::pitch_deg, DCM_TableTopPitchAngle);
+  compare("--couch-roll", switches.couch_roll_deg, &TableReadOuts::roll_deg, DCM_TableTopRollAngle);
+  return doubts;
+}
+
 std::vector<Finding> session_doubts(std::span<const RtImage> images, double max_span_s) {
   if (images.size() < 2) return {};
   std::vector<Finding> doubts = setting_doubts(images);
-  if (std::ranges::all_of(images, [](const RtImage& image) { return image.table.has_position(); })) return doubts;
+  // Read-outs that were planned, or that one view lacks, do not tell that the table stood still.
+  const auto tells_table = [&](const RtImage& image) {
+    return image.table.has_position() && image.reported_values_origin == "ACTUAL" &&
+           image.table.has_same_read_outs(images.front().table);
+  };
+  if (std::ranges::all_of(images, tells_table)) return doubts;
   if (auto doubt = time_doubt(images, max_span_s)) doubts.push_back(std::move(*doubt));
   for (std::size_t n = 1; n < images.size(); ++n)
     if (const auto first = std::ranges::find_if(images.first(n),

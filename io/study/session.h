@@ -27,6 +27,9 @@ std::vector<Finding> session_findings(std::span<const RtImage> images, Notes& no
 // - in any case: views of two machines, and a table angle that is not 0 in one view and missing in another.
 std::vector<Finding> session_doubts(std::span<const RtImage> images, double max_span_s);
 
+// What a person says by switches against what the X-rays say.
+std::vector<Finding> switch_doubts(std::span<const RtImage> images, const RtImageSwitches& switches);
+
 // The differences between the table read-outs of `image` and `reference`, as far as both have them.
 std::vector<Finding> table_findings(const RtImage& image, const RtImage& reference);
 

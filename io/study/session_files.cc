@@ -112,6 +112,71 @@ std::vector<SessionFiles> untimed_sessions(Images images, const std::set<std::st
   return all;
 }
 
+// What the patient's other X-rays say against a session whose files do not tell where the table stood.
+class Doubts {
+ public:
+  // `sessions`: all that were found among the `images` of all patients.
+  Doubts(Images images, const std::vector<SessionFiles>& sessions) : images_(images), sessions_(sessions) {}
+
+  std::vector<std::string> of(const SessionFiles& session) const {
+    Images own = session.images;
+    if (own.size() < 2 || !own.front().at_s ||
+        std::ranges::all_of(own, [](const auto& image) { return image.table.has_position(); }))
+      return {};
+    std::vector<std::string> doubts;
+    const StudyFiles::Image *before = nullptr, *after = nullptr;
+    for (const StudyFiles::Image& other : images_) {
+      if (patient_id_of(other.patient) != patient_id_of(session.patient) || is_in(session, other)) continue;
+      if (!other.at_s) {
+        if (has_label(own, other.label))
+          doubts.push_back(
+              fmt::format("{} shows {}, too, and when it was taken is not known", other.file.string(), other.label));
+      } else if (*other.at_s > *own.front().at_s && *other.at_s < *own.back().at_s) {
+        doubts.push_back(fmt::format("{} was taken between these views", other.file.string()));
+      } else if (*other.at_s <= *own.front().at_s) {
+        if (before == nullptr || *other.at_s > *before->at_s) before = &other;
+      } else if (after == nullptr || *other.at_s < *after->at_s) {
+        after = &other;
+      }
+    }
+    if (auto doubt = of_neighbors(own, before, after); !doubt.empty()) doubts.push_back(std::move(doubt));
+    return doubts;
+  }
+
+ private:
+  static bool is_in(const SessionFiles& session, const StudyFiles::Image& image) {
+    return std::ranges::find(session.images, image.sop_instance_uid, &StudyFiles::Image::sop_instance_uid) !=
+           session.images.end();
+  }
+
+  // Whether the X-ray is of a session that lacks a view which `own` has: its own view may be in this one.
+  bool is_incomplete(const StudyFiles::Image& image, Images own) const {
+    const auto session = std::ranges::find_if(sessions_, [&](const auto& one) { return is_in(one, image); });
+    return session != sessions_.end() && session->images.size() < own.size();
+  }
+
+  // An X-ray without its partner shortly before or after the session may be the partner of one of its views.
+  std::string of_neighbors(Images own, const StudyFiles::Image* before, const StudyFiles::Image* after) const {
+    constexpr double kMuchLonger = 5.0;
+    double longest_s = 0.0;
+    for (std::size_t n = 1; n < own.size(); ++n) longest_s = std::max(longest_s, *own[n].at_s - *own[n - 1].at_s);
+    const double before_s = before != nullptr ? *own.front().at_s - *before->at_s : kMaxTimeSpanS + 1.0;
+    const double after_s = after != nullptr ? *after->at_s - *own.back().at_s : kMaxTimeSpanS + 1.0;
+    const bool lacks_before = before_s <= kMaxTimeSpanS && is_incomplete(*before, own);
+    const bool lacks_after = after_s <= kMaxTimeSpanS && is_incomplete(*after, own);
+    if (lacks_before && (lacks_after || before_s < kMuchLonger * longest_s))
+      return fmt::format("{}, {:.0f} s before, has no partner, and may belong to one of these views",
+                         before->file.string(), before_s);
+    if (lacks_after && after_s < kMuchLonger * longest_s)
+      return fmt::format("{}, {:.0f} s after, has no partner, and may belong to one of these views",
+                         after->file.string(), after_s);
+    return "";
+  }
+
+  Images images_;
+  const std::vector<SessionFiles>& sessions_;
+};
+
 }  // namespace
 
 std::string session_name(const std::set<std::string>& sop_instance_uids) {
@@ -150,7 +215,14 @@ std::vector<SessionFiles> sessions_of(const StudyFiles& files, bool other_xrays,
     std::ranges::move(found, std::back_inserter(sessions));
     begin = end;
   }
-  for (SessionFiles& session : sessions) session.name = name_of(session.images);
+  // Evidence are all X-rays, those that are not to be registered, too.
+  if (!other_xrays) take_new(files.other_xrays);
+  std::vector<std::vector<std::string>> doubts;
+  for (const SessionFiles& session : sessions) doubts.push_back(Doubts(images, sessions).of(session));
+  for (std::size_t n = 0; n < sessions.size(); ++n) {
+    sessions[n].name = name_of(sessions[n].images);
+    sessions[n].doubts = std::move(doubts[n]);
+  }
   return sessions;
 }
 

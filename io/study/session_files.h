@@ -15,6 +15,7 @@ struct SessionFiles {
   std::string patient;
   std::vector<StudyFiles::Image> images;  // in the order of their times
   std::vector<std::string> remarks;       // in words: retakes, and why X-rays are not grouped
+  std::vector<std::string> doubts;        // in words: why other X-rays of the patient make the grouping uncertain
 };
 
 // X-rays are grouped from the newest backwards: a label that repeats begins an earlier session, and so do table

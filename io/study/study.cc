@@ -218,10 +218,14 @@ void check_isocenter(const Study& study) {
   }
 }
 
-// The X-rays with what a person and a machine profile supply, in order of acquisition, and what speaks against their
-// being of one session.
+// What the X-rays say against their being of one session.
+struct SaidOfSession {
+  std::vector<Finding> findings, doubts;
+};
+
+// The X-rays with what a person and a machine profile supply, in order of acquisition.
 std::vector<RtImage> read_images(const std::vector<std::filesystem::path>& paths, const StudyRequest& request,
-                                 XrayFiles& files, std::vector<Finding>& findings, Notes& notes) {
+                                 XrayFiles& files, SaidOfSession& said, Notes& notes) {
   std::vector<RtImage> images;
   for (const std::filesystem::path& path : paths)
     std::ranges::move(files.images_of(path, notes), std::back_inserter(images));
@@ -230,7 +234,10 @@ std::vector<RtImage> read_images(const std::vector<std::filesystem::path>& paths
   if (request.one_per_imager) keep_earliest_of_each_imager(images);
   check_labels(request.switches, images);
   sort_by_time(images);
-  findings = session_findings(images, notes);  // by what was measured: a switch hides no move of the table
+  // By what was measured: a switch hides no move of the table.
+  said.findings = session_findings(images, notes);
+  said.doubts = session_doubts(images, request.max_span_s);
+  std::ranges::move(switch_doubts(images, request.switches), std::back_inserter(said.doubts));
   for (RtImage& image : images) {
     if (request.machine) image = with_machine(image, *request.machine, request.switches, notes);
     image = with_switches(image, request.switches, notes);
@@ -260,14 +267,15 @@ void check_images(const Study& study, const StudyRequest& request, Notes& notes)
                                            image.label, described(DCM_ReportedValuesOrigin)));
 }
 
-// Whether the parts of the study belong together. `of_session`: what the X-rays say against each other.
-void check_together(const StudyRequest& request, const std::vector<Finding>& of_session, Study& study, Notes& notes) {
+// Whether the parts of the study belong together.
+void check_together(const StudyRequest& request, const SaidOfSession& said, Study& study, Notes& notes) {
   std::vector<Finding> findings = patient_findings(study);
   std::ranges::move(plan_findings(study, notes), std::back_inserter(findings));
   std::ranges::move(structure_findings(study, notes), std::back_inserter(findings));
-  std::ranges::copy(of_session, std::back_inserter(findings));
+  std::ranges::copy(said.findings, std::back_inserter(findings));
   settle(findings, request.allowed, notes);
-  for (const Finding& doubt : not_allowed(session_doubts(study.rt_images, request.max_span_s), request.allowed, notes))
+  study.doubts = request.parts.doubts;
+  for (const Finding& doubt : not_allowed(said.doubts, request.allowed, notes))
     study.doubts.push_back(fmt::format("{} (--allow {}=REASON)", doubt.message, doubt.key));
   check_one_patient_position(study);
 }
@@ -314,8 +322,8 @@ Study load_study(const StudyRequest& request, Notes& notes, const Progress& prog
   if (!parts.plan.empty()) study.plan = read_rt_plan(parts.plan);
   if (!parts.structures.empty()) study.structures = read_rt_structures(parts.structures);
   XrayFiles files(request.one_per_imager);
-  std::vector<Finding> of_session;
-  study.rt_images = read_images(parts.images, request, files, of_session, notes);
+  SaidOfSession said;
+  study.rt_images = read_images(parts.images, request, files, said, notes);
 
   std::vector<RtPlan::Beam> beams;
   if (study.plan) {
@@ -326,7 +334,7 @@ Study load_study(const StudyRequest& request, Notes& notes, const Progress& prog
   }
   check_images(study, request, notes);
   study.ct = cts.get(parts.ct, request.allowed, notes, progress);
-  check_together(request, of_session, study, notes);
+  check_together(request, said, study, notes);
   place_patient(request, beams, study, notes);
   for (const RtImage& image : study.rt_images)
     study.xrays.push_back(

@@ -85,6 +85,7 @@ struct StudyParts {
   std::filesystem::path study;  // folder in which the parts that are not named are searched for
   std::vector<std::filesystem::path> ct, images;
   std::filesystem::path plan, structures;
+  std::vector<std::string> doubts;  // why the images may not show one setup: then the result needs a person's review
 
   bool operator==(const StudyParts&) const = default;
 };

@@ -1,3 +1,4 @@
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -396,6 +397,38 @@ TEST_F(CheckCommandTest, AnInvertedOneIsFoundNearTheOriginOfTheCtToo) {
   EXPECT_EQ(outcome.exit_status, 1);
   EXPECT_THAT(outcome.out, HasSubstr("the matrix looks inverted"));
   EXPECT_THAT(outcome.out, Not(HasSubstr("a couch shift of")));
+}
+
+TEST_F(CheckCommandTest, APatientWhoWouldBeTurnedFarIsAnError) {
+  const std::string theirs = from_room(Eigen::Matrix3d::Identity(), {1, 2, 3}, Eigen::Matrix3d::Identity());
+  const CommandOutcome outcome = run_command({"check", theirs, "--plan", plan(), "--couch-angle", "90"});
+  EXPECT_EQ(outcome.exit_status, 1);
+  EXPECT_THAT(outcome.out, HasSubstr("the patient would be turned by 90 degrees"));
+  EXPECT_THAT(outcome.out, Not(HasSubstr("a couch shift of")));
+}
+
+TEST_F(CheckCommandTest, AnotherIsocenterOfTheSameFrameIsNoted) {
+  const auto checked_at = [&](double off_mm) {
+    const std::string isocenter = fmt::format("{},{},{}", isocenter_.x(), isocenter_.y(), isocenter_.z() + off_mm);
+    return run_command({"check", ours(), "--isocenter", isocenter, "--patient-position", "HFS"});
+  };
+  EXPECT_THAT(checked_at(60.0).out, HasSubstr("mm from the planned isocenter: compare that of the plan"));
+  const CommandOutcome far = checked_at(150.0);
+  EXPECT_EQ(far.exit_status, 1);
+  EXPECT_THAT(far.out, HasSubstr("it is of another isocenter or another frame"));
+}
+
+TEST_F(CheckCommandTest, AnObjectThatWasNotAcceptedSaysSo) {
+  const std::string review = testdata("registrations/review/spatial_registration.dcm").string();
+  EXPECT_THAT(run_command({"check", review}).out, HasSubstr("\"NOT ACCEPTED: REVIEW\": a person has to decide"));
+}
+
+TEST_F(CheckCommandTest, OneIsocenterIsNotTakenForTwoFrames) {
+  const std::string first = foreign();
+  const std::string second = ours_from("1.2.3.5", our_matrix(), "second.dcm", "Plastimatch");
+  const CommandOutcome outcome = run_command({"check", first, second, "--source-isocenter", "9,-5,6.9"});
+  EXPECT_EQ(outcome.exit_status, 2);
+  EXPECT_THAT(outcome.err, HasSubstr("start from different frames"));
 }
 
 TEST_F(CheckCommandTest, AnglesThatNoCouchHasAreRefused) {

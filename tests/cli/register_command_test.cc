@@ -232,22 +232,32 @@ TEST_F(RegisterCommandTest, ViewsThatMayBeOfTwoSetupsNeedAReview) {
               HasSubstr("is 3 degrees in KV_G090 and missing in KV_G000"));
 }
 
-// Programs that know no table position write zeros: whether the table moved in the three minutes is not known.
-TEST_F(RegisterCommandTest, ThreeZerosAreNoTablePosition) {
-  const auto reasons = [](double longitudinal_mm) {
+// Programs that know no table position write zeros or huge numbers, or the planned position: whether the table moved in
+// the three minutes is not known.
+TEST_F(RegisterCommandTest, PlaceholdersAreNoTablePosition) {
+  const auto reasons = [](double longitudinal_mm, const char* origin = "ACTUAL") {
     const SmallStudy study;
     for (const int n : {0, 1})
       edit(study.image(n), [&](DicomItem d) {
         d.put(DCM_TableTopLateralPosition, 0.0);
         d.put(DCM_TableTopLongitudinalPosition, longitudinal_mm);
-        d.put(DCM_TableTopVerticalPosition, 0.0);
+        d.put(DCM_TableTopVerticalPosition, longitudinal_mm == 0.0 ? 0.0 : -152.5);
+        d.put(DCM_ReportedValuesOrigin, origin);
       });
     edit(study.image(1), [](DicomItem d) { d.put(DCM_AcquisitionTime, "101800"); });
-    register_study(study);
+    register_study(study, {"--allow", "planned-geometry=a test"});
     return nlohmann::json::parse(std::ifstream(study.output() / "result.json"))["reasons"].dump();
   };
   EXPECT_THAT(reasons(0.0), HasSubstr("without table positions in all views"));
+  EXPECT_THAT(reasons(99999.0), HasSubstr("without table positions in all views"));
   EXPECT_THAT(reasons(812.0), testing::Not(HasSubstr("without table positions")));
+  EXPECT_THAT(reasons(812.0, "PLAN"), HasSubstr("without table positions in all views"));
+}
+
+TEST_F(RegisterCommandTest, ASwitchThatContradictsAReadOutNeedsAReview) {
+  const CommandOutcome outcome = register_study(study_, {"--couch-pitch", "1"});
+  EXPECT_EQ(outcome.exit_status, 3) << outcome.err;
+  EXPECT_THAT(result()["reasons"].dump(), HasSubstr("--couch-pitch 1 contradicts KV_G000"));
 }
 
 TEST_F(RegisterCommandTest, ViewsAreInTheOrderOfTheirLabels) {
@@ -265,7 +275,7 @@ TEST_F(RegisterCommandTest, AnglesThatNoCouchHasAreRefused) {
     EXPECT_EQ(outcome.exit_status, 2) << flag;
     EXPECT_THAT(outcome.err, HasSubstr(fmt::format("{}: {}, expected degrees from -", flag, angle)));
   }
-  EXPECT_EQ(register_study(study_, {"--couch-pitch", "359.5"}).exit_status, 0);
+  EXPECT_EQ(register_study(study_, {"--couch-pitch", "359.95"}).exit_status, 0);
 }
 
 // A switch supplies what is missing; a table that was seen to turn is refused whatever a switch says.

@@ -222,6 +222,9 @@ std::vector<BatchCase> scan_cases(const fs::path& folder, bool other_xrays, Note
       if (const std::string reason = unreadable_beside(parts, files); !reason.empty())
         throw Error("a file beside these X-rays may belong to them: " + reason);
       parts.ct = ct_paths(top, parts.ct, files);
+      parts.doubts = session.doubts;
+      for (const std::string& doubt : session.doubts)
+        notes.warnings.push_back(fmt::format("case {}: {}", session.name, doubt));
       cases.push_back({.name = session.name, .parts = std::move(parts), .anatomy = ""});
     } catch (const Error& error) {
       notes.warnings.push_back(

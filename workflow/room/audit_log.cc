@@ -8,10 +8,12 @@
 
 #include <array>
 #include <cerrno>
+#include <chrono>
 #include <cstring>
 #include <fstream>
 #include <sstream>
 #include <string_view>
+#include <thread>
 
 #include "base/error.h"
 #include "base/local_time.h"
@@ -47,6 +49,18 @@ int append_and_flush(int descriptor, std::string_view text) {
 
 }  // namespace
 
+void AuditLog::lock(int descriptor) const {
+  constexpr std::chrono::seconds kPatience(5);
+  const auto end = std::chrono::steady_clock::now() + kPatience;
+  while (::flock(descriptor, LOCK_EX | LOCK_NB) != 0) {
+    if (std::chrono::steady_clock::now() > end) {
+      ::close(descriptor);
+      throw Error(fmt::format("{}: another program has locked it", path_.string()));
+    }
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  }
+}
+
 void AuditLog::append(const std::string& event, const Json& details) {
   write(kept_ + line_of(event, details));
   kept_.clear();
@@ -70,7 +84,7 @@ void AuditLog::write_kept() {
 void AuditLog::write(const std::string& lines) const {
   const int descriptor = ::open(path_.c_str(), O_RDWR | O_APPEND | O_CREAT | O_CLOEXEC, 0640);
   if (descriptor < 0) throw Error(fmt::format("{}: cannot be written: {}", path_.string(), std::strerror(errno)));
-  ::flock(descriptor, LOCK_EX);
+  lock(descriptor);
   const off_t before = ::lseek(descriptor, 0, SEEK_END);
   char last = '\n';  // a line that was cut off gets an end
   const bool is_cut = before > 0 && ::pread(descriptor, &last, 1, before - 1) == 1 && last != '\n';
@@ -124,6 +138,8 @@ bool AuditLog::has_registration(const std::string& session, const std::string& r
   const auto found = registrations.find(session);
   return found != registrations.end() && found->second == record_sha256;
 }
+
+bool AuditLog::has_been_released(const std::string& session) const { return proofs().releases.contains(session); }
 
 bool AuditLog::has_release(const std::string& session, const std::string& release_sha256) const {
   const auto& releases = proofs().releases;

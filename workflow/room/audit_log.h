@@ -32,6 +32,7 @@ class AuditLog {
   // The following say what the lines prove. They throw Error if the log exists and cannot be read.
   // True if the newest registration of the session has this record.
   bool has_registration(const std::string& session, const std::string& record_sha256) const;
+  bool has_been_released(const std::string& session) const;
   // True if the newest release of the session has this file.
   bool has_release(const std::string& session, const std::string& release_sha256) const;
   // True if the peer has confirmed the object. Lines that were kept count, too.
@@ -54,6 +55,8 @@ class AuditLog {
     void add(const std::string& line);
   };
   void write(const std::string& lines) const;
+  // Waits a few seconds for other writers. Closes the file and throws Error if one of them does not end.
+  void lock(int descriptor) const;
   const Proofs& proofs() const;  // reads the log again if it has changed
 
   std::filesystem::path path_;

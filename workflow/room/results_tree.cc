@@ -205,11 +205,20 @@ Release ResultsTree::release(const std::string& session, const Releaser& release
   const SessionRecord record = checked(session);
   if (record.verdict == "rejected")
     throw Error(fmt::format("session {}: was rejected: there is nothing to release", session));
+  const bool is_again = audit_.has_been_released(session);
+  if (!releaser.is_person && record.verdict != "accepted")
+    throw Error(fmt::format("session {}: its verdict is {}: only a person can release it", session, record.verdict));
+  if (!releaser.is_person && is_again)
+    throw Error(
+        fmt::format("session {}: was released before, as audit.jsonl says, and {} is gone: only a person can release "
+                    "it again",
+                    session, release_file(session).string()));
   Release release{.session = session,
                   .releaser = releaser,
                   .on = local_time(),
                   .verdict = record.verdict,
                   .record = record.sha256,
+                  .is_again = is_again,
                   .objects = {},
                   .peers = peers};
   for (const char* file : {kRegistrationFile, "report.dcm"})
@@ -232,6 +241,7 @@ void ResultsTree::put_release(const Release& release) {
   std::error_code ignored;
   Json line = release_json(release);
   line["release"] = sha256_of(text);
+  if (release.is_again) line["again"] = true;
   try {
     audit_.append("released", line);
   } catch (const Error& error) {
@@ -315,7 +325,8 @@ void ResultsTree::prepare_to_send(const Delivery& delivery) {
 }
 
 bool ResultsTree::is_in_doubt(const Delivery& delivery) const {
-  return fs::exists(prepared_file(delivery)) || (is_marked(delivery) && !is_sent(delivery));
+  return fs::exists(prepared_file(delivery)) ||
+         is_marked(delivery) != audit_.has_sending(delivery.session, delivery.peer, delivery.object.sha256);
 }
 
 void ResultsTree::mark_sent(const Delivery& delivery, const std::string& answer) {

@@ -29,6 +29,7 @@ namespace isoshift {
 // Who releases a session: the name given, the user of the system, and the user who became that user by sudo.
 struct Releaser {
   std::string by, user, sudo_user;  // sudo_user: empty without sudo
+  bool is_person = true;            // false: the site's rule; it releases only what was accepted, and only once
 };
 
 // "J. Doe (user isoshift, sudo of jdoe)".
@@ -43,7 +44,8 @@ struct Release {
   Releaser releaser;
   std::string on;  // local time
   std::string verdict;
-  std::string record;  // SHA-256 of the session's record at the time of the release
+  std::string record;     // SHA-256 of the session's record at the time of the release
+  bool is_again = false;  // the audit log has an earlier release of the session, whose file is gone
   std::vector<Object> objects;
   std::vector<std::string> peers;
 };
@@ -100,7 +102,8 @@ class ResultsTree {
   // Writes the mark, which mark_sent() then only renames: if the disk is full, the object is not sent, since it could
   // not be marked.
   void prepare_to_send(const Delivery& delivery);
-  // True if a sending was prepared or marked, and the audit log has no line for it: the peer may have the object.
+  // True if a sending was prepared, or has its mark without its line in the audit log, or its line without its mark:
+  // the peer may have the object.
   bool is_in_doubt(const Delivery& delivery) const;
   void mark_sent(const Delivery& delivery, const std::string& answer);
 

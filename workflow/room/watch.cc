@@ -110,19 +110,22 @@ Verdict Watch::take_result(const std::string& session) {
   const SetupResult report = read_report(tree_.session(session));
   if (report.views.empty()) throw Error(fmt::format("{}: names no views", tree_.session(session).string()));
   for (const auto& view : report.views) registered_.insert(view.sop_instance_uid);
-  index_.add(session, report, obstacle_to_release(session));
+  const std::string obstacle = obstacle_to_release(session, report.verdict);
+  index_.add(session, report, obstacle);
   // What was made under another site file waits for a person.
-  if (watch_.site.automatic_release && report.verdict == Verdict::kAccepted && report.site &&
+  if (watch_.site.automatic_release && obstacle.empty() && report.verdict == Verdict::kAccepted && report.site &&
       report.site->sha256 == watch_.site.sha256)
     accepted_.insert(session);
   return report.verdict;
 }
 
 // Empty: there is a record of its registration. What the folder holds is checked when it is released.
-std::string Watch::obstacle_to_release(const std::string& session) const {
+std::string Watch::obstacle_to_release(const std::string& session, Verdict verdict) const {
   try {
-    (void)tree_.registered(session);
-    return "";
+    const SessionRecord record = tree_.registered(session);
+    if (record.verdict == to_string(verdict)) return "";
+    return fmt::format("session {}: its result says {}, the record of its registration {}: the result was changed",
+                       session, to_string(verdict), record.verdict);
   } catch (const Error& error) {
     return error.what();
   }
@@ -188,7 +191,9 @@ void Watch::begin_registration(const Complete& complete) {
     parts_.observer.say(fmt::format("session {}: {}", session, remark));
   try {
     tree_.check_is_new(session);
-    parts_.runner.begin(choose_parts(complete.files), tree_.registering(session));
+    StudyParts parts = choose_parts(complete.files);
+    parts.doubts = complete.session.doubts;
+    parts_.runner.begin(parts, tree_.registering(session));
     running_ = Running{.session = session, .news = complete.last};
   } catch (const std::exception& error) {
     fail(session, complete.last, {.why = error.what()});
@@ -237,7 +242,8 @@ void Watch::release_automatically() {
                       {.by = fmt::format("automatic, allowed by {} on {}", watch_.site.automatic_release->by,
                                          watch_.site.automatic_release->on),
                        .user = user_.name,
-                       .sudo_user = user_.sudo_user},
+                       .sudo_user = user_.sudo_user,
+                       .is_person = false},
                       watch_.names_of_peers());
       accepted_.erase(session);
     } catch (const std::exception& error) {

@@ -77,7 +77,7 @@ class Watch {
 
   void take_results();
   Verdict take_result(const std::string& session);
-  std::string obstacle_to_release(const std::string& session) const;
+  std::string obstacle_to_release(const std::string& session, Verdict verdict) const;
   void receive();
   void register_complete();
   std::vector<Complete> complete_sessions();

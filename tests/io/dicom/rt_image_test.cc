@@ -325,6 +325,10 @@ TEST_F(RtImageTest, AFrameWithoutItsIncrementHasNoTimeOfItsOwn) {
   edit(study_.image(0), [](DicomItem d) { d.put(DCM_FrameTime, 2500.0); });
   const std::vector<RtImage> told = read_rt_images(study_.image(0), notes_);
   ASSERT_TRUE(told[1].has_own_time);
+  for (const double no_step_ms : {0.0, -100.0}) {
+    edit(study_.image(0), [&](DicomItem d) { d.put(DCM_FrameTime, no_step_ms); });
+    EXPECT_FALSE(read_rt_images(study_.image(0), notes_)[1].has_own_time) << no_step_ms;
+  }
   EXPECT_NEAR(*acquisition_seconds(told[1]) - *acquisition_seconds(told[0]), 2.5, 1e-6);
 }
 
@@ -339,6 +343,10 @@ TEST_F(RtImageTest, DateAndTimeInOneAttributeAreRead) {
   EXPECT_EQ(acquired(of("20260301101530.25+0100")), "2026-03-01 10:15:30");
   EXPECT_NEAR(*acquisition_seconds(of("20260301101530.25")) - *acquisition_seconds(of("20260301101500")), 30.25, 1e-6);
   EXPECT_FALSE(acquisition_seconds(of("20260301")));
+  EXPECT_FALSE(acquisition_seconds(of("2026030110")));  // to the hour
+  // The night in which the clock is set back.
+  EXPECT_NEAR(*acquisition_seconds(of("20261025021030+0100")) - *acquisition_seconds(of("20261025021000+0200")), 3630.0,
+              1e-6);
 }
 
 TEST_F(RtImageTest, FramesWithoutExposuresShareTheGeometryOfTheFile) {

@@ -98,5 +98,13 @@ TEST_F(RtPlanTest, ASetupDisplacementAndAMissingApprovalAreWarnedOf) {
   EXPECT_THAT(outcome.err, HasSubstr("the plan is not approved (ApprovalStatus (300E,0002) is \"UNAPPROVED\")"));
 }
 
+TEST_F(RtPlanTest, AnIsocenterThatMovesIsRefused) {
+  edit(study_.plan(), [](DicomItem d) {
+    DicomItem beam = d.items(DCM_BeamSequence)[0];
+    beam.append_item(DCM_ControlPointSequence).put(DCM_IsocenterPosition, std::array{1.0, 2.0, 3.0});
+  });
+  EXPECT_THAT(error_of([](const RtPlan&) {}), HasSubstr("beams with a moving isocenter are not supported"));
+}
+
 }  // namespace
 }  // namespace isoshift

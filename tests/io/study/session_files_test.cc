@@ -104,6 +104,50 @@ TEST(Sessions, ARetakeBeforeAMoveIsNotPairedWithWhatFollowsSoonAfter) {
               testing::ElementsAre("ab", "c", "d"));
 }
 
+// The doubts of the only session of two X-rays.
+std::vector<std::string> doubts_of(const std::vector<StudyFiles::Image>& images,
+                                   const std::vector<StudyFiles::Image>& other_xrays = {}) {
+  StudyFiles files;
+  files.images = images;
+  files.other_xrays = other_xrays;
+  std::vector<std::string> doubts = {"there is no session of two X-rays"};
+  for (const SessionFiles& session : sessions_of(files, false))
+    if (session.images.size() == 2) doubts = session.doubts;
+  return doubts;
+}
+
+// Evidence that the couch may have moved between the views, of X-rays that are not in the session.
+TEST(Sessions, AnXrayBetweenTheViewsMakesThemDoubtful) {
+  using testing::ElementsAre;
+  using testing::HasSubstr;
+  const StudyFiles::Image ap = image("a", "AP", 0), lat = image("c", "LAT", 60);
+  EXPECT_THAT(doubts_of({ap, lat}), testing::IsEmpty());
+  StudyFiles::Image of_other_machine = image("b", "AP", 40);
+  of_other_machine.machine = "LINAC2";
+  EXPECT_THAT(doubts_of({ap, of_other_machine, lat}), ElementsAre(HasSubstr("/x/b was taken between these views")));
+  EXPECT_THAT(doubts_of({ap, image("b", "AP", 40, "P", "2"), lat}), ElementsAre(HasSubstr("between these views")));
+  EXPECT_THAT(doubts_of({ap, lat}, {image("b", "AP", 40)}), ElementsAre(HasSubstr("between these views")));
+  EXPECT_THAT(doubts_of({ap, image("b", "AP", std::nullopt), lat}),
+              ElementsAre(HasSubstr("/x/b shows AP, too, and when it was taken is not known")));
+  EXPECT_THAT(doubts_of({ap, image("b", "AP", 40, "Q"), lat}), testing::IsEmpty());
+  StudyFiles::Image at_couch = at_table(ap, -150), too = at_table(lat, -150);
+  at_couch.table.longitudinal_mm = too.table.longitudinal_mm = 812.0;
+  EXPECT_THAT(doubts_of({at_couch, of_other_machine, too}), testing::IsEmpty());  // the table did not move
+}
+
+TEST(Sessions, AnXrayWithoutItsPartnerMakesItsNeighborsDoubtful) {
+  using testing::ElementsAre;
+  using testing::HasSubstr;
+  // LAT and AP, the couch moves, LAT again, nearer to AP than AP is to the first LAT.
+  EXPECT_THAT(doubts_of({image("a", "LAT", 0), image("b", "AP", 60), image("c", "LAT", 88)}),
+              ElementsAre(HasSubstr("/x/a, 60 s before, has no partner")));
+  // Two imagers whose clocks are five minutes apart: AP and LAT, the couch moves, AP and LAT.
+  EXPECT_THAT(doubts_of({image("a", "AP", 0), image("b", "AP", 300), image("c", "LAT", 310), image("d", "LAT", 620)}),
+              ElementsAre(HasSubstr("/x/a, 300 s before, has no partner")));
+  // A retake long before a pair whose views belong together plainly.
+  EXPECT_THAT(doubts_of({image("a", "LAT", 60), image("b", "AP", 300), image("c", "LAT", 310)}), testing::IsEmpty());
+}
+
 TEST(Sessions, TwoMachinesAreTwoSessions) {
   StudyFiles::Image other = image("b", "LAT", 10);
   other.machine = "LINAC2";

@@ -1,7 +1,10 @@
 #include "workflow/room/audit_log.h"
 
+#include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/file.h>
+#include <unistd.h>
 
 #include <fstream>
 #include <iterator>
@@ -52,6 +55,16 @@ TEST_F(AuditLogTest, ProvesWhatItHasALineFor) {
   EXPECT_FALSE(log_.session_releasing("o2"));
   EXPECT_TRUE(log_.has_sending("a", "p", "o1"));
   EXPECT_FALSE(log_.has_sending("a", "q", "o1"));
+}
+
+TEST_F(AuditLogTest, ALogThatIsLockedForLongIsAnError) {
+  log_.append("registered", registration("r1"));
+  const int other = ::open(path_.c_str(), O_RDWR | O_CLOEXEC);
+  ASSERT_EQ(::flock(other, LOCK_EX), 0);
+  EXPECT_THROW(log_.append("registered", registration("r2")), Error);
+  ::close(other);
+  log_.append("registered", registration("r3"));
+  EXPECT_TRUE(log_.has_registration("a", "r3"));
 }
 
 TEST_F(AuditLogTest, TheNewestRegistrationCounts) {

@@ -158,6 +158,38 @@ TEST_F(ResultsTreeTest, AReleaseThatAnotherReplacedDoesNotCountAgain) {
   EXPECT_THAT(tree_.pending().refused[a_], HasSubstr("is not the newest release of session " + a_));
 }
 
+TEST_F(ResultsTreeTest, TheSitesRuleReleasesOnlyWhatWasAcceptedAndOnlyOnce) {
+  const Releaser rule{.by = "automatic", .user = "isoshift", .sudo_user = "", .is_person = false};
+  const std::string review = register_session(tree_, {"1.2.9"}, "review");
+  const auto error_of = [&](const std::string& session) {
+    try {
+      tree_.release(session, rule, {"record"});
+    } catch (const Error& error) {
+      return std::string(error.what());
+    }
+    return std::string();
+  };
+  EXPECT_THAT(error_of(review), HasSubstr("its verdict is review: only a person can release it"));
+  EXPECT_EQ(error_of(a_), "");
+  fs::remove(released(a_));
+  EXPECT_THAT(error_of(a_), HasSubstr("was released before, as audit.jsonl says"));
+  EXPECT_FALSE(tree_.is_released(a_));
+  EXPECT_TRUE(tree_.release(a_, kDoe, {"archive"}).is_again);
+  EXPECT_THAT(audit(), HasSubstr("\"again\":true"));
+}
+
+TEST_F(ResultsTreeTest, ALineWithoutItsMarkIsInDoubt) {
+  tree_.release(a_, kDoe, {"record"});
+  const Delivery sent = tree_.pending().deliveries[0];
+  tree_.prepare_to_send(sent);
+  tree_.mark_sent(sent, "");
+  EXPECT_FALSE(tree_.is_in_doubt(sent));
+  fs::remove(tree_.path() / "sent" / (a_ + ".record." + sent.object.file));
+  ResultsTree reopened(tree_.path());
+  EXPECT_EQ(reopened.pending().deliveries.size(), 2U);
+  EXPECT_TRUE(reopened.is_in_doubt(sent));  // the peer is asked first
+}
+
 TEST_F(ResultsTreeTest, AFolderInThePlaceOfAReleaseIsNamed) {
   fs::create_directory(released(a_));
   EXPECT_THAT(error_of_release(a_), HasSubstr(a_ + ".json: is a folder, expected a JSON file"));

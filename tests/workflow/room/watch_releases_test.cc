@@ -96,6 +96,28 @@ TEST_F(WatchReleases, OnlyAcceptedResultsAreReleasedWithoutAPerson) {
   EXPECT_THAT(room_.index(), HasSubstr("released by automatic, allowed by J. Doe on 2026-03-01"));
 }
 
+// A watch that began while result.json said something else must not remember it.
+TEST_F(WatchReleases, AVerdictThatWasExchangedForAWhileReleasesNothing) {
+  allow_automatic_release();
+  room_.runner.verdict = [](const auto&) { return Verdict::kReview; };
+  room_.start();
+  bring("P");
+  room_.pass(60s);
+  const fs::path result = room_.file.results / "sessions" / session("P") / "result.json";
+  std::string text;
+  std::getline(std::ifstream(result), text, '\0');
+  std::string exchanged = text;
+  exchanged.replace(exchanged.find("\"review\""), 8, "\"accepted\"");
+  replace_text(result, exchanged);
+  room_.start();
+  room_.pass(60s);
+  EXPECT_THAT(room_.index(), HasSubstr("the result was changed"));
+  replace_text(result, text);
+  room_.pass(60s);
+  EXPECT_FALSE(is_released("P"));
+  EXPECT_THAT(room_.sender.attempts(), IsEmpty());
+}
+
 TEST_F(WatchReleases, WhatWasMadeUnderAnotherSiteFileWaitsForAPerson) {
   allow_automatic_release();
   room_.runner.site_sha256 = "an earlier site file";
