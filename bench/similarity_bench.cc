@@ -18,6 +18,7 @@ std::vector<float> pixels_of(int count, std::uint64_t seed) {
   std::mt19937_64 random(seed);
   std::normal_distribution<float> noise(0.0F, 0.05F);
   std::vector<float> pixels;
+  pixels.reserve(static_cast<std::size_t>(count));
   for (int n = 0; n < count; ++n)
     pixels.push_back(2.0F + std::sin(0.05F * static_cast<float>(n % 256)) + noise(random));
   return pixels;
