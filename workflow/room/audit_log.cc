@@ -11,6 +11,7 @@
 #include <chrono>
 #include <cstring>
 #include <fstream>
+#include <iterator>
 #include <sstream>
 #include <string_view>
 #include <thread>
@@ -18,6 +19,7 @@
 #include "base/error.h"
 #include "base/local_time.h"
 #include "base/output_folder.h"
+#include "base/sha256.h"
 
 namespace isoshift {
 namespace {
@@ -111,12 +113,18 @@ void AuditLog::Proofs::add(const std::string& text) {
       if (object.is_object()) objects.emplace(text_of(object, "sha256"), session);
 }
 
+void AuditLog::refuse_another_log() const {
+  throw Error(
+      fmt::format("{}: is gone, was cut, or is another file than before. Nothing is released or sent until "
+                  "isoshift watch is started again, by a person who knows why",
+                  path_.string()));
+}
+
 const AuditLog::Proofs& AuditLog::proofs() const {
   struct stat status{};
   if (::stat(path_.c_str(), &status) != 0) {
     if (errno != ENOENT) throw Error(fmt::format("{}: cannot be read: {}", path_.string(), std::strerror(errno)));
-    read_version_ = {};
-    proofs_ = {};
+    if (read_text_.size > 0) refuse_another_log();
     return proofs_;
   }
   const bool is_same = status.st_ino == read_version_.inode && status.st_size == read_version_.size &&
@@ -124,12 +132,19 @@ const AuditLog::Proofs& AuditLog::proofs() const {
                        status.st_mtim.tv_nsec == read_version_.written.tv_nsec;
   if (is_same) return proofs_;
   if (!S_ISREG(status.st_mode)) throw Error(fmt::format("{}: cannot be read: it is not a plain file", path_.string()));
-  std::ifstream file(path_);
+  std::ifstream file(path_, std::ios::binary);
+  const std::string text{std::istreambuf_iterator<char>(file), {}};
   if (!file) throw Error(fmt::format("{}: cannot be read", path_.string()));
+  if (text.size() < read_text_.size ||
+      (read_text_.size > 0 && sha256_of(text.substr(0, read_text_.size)) != read_text_.sha256))
+    refuse_another_log();
   Proofs proofs;
-  for (std::string text; std::getline(file, text);) proofs.add(text);
+  std::istringstream lines(text);
+  for (std::string line; std::getline(lines, line);) proofs.add(line);
   proofs_ = std::move(proofs);
   read_version_ = {.inode = status.st_ino, .size = status.st_size, .written = status.st_mtim};
+  const std::size_t whole = text.rfind('\n') + 1;  // without a line that is being written, or was cut off
+  read_text_ = {.size = whole, .sha256 = sha256_of(text.substr(0, whole))};
   return proofs_;
 }
 

@@ -29,7 +29,8 @@ class AuditLog {
   // Writes the lines that were kept. Throws Error if they still cannot be written.
   void write_kept();
 
-  // The following say what the lines prove. They throw Error if the log exists and cannot be read.
+  // The following say what the lines prove. They throw Error if the log exists and cannot be read, and if it is not the
+  // log that was read before, with more lines: a line may have been taken out.
   // True if the newest registration of the session has this record.
   bool has_registration(const std::string& session, const std::string& record_sha256) const;
   bool has_been_released(const std::string& session) const;
@@ -54,14 +55,20 @@ class AuditLog {
 
     void add(const std::string& line);
   };
+  struct Text {
+    std::size_t size = 0;
+    std::string sha256;
+  };
   void write(const std::string& lines) const;
   // Waits a few seconds for other writers. Closes the file and throws Error if one of them does not end.
   void lock(int descriptor) const;
   const Proofs& proofs() const;  // reads the log again if it has changed
+  [[noreturn]] void refuse_another_log() const;
 
   std::filesystem::path path_;
   std::string kept_;  // lines that could not be written yet
   mutable Version read_version_;
+  mutable Text read_text_;  // what was read: a log only grows
   mutable Proofs proofs_;
 };
 

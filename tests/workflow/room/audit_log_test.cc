@@ -73,8 +73,20 @@ TEST_F(AuditLogTest, TheNewestRegistrationCounts) {
   AuditLog(path_).append("registered", registration("r2"));  // by another process
   EXPECT_FALSE(log_.has_registration("a", "r1"));
   EXPECT_TRUE(log_.has_registration("a", "r2"));
+}
+
+TEST_F(AuditLogTest, LinesThatWereTakenOutAreNoticed) {
+  log_.append("registered", registration("r1"));
+  const std::string earlier = text();
+  log_.append("registered", registration("r2"));
+  EXPECT_TRUE(log_.has_registration("a", "r2"));
+  fs::resize_file(path_, earlier.size());
+  EXPECT_THROW(log_.has_registration("a", "r1"), Error);
   fs::remove(path_);
-  EXPECT_FALSE(log_.has_registration("a", "r2"));
+  EXPECT_THROW(log_.has_registration("a", "r1"), Error);
+  std::ofstream(path_) << earlier << earlier << earlier;  // another file
+  EXPECT_THROW(log_.has_registration("a", "r1"), Error);
+  EXPECT_TRUE(AuditLog(path_).has_registration("a", "r1"));  // started again
 }
 
 TEST_F(AuditLogTest, LinesThatAreNoneAreSkipped) {
