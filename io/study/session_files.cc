@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <iterator>
+#include <ranges>
 #include <set>
 #include <span>
 #include <tuple>
@@ -66,12 +67,14 @@ struct Timeline {
   std::vector<std::string> retakes(std::size_t oldest, std::size_t newest) const {
     std::vector<std::string> words;
     for (std::size_t n = oldest; n <= newest; ++n)
-      for (std::size_t before = oldest; before-- > 0 && *images[n].at_s - *images[before].at_s <= kMaxTimeSpanS;)
-        if (!images[n].label.empty() && images[before].label == images[n].label) {
-          words.push_back(fmt::format("{} was taken again {:.0f} s after {}", images[n].label,
-                                      *images[n].at_s - *images[before].at_s, images[before].file.string()));
-          break;
-        }
+      for (const StudyFiles::Image& before : images.first(oldest) | std::views::reverse) {
+        const double after_s = *images[n].at_s - *before.at_s;
+        if (after_s > kMaxTimeSpanS) break;
+        if (images[n].label.empty() || before.label != images[n].label) continue;
+        words.push_back(
+            fmt::format("{} was taken again {:.0f} s after {}", images[n].label, after_s, before.file.string()));
+        break;
+      }
     return words;
   }
 
@@ -217,11 +220,10 @@ std::vector<SessionFiles> sessions_of(const StudyFiles& files, bool other_xrays,
   }
   // Evidence are all X-rays, those that are not to be registered, too.
   if (!other_xrays) take_new(files.other_xrays);
-  std::vector<std::vector<std::string>> doubts;
-  for (const SessionFiles& session : sessions) doubts.push_back(Doubts(images, sessions).of(session));
-  for (std::size_t n = 0; n < sessions.size(); ++n) {
-    sessions[n].name = name_of(sessions[n].images);
-    sessions[n].doubts = std::move(doubts[n]);
+  const Doubts doubts(images, sessions);
+  for (SessionFiles& session : sessions) {
+    session.name = name_of(session.images);
+    session.doubts = doubts.of(session);
   }
   return sessions;
 }

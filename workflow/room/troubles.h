@@ -31,6 +31,7 @@ class Troubles {
 
   std::vector<std::string> lines() const {
     std::vector<std::string> lines;
+    lines.reserve(why_.size());
     for (const auto& [what, why] : why_) lines.push_back(fmt::format("{}: {}", what, why));
     return lines;
   }
