@@ -34,10 +34,6 @@ struct CheckOptions {
 };
 
 void CheckOptions::check() const {
-  const auto check_finite = [](const char* flag, const auto& values) {
-    for (const double value : values)
-      if (!std::isfinite(value)) throw UsageError(fmt::format("{}: {} is not a finite number", flag, value));
-  };
   check_finite("--isocenter", isocenter);
   check_finite("--source-isocenter", source_isocenter);
   const bool asks_for_shift = !plan.empty() || !isocenter.empty() || !patient_position.empty();

@@ -70,6 +70,12 @@ std::vector<Finding> setting_doubts(std::span<const RtImage> images) {
   return doubts;
 }
 
+// The switch that supplies a table angle.
+const char* flag_of(const TableReadOut& read_out) {
+  if (read_out.tag == DCM_PatientSupportAngle) return "--couch-angle";
+  return read_out.tag == DCM_TableTopPitchAngle ? "--couch-pitch" : "--couch-roll";
+}
+
 // Views too far apart in time, or views whose distance in time is not known.
 std::optional<Finding> time_doubt(std::span<const RtImage> images, double max_span_s) {
   const RtImage* earliest = &images.front();
@@ -146,18 +152,15 @@ std::vector<Finding> session_findings(std::span<const RtImage> images, Notes& no
 
 std::vector<Finding> switch_doubts(std::span<const RtImage> images, const RtImageSwitches& switches) {
   std::vector<Finding> doubts;
-  const auto compare = [&](const char* flag, const std::optional<double>& supplied_deg,
-                           std::optional<double> TableReadOuts::* angle_deg, const DcmTagKey& tag) {
+  const TableReadOuts supplied{.support_angle_deg = switches.couch_angle_deg,
+                               .pitch_deg = switches.couch_pitch_deg,
+                               .roll_deg = switches.couch_roll_deg};
+  for (const TableReadOut& read_out : table_read_outs())
     for (const RtImage& image : images)
-      if (const auto& read_deg = image.table.*angle_deg;
-          supplied_deg && read_deg &&
-          std::abs(wrapped_rad(rad_from_deg(*supplied_deg - *read_deg))) > rad_from_deg(kMaxTableTurnDeg))
-        doubts.push_back({"table-moved", fmt::format("{} {} contradicts {}: {} is {}", flag, *supplied_deg, image.label,
-                                                     described(tag), *read_deg)});
-  };
-  compare("--couch-angle", switches.couch_angle_deg, &TableReadOuts::support_angle_deg, DCM_PatientSupportAngle);
-  compare("--couch-pitch", switches.couch_pitch_deg, &TableReadOuts::pitch_deg, DCM_TableTopPitchAngle);
-  compare("--couch-roll", switches.couch_roll_deg, &TableReadOuts::roll_deg, DCM_TableTopRollAngle);
+      if (table_change(read_out, supplied, image.table))
+        doubts.push_back({"table-moved",
+                          fmt::format("{} {} contradicts {}: {} is {}", flag_of(read_out), *(supplied.*read_out.value),
+                                      image.label, described(read_out.tag), *(image.table.*read_out.value))});
   return doubts;
 }
 

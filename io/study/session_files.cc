@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <iterator>
+#include <map>
 #include <ranges>
 #include <set>
 #include <span>
@@ -119,7 +120,12 @@ std::vector<SessionFiles> untimed_sessions(Images images, const std::set<std::st
 class Doubts {
  public:
   // `sessions`: all that were found among the `images` of all patients.
-  Doubts(Images images, const std::vector<SessionFiles>& sessions) : images_(images), sessions_(sessions) {}
+  Doubts(Images images, const std::vector<SessionFiles>& sessions) {
+    for (const StudyFiles::Image& image : images) of_patient_[patient_id_of(image.patient)].push_back(&image);
+    for (const SessionFiles& session : sessions)
+      for (const StudyFiles::Image& image : session.images)
+        size_of_session_[image.sop_instance_uid] = session.images.size();
+  }
 
   std::vector<std::string> of(const SessionFiles& session) const {
     Images own = session.images;
@@ -128,8 +134,9 @@ class Doubts {
       return {};
     std::vector<std::string> doubts;
     const StudyFiles::Image *before = nullptr, *after = nullptr;
-    for (const StudyFiles::Image& other : images_) {
-      if (patient_id_of(other.patient) != patient_id_of(session.patient) || is_in(session, other)) continue;
+    for (const StudyFiles::Image* const one : of_patient_.at(patient_id_of(session.patient))) {
+      const StudyFiles::Image& other = *one;
+      if (is_in(session, other)) continue;
       if (!other.at_s) {
         if (has_label(own, other.label))
           doubts.push_back(
@@ -154,8 +161,8 @@ class Doubts {
 
   // Whether the X-ray is of a session that lacks a view which `own` has: its own view may be in this one.
   bool is_incomplete(const StudyFiles::Image& image, Images own) const {
-    const auto session = std::ranges::find_if(sessions_, [&](const auto& one) { return is_in(one, image); });
-    return session != sessions_.end() && session->images.size() < own.size();
+    const auto size = size_of_session_.find(image.sop_instance_uid);
+    return size != size_of_session_.end() && size->second < own.size();
   }
 
   // An X-ray without its partner shortly before or after the session may be the partner of one of its views.
@@ -176,8 +183,8 @@ class Doubts {
     return "";
   }
 
-  Images images_;
-  const std::vector<SessionFiles>& sessions_;
+  std::map<std::string, std::vector<const StudyFiles::Image*>> of_patient_;  // X-rays, by PatientID
+  std::map<std::string, std::size_t> size_of_session_;                       // by SOPInstanceUID of its X-rays
 };
 
 }  // namespace

@@ -31,6 +31,11 @@ double number_from(const std::string& text, std::string_view flag) {
 
 }  // namespace
 
+void check_finite(const char* flag, std::span<const double> values) {
+  for (const double value : values)
+    if (!std::isfinite(value)) throw UsageError(fmt::format("{}: {} is not a finite number", flag, value));
+}
+
 void check_couch_angles(const std::optional<double>& couch_angle_deg, const std::optional<double>& couch_pitch_deg,
                         const std::optional<double>& couch_roll_deg) {
   constexpr double kTurnDeg = 360.0, kMostTiltedDeg = 45.0;
@@ -44,20 +49,16 @@ void check_couch_angles(const std::optional<double>& couch_angle_deg, const std:
           fmt::format("{}: {}, expected degrees from -45 to 45: no table top tilts farther", flag, angle_deg));
 }
 
-void StudyOptions::check_finite() const {
-  const auto check = [](const char* flag, const auto& values) {
-    for (const double value : values)
-      if (!std::isfinite(value)) throw UsageError(fmt::format("{}: {} is not a finite number", flag, value));
-  };
-  check("--isocenter", isocenter);
-  check("--rt-image-position", rt_image_position);
+void StudyOptions::check_numbers() const {
+  check_finite("--isocenter", isocenter);
+  check_finite("--rt-image-position", rt_image_position);
   check_couch_angles(couch_angle_deg, couch_pitch_deg, couch_roll_deg);
-  check("--sad", std::array{sad_mm.value_or(0.0)});
-  check("--sid", std::array{sid_mm.value_or(0.0)});
+  check_finite("--sad", std::array{sad_mm.value_or(0.0)});
+  check_finite("--sid", std::array{sid_mm.value_or(0.0)});
 }
 
 StudyRequest StudyOptions::request() const {
-  check_finite();
+  check_numbers();
   StudyRequest request;
   if (parts.study.empty() && (parts.ct.empty() || parts.images.empty()))
     throw UsageError("which study? Name its folder, or its parts with --ct and --image");

@@ -1,6 +1,7 @@
 #pragma once
 // Which study the user means, and which values the user supplies for it, for every command that reads a study.
 
+#include <span>
 #include <string>
 #include <vector>
 
@@ -8,6 +9,9 @@
 #include "workflow/observer.h"
 
 namespace isoshift {
+
+// Throws UsageError if one of the values of a flag is not finite.
+void check_finite(const char* flag, std::span<const double> values);
 
 // Throws UsageError for an angle of the couch at imaging that no couch has, in degrees, IEC 61217.
 void check_couch_angles(const std::optional<double>& couch_angle_deg, const std::optional<double>& couch_pitch_deg,
@@ -27,7 +31,7 @@ struct StudyOptions {
   StudyRequest request() const;
 
  private:
-  void check_finite() const;
+  void check_numbers() const;
 };
 
 // Loads the study and tells the observer which files were left aside.

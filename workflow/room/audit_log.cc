@@ -19,7 +19,6 @@
 #include "base/error.h"
 #include "base/local_time.h"
 #include "base/output_folder.h"
-#include "base/sha256.h"
 
 namespace isoshift {
 namespace {
@@ -36,6 +35,11 @@ std::string line_of(const std::string& event, const Json& details) {
 std::string text_of(const Json& line, const char* key) {
   const auto found = line.find(key);
   return found != line.end() && found->is_string() ? found->get<std::string>() : "";
+}
+
+bool has(const std::map<std::string, std::string>& entries, const std::string& key, const std::string& value) {
+  const auto found = entries.find(key);
+  return found != entries.end() && found->second == value;
 }
 
 // 0, or the errno of what failed: then all of it may be missing.
@@ -98,6 +102,11 @@ void AuditLog::write(const std::string& lines) const {
   if (before == 0) flush(path_.parent_path());
 }
 
+void AuditLog::Proofs::add_lines(const std::string& text) {
+  std::istringstream lines(text);
+  for (std::string line; std::getline(lines, line);) add(line);
+}
+
 // A line that was cut off proves nothing.
 void AuditLog::Proofs::add(const std::string& text) {
   const Json line = Json::parse(text, nullptr, false);
@@ -124,7 +133,7 @@ const AuditLog::Proofs& AuditLog::proofs() const {
   struct stat status{};
   if (::stat(path_.c_str(), &status) != 0) {
     if (errno != ENOENT) throw Error(fmt::format("{}: cannot be read: {}", path_.string(), std::strerror(errno)));
-    if (read_text_.size > 0) refuse_another_log();
+    if (!read_lines_.empty()) refuse_another_log();
     return proofs_;
   }
   const bool is_same = status.st_ino == read_version_.inode && status.st_size == read_version_.size &&
@@ -135,38 +144,29 @@ const AuditLog::Proofs& AuditLog::proofs() const {
   std::ifstream file(path_, std::ios::binary);
   const std::string text{std::istreambuf_iterator<char>(file), {}};
   if (!file) throw Error(fmt::format("{}: cannot be read", path_.string()));
-  if (text.size() < read_text_.size ||
-      (read_text_.size > 0 && sha256_of(text.substr(0, read_text_.size)) != read_text_.sha256))
-    refuse_another_log();
+  if (!text.starts_with(read_lines_)) refuse_another_log();
   Proofs proofs;
-  std::istringstream lines(text);
-  for (std::string line; std::getline(lines, line);) proofs.add(line);
+  proofs.add_lines(text);
   proofs_ = std::move(proofs);
   read_version_ = {.inode = status.st_ino, .size = status.st_size, .written = status.st_mtim};
-  const std::size_t whole = text.rfind('\n') + 1;  // without a line that is being written, or was cut off
-  read_text_ = {.size = whole, .sha256 = sha256_of(text.substr(0, whole))};
+  read_lines_ = text.substr(0, text.rfind('\n') + 1);  // without a line that is being written, or was cut off
   return proofs_;
 }
 
 bool AuditLog::has_registration(const std::string& session, const std::string& record_sha256) const {
-  const auto& registrations = proofs().registrations;
-  const auto found = registrations.find(session);
-  return found != registrations.end() && found->second == record_sha256;
+  return has(proofs().registrations, session, record_sha256);
 }
 
 bool AuditLog::has_been_released(const std::string& session) const { return proofs().releases.contains(session); }
 
 bool AuditLog::has_release(const std::string& session, const std::string& release_sha256) const {
-  const auto& releases = proofs().releases;
-  const auto found = releases.find(session);
-  return found != releases.end() && found->second == release_sha256;
+  return has(proofs().releases, session, release_sha256);
 }
 
 bool AuditLog::has_sending(const std::string& session, const std::string& peer,
                            const std::string& object_sha256) const {
   Proofs kept;
-  std::istringstream lines(kept_);
-  for (std::string line; std::getline(lines, line);) kept.add(line);
+  kept.add_lines(kept_);
   const std::array sending = {session, peer, object_sha256};
   return kept.sendings.contains(sending) || proofs().sendings.contains(sending);
 }

@@ -53,11 +53,8 @@ class AuditLog {
     std::map<std::string, std::string> objects;        // session, by SHA-256 of a released object
     std::set<std::array<std::string, 3>> sendings;     // session, peer, SHA-256 of the object
 
+    void add_lines(const std::string& text);
     void add(const std::string& line);
-  };
-  struct Text {
-    std::size_t size = 0;
-    std::string sha256;
   };
   void write(const std::string& lines) const;
   // Waits a few seconds for other writers. Closes the file and throws Error if one of them does not end.
@@ -68,7 +65,7 @@ class AuditLog {
   std::filesystem::path path_;
   std::string kept_;  // lines that could not be written yet
   mutable Version read_version_;
-  mutable Text read_text_;  // what was read: a log only grows
+  mutable std::string read_lines_;  // the whole lines that were read: a log only grows
   mutable Proofs proofs_;
 };
 

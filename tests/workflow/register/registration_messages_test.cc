@@ -4,17 +4,12 @@
 #include <gtest/gtest.h>
 
 #include "base/error.h"
+#include "tests/support/message_line.h"
 
 namespace isoshift {
 namespace {
 
 using testing::HasSubstr;
-
-std::string line_without_end(std::string line) {
-  EXPECT_EQ(line.find('\n'), line.size() - 1) << "one message, one line";
-  line.pop_back();
-  return line;
-}
 
 std::string error_of(const std::string& line) {
   try {
