@@ -1,7 +1,8 @@
 # isoshift_library(NAME SOURCE...): a static library isoshift_NAME, a box of ARCHITECTURE.md.
 #
 # Headers that most sources include are compiled once for all boxes (bench/results/build-time.md has what that saves).
-# Sources include what they use all the same: with -DISOSHIFT_PCH=OFF, as ./dev lint builds, nothing is precompiled.
+# Presets for whole builds also compile several sources of a box together (CMAKE_UNITY_BUILD); the preset dev does not, since
+# there a changed source is compiled alone. Sources include what they use all the same: ./dev lint reads them one by one, with -DISOSHIFT_PCH=OFF.
 option(ISOSHIFT_PCH "Precompile the headers that most sources include" ON)
 
 set(isoshift_common_headers

@@ -37,12 +37,12 @@ void put_common(DicomItem dataset, const Identity& identity, const char* sop_cla
   dataset.put(DCM_OperatorsName, "");
 }
 
-struct Body {
+struct ScannedPart {
   Eigen::Vector3d extent_mm, center_from_isocenter_mm;
-  const char* part;  // BodyPartExamined
+  const char* name;  // BodyPartExamined
 };
 
-Body body_of(PhantomOptions::Anatomy anatomy) {
+ScannedPart part_of(PhantomOptions::Anatomy anatomy) {
   switch (anatomy) {
     case PhantomOptions::Anatomy::kHead: return {{190, 230, 216}, {0, 0, 4}, "HEAD"};
     case PhantomOptions::Anatomy::kSpine: return {{320, 220, 180}, {0, -25, 0}, "LSPINE"};
@@ -52,17 +52,17 @@ Body body_of(PhantomOptions::Anatomy anatomy) {
 }
 
 CtLattice lattice_of(const PhantomOptions& options) {
-  const Body body = body_of(options.anatomy);
+  const ScannedPart part = part_of(options.anatomy);
   CtLattice lattice;
   lattice.spacing_mm = Eigen::Vector3d(options.voxel_mm, options.voxel_mm, kSliceToPixel * options.voxel_mm);
-  lattice.size = (body.extent_mm.array() / lattice.spacing_mm.array()).round().cast<int>();
+  lattice.size = (part.extent_mm.array() / lattice.spacing_mm.array()).round().cast<int>();
   // Tilted slices lean against the table, which moves along z: the voxels' axes are sheared.
   const double tilt_rad = options.ct_tilt_deg * std::numbers::pi / 180.0;
   lattice.along_columns = Eigen::Vector3d(0.0, std::cos(tilt_rad), std::sin(tilt_rad));
   lattice.patient_from_voxel.linear() << Eigen::Vector3d::UnitX() * lattice.spacing_mm.x(),
       lattice.along_columns * lattice.spacing_mm.y(), Eigen::Vector3d::UnitZ() * lattice.spacing_mm.z();
   lattice.patient_from_voxel.translation() =
-      options.placement.isocenter_patient_mm + body.center_from_isocenter_mm -
+      options.placement.isocenter_patient_mm + part.center_from_isocenter_mm -
       0.5 * (lattice.patient_from_voxel.linear() * Eigen::Vector3d((lattice.size.array() - 1).cast<double>()));
   return lattice;
 }
@@ -146,7 +146,7 @@ std::vector<std::string> write_ct(const PhantomOptions& options, const StudyUids
     put_common(dataset, study.identity, UID_CTImageStorage, instances.back(), "CT", series_uid,
                study.frame_of_reference);
     dataset.put(DCM_ImageType, "ORIGINAL\\PRIMARY\\AXIAL");
-    dataset.put(DCM_BodyPartExamined, body_of(options.anatomy).part);
+    dataset.put(DCM_BodyPartExamined, part_of(options.anatomy).name);
     dataset.put(DCM_PatientPosition, options.placement.patient_position);
     dataset.put(DCM_KVP, 120.0);
     dataset.put(DCM_AcquisitionNumber, "1");
