@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <optional>
+#include <utility>
 
 namespace isoshift {
 
@@ -16,9 +17,13 @@ class FileLock {
   FileLock(FileLock&& other) noexcept;
   FileLock& operator=(FileLock&&) = delete;
 
- private:
-  explicit FileLock(int descriptor) : descriptor_(descriptor) {}
+  // False if the file was removed or replaced: then another process can take a lock of the same name.
+  bool is_in_place() const;
 
+ private:
+  FileLock(std::filesystem::path path, int descriptor) : path_(std::move(path)), descriptor_(descriptor) {}
+
+  std::filesystem::path path_;
   int descriptor_;
 };
 

@@ -1,8 +1,8 @@
 # isoshift_library(NAME SOURCE...): a static library isoshift_NAME, a box of ARCHITECTURE.md.
 #
-# Headers that most sources include are compiled once for all boxes (bench/results/build-time.md has what that saves).
-# Presets for whole builds also compile several sources of a box together (CMAKE_UNITY_BUILD); the preset dev does not, since
-# there a changed source is compiled alone. Sources include what they use all the same: ./dev lint reads them one by one, with -DISOSHIFT_PCH=OFF.
+# Headers that most sources include are compiled once for all boxes, and several sources of a box are compiled together
+# (CMAKE_UNITY_BUILD in the presets); bench/results/build-time.md has what that saves. Sources include what they use all
+# the same: ./dev lint reads each by itself, without either.
 option(ISOSHIFT_PCH "Precompile the headers that most sources include" ON)
 
 set(isoshift_common_headers

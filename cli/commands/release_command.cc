@@ -14,8 +14,10 @@
 #include "base/system_user.h"
 #include "cli/commands/commands.h"
 #include "io/config/watch_file.h"
+#include "io/report/result_folder.h"
 #include "workflow/room/deliver.h"
 #include "workflow/room/results_tree.h"
+#include "workflow/room/session_index.h"
 
 namespace isoshift {
 namespace {
@@ -48,6 +50,9 @@ void run_release(const std::filesystem::path& file, const std::string& session, 
   const SystemUser user = system_user();
   const Release release =
       tree.release(session, {.by = by, .user = user.name, .sudo_user = user.sudo_user}, watch.names_of_peers());
+  const SetupResult result = read_report(tree.session(session));
+  console.out << fmt::format("{} ({}), {}\n", result.identity.patient_name, result.identity.patient_id,
+                             times_of(result.views));
   console.out << fmt::format("released by {}; the verdict was {}\n", to_string(release.releaser), release.verdict);
   if (release.is_again)
     console.err << "warning: the session was released before, as the audit log says, and the file of that release is "

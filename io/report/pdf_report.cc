@@ -248,7 +248,7 @@ class PdfReport {
       y_ += height;
     }
     if (n == first) return n;
-    const std::string legend = n < report_.views.size() ? std::string(kLegend) + " More on the next page." : kLegend;
+    const std::string legend = fmt::format("{}{}", kLegend, n < report_.views.size() ? " More on the next page." : "");
     y_ += canvas_.text(kMargin, y_, legend, legend_style()) + 2.0;
     return n;
   }

@@ -174,10 +174,10 @@ class Doubts {
     const double after_s = after != nullptr ? *after->at_s - *own.back().at_s : kMaxTimeSpanS + 1.0;
     const bool lacks_before = before_s <= kMaxTimeSpanS && is_incomplete(*before, own);
     const bool lacks_after = after_s <= kMaxTimeSpanS && is_incomplete(*after, own);
-    if (lacks_before && (lacks_after || before_s < kMuchLonger * longest_s))
+    if (lacks_before && (lacks_after || before_s <= kMuchLonger * longest_s))
       return fmt::format("{}, {:.0f} s before, has no partner, and may belong to one of these views",
                          before->file.string(), before_s);
-    if (lacks_after && after_s < kMuchLonger * longest_s)
+    if (lacks_after && after_s <= kMuchLonger * longest_s)
       return fmt::format("{}, {:.0f} s after, has no partner, and may belong to one of these views",
                          after->file.string(), after_s);
     return "";
@@ -275,6 +275,18 @@ std::string missing_ct_images(const StudyFiles& of_session) {
                            structures.ct_sop_instance_uids.size());
     }
   }
+  return "";
+}
+
+std::string unreadable_beside(const StudyParts& parts, const std::vector<std::string>& unreadable) {
+  std::set<std::string> folders;
+  for (const auto& files : {parts.ct, parts.images})
+    for (const fs::path& file : files) folders.insert(file.parent_path().string() + "/");
+  for (const std::string& reason : unreadable)
+    for (const std::string& folder : folders)
+      if (reason.starts_with(folder) &&
+          reason.substr(0, reason.find(": ")).find('/', folder.size()) == std::string::npos)
+        return reason;
   return "";
 }
 

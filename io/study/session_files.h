@@ -41,6 +41,10 @@ StudyFiles files_for(const SessionFiles& session, const StudyFiles& files);
 // structure set tells.
 std::string missing_ct_images(const StudyFiles& of_session);
 
+// Why a file in a folder of these CT images or X-rays cannot be read: it may be one of them. Empty if there is no such
+// file. `unreadable`: messages, each beginning with the file's path.
+std::string unreadable_beside(const StudyParts& parts, const std::vector<std::string>& unreadable);
+
 // The missing objects to which the session's files refer, in words. Empty if nothing is missing.
 std::vector<std::string> missing_parts(const StudyFiles& of_session);
 

@@ -214,6 +214,31 @@ TEST_F(BatchCommandTest, ScanDoesNotPairARetakeAcrossACouchMove) {
   EXPECT_THAT(found, ElementsAre(ElementsAre("KV_G000", "KV_G090"), ElementsAre("c"), ElementsAre("d", "e")));
 }
 
+// A partner that may belong to either session is a doubt, which a manifest keeps: a batch that goes on reads the
+// manifest.
+TEST_F(BatchCommandTest, AManifestKeepsTheDoubtsOfTheScan) {
+  const fs::path images = exported() / "1" / "RTIMAGE";
+  fs::remove_all(exported() / "2");
+  fs::remove_all(images / "F02");
+  const auto take = [&](const char* name, const char* to, const char* time) {
+    if (std::string_view(name) != to) fs::copy_file(images / name, images / to);
+    edit(images / to, [&](DicomItem d) {
+      d.put(DCM_SOPInstanceUID, fmt::format("1.2.{}", time + 1));
+      d.put(DCM_AcquisitionTime, time);
+      for (const TableReadOut& read_out : table_read_outs()) d.erase(read_out.tag);
+    });
+  };
+  take("KV_G000.dcm", "KV_G000.dcm", "101600");
+  take("KV_G090.dcm", "before.dcm", "101500");
+  take("KV_G090.dcm", "KV_G090.dcm", "101630");
+  const fs::path manifest = folder_ / "cases.csv";
+  ASSERT_EQ(run_command({"batch", "--scan", exported().string(), "-o", manifest.string()}).exit_status, 0);
+  std::vector<std::string> doubts;
+  for (const BatchCase& one : read_manifest(manifest))
+    if (one.parts.images.size() == 2) doubts = one.parts.doubts;
+  EXPECT_THAT(doubts, testing::ElementsAre(HasSubstr("before.dcm, 60 s before, has no partner")));
+}
+
 class ManifestTest : public testing::Test {
  protected:
   std::string error_of(const std::string& text) const {
@@ -229,9 +254,9 @@ class ManifestTest : public testing::Test {
 };
 
 TEST_F(ManifestTest, TablesAndJsonLinesSayTheSame) {
-  std::ofstream(folder_ / "m.csv") << "case,ct,images,anatomy\n\"a\",\"CT, planning\",a.dcm;b.dcm,head\n";
+  std::ofstream(folder_ / "m.csv") << "case,ct,images,anatomy,doubts\n\"a\",\"CT, planning\",a.dcm;b.dcm,head,moved\n";
   std::ofstream(folder_ / "m.jsonl")
-      << R"({"case": "a", "ct": "CT, planning", "images": ["a.dcm", "b.dcm"], "anatomy": "head"})"
+      << R"({"case": "a", "ct": "CT, planning", "images": ["a.dcm", "b.dcm"], "anatomy": "head", "doubts": ["moved"]})"
       << "\n";
   for (const char* name : {"m.csv", "m.jsonl"}) {
     const auto cases = read_manifest(folder_ / name);
@@ -239,6 +264,7 @@ TEST_F(ManifestTest, TablesAndJsonLinesSayTheSame) {
     EXPECT_EQ(cases[0].parts.ct, std::vector{folder_ / "CT, planning"});
     EXPECT_EQ(cases[0].parts.images, (std::vector{folder_ / "a.dcm", folder_ / "b.dcm"}));
     EXPECT_EQ(cases[0].anatomy, "head");
+    EXPECT_EQ(cases[0].parts.doubts, std::vector<std::string>{"moved"});
   }
 }
 

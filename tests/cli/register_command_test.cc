@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <array>
 #include <fstream>
 #include <nlohmann/json.hpp>
 
@@ -230,6 +231,22 @@ TEST_F(RegisterCommandTest, ViewsThatMayBeOfTwoSetupsNeedAReview) {
   EXPECT_THAT(reasons([](DicomItem d) { d.put(DCM_RadiationMachineName, "LINAC2"); }), HasSubstr("LINAC2"));
   EXPECT_THAT(reasons([](DicomItem d) { d.put(DCM_TableTopEccentricAngle, 3.0); }),
               HasSubstr("is 3 degrees in KV_G090 and missing in KV_G000"));
+}
+
+// The isocenter, in the frame of the CT, tells of a second plan or of a move that no read-out tells.
+TEST_F(RegisterCommandTest, ViewsOfTwoIsocentersNeedAReview) {
+  const auto reasons = [](double apart_mm) {
+    const SmallStudy study;
+    for (const int n : {0, 1})
+      edit(study.image(n), [&](DicomItem d) {
+        const std::array isocenter_mm = {0.0, 0.0, n * apart_mm};
+        d.put(DCM_IsocenterPosition, isocenter_mm);
+      });
+    register_study(study);
+    return nlohmann::json::parse(std::ifstream(study.output() / "result.json"))["reasons"].dump();
+  };
+  EXPECT_THAT(reasons(0.1), testing::Not(HasSubstr("different isocenters")));
+  EXPECT_THAT(reasons(2.0), HasSubstr("KV_G090 and KV_G000 have different isocenters"));
 }
 
 // Programs that know no table position write zeros or huge numbers, or the planned position: whether the table moved in

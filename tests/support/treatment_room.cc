@@ -63,6 +63,13 @@ double second_of(int hour, int minute, int second) { return 3600.0 * hour + 60.0
 
 void FakeSource::bring(const StudyFiles& object) { brought_.push_back(object); }
 
+const StudyFiles::Image* FakeSource::xray(const std::string& uid) const {
+  for (const auto& [patient_id, objects] : everything_)
+    if (const auto found = objects.find(uid); found != objects.end() && !found->second.images.empty())
+      return &found->second.images.front();
+  return nullptr;
+}
+
 void FakeSource::take(const std::string& patient_id, const std::string& uid, const StudyFiles& object) {
   Patient& patient = patients_[patient_id];
   patient.last = clock_.now();
@@ -90,7 +97,7 @@ void FakeSource::forget_before(std::filesystem::file_time_type time) {
 }
 
 void FakeRunner::begin(const StudyParts& parts, const std::filesystem::path& folder) {
-  Run& run = runs_.emplace_back(Run{.xrays = {}, .began = clock_.now()});
+  Run& run = runs_.emplace_back(Run{.xrays = {}, .doubts = parts.doubts, .began = clock_.now()});
   for (const auto& image : parts.images) run.xrays.insert(image.filename().string());
   folder_ = folder;
   is_running_ = true;
@@ -107,7 +114,12 @@ std::optional<Runner::End> FakeRunner::end() {
   report.site.emplace().sha256 = site_sha256;
   std::string all;
   for (const std::string& uid : run.xrays) {
-    report.views.emplace_back().sop_instance_uid = uid;
+    auto& view = report.views.emplace_back();
+    view.sop_instance_uid = uid;
+    if (const StudyFiles::Image* image = source_.xray(uid)) {
+      view.acquired = image->acquired;
+      report.identity.patient_id = patient_id_of(image->patient);
+    }
     all += uid;
   }
   std::filesystem::create_directories(folder_);

@@ -51,12 +51,18 @@ class FakeSource : public Source {
  public:
   explicit FakeSource(const Clock& clock) : clock_(clock) {}
 
+  std::vector<std::string> broken;  // messages on files that cannot be read
+
   void bring(const StudyFiles& object);  // comes with the next update
   void set_down(bool is_down) { is_down_ = is_down; }
   void set_coming(bool is_coming) { is_coming_ = is_coming; }
 
+  // The X-ray of this SOPInstanceUID; null where no X-ray of it was brought.
+  const StudyFiles::Image* xray(const std::string& uid) const;
+
   void update(Notes& notes) override;
   const std::map<std::string, Patient>& patients() const override { return patients_; }
+  std::vector<std::string> unreadable() const override { return broken; }
   bool is_coming(const std::string& /*patient_id*/) const override { return is_coming_; }
   void ask_for_rest(const std::string& patient_id) override { asked_.insert(patient_id); }
   void forget_before(std::filesystem::file_time_type time) override;
@@ -76,10 +82,11 @@ class FakeSource : public Source {
 
 class FakeRunner : public Runner {
  public:
-  explicit FakeRunner(const Clock& clock) : clock_(clock) {}
+  FakeRunner(const Clock& clock, const FakeSource& source) : clock_(clock), source_(source) {}
 
   struct Run {
-    std::set<std::string> xrays;  // SOPInstanceUIDs
+    std::set<std::string> xrays;      // SOPInstanceUIDs
+    std::vector<std::string> doubts;  // whether they show one setup
     Clock::Time began;
   };
   std::function<Verdict(const std::set<std::string>& xrays)> verdict = [](const auto&) { return Verdict::kAccepted; };
@@ -96,6 +103,7 @@ class FakeRunner : public Runner {
 
  private:
   const Clock& clock_;
+  const FakeSource& source_;
   std::vector<Run> runs_;
   std::filesystem::path folder_;
   bool is_running_ = false;
@@ -147,7 +155,7 @@ struct TreatmentRoom {
   WatchFile file;
   ManualClock clock;
   FakeSource source{clock};
-  FakeRunner runner{clock};
+  FakeRunner runner{clock, source};
   FakeSender sender{clock};
   SayingsObserver observer, sending;
   std::unique_ptr<Watch> watch;

@@ -22,8 +22,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::array kColumns = {"case", "study", "ct", "plan", "structures", "images", "anatomy"};
-constexpr char kBetweenPaths = ';';  // of one cell
+constexpr std::array kColumns = {"case", "study", "ct", "plan", "structures", "images", "anatomy", "doubts"};
+constexpr std::array kLists = {"ct", "images", "doubts"};  // columns whose cells may hold several texts
+constexpr char kBetween = ';';                             // the texts of one cell
 
 using Row = std::map<std::string, std::vector<std::string>, std::less<>>;  // by column
 struct NumberedRow {
@@ -35,7 +36,7 @@ std::vector<std::string> parts_of(const std::string& cell) {
   std::vector<std::string> parts;
   std::size_t begin = 0;
   while (begin <= cell.size()) {
-    const std::size_t end = std::min(cell.find(kBetweenPaths, begin), cell.size());
+    const std::size_t end = std::min(cell.find(kBetween, begin), cell.size());
     if (end > begin) parts.push_back(cell.substr(begin, end - begin));
     begin = end + 1;
   }
@@ -77,7 +78,7 @@ std::vector<NumberedRow> csv_rows(const std::string& text, const std::string& wh
     NumberedRow row{.line = static_cast<int>(n + 1), .cells = {}};
     for (std::size_t column = 0; column < names.size(); ++column)
       row.cells[names[column]] =
-          names[column] == "ct" || names[column] == "images"
+          std::ranges::find(kLists, names[column]) != kLists.end()
               ? parts_of(cells[column])
               : (cells[column].empty() ? std::vector<std::string>() : std::vector{cells[column]});
     rows.push_back(std::move(row));
@@ -130,7 +131,8 @@ BatchCase case_of(const NumberedRow& row, const fs::path& folder, const std::str
                                .ct = paths("ct"),
                                .images = paths("images"),
                                .plan = path(one("plan")),
-                               .structures = path(one("structures"))},
+                               .structures = path(one("structures")),
+                               .doubts = many("doubts")},
                      .anatomy = one("anatomy")};
   const auto is_allowed = [](unsigned char c) { return std::isalnum(c) != 0 || c == '.' || c == '_' || c == '-'; };
   if (one_case.name.empty() || one_case.name.starts_with('.') || !std::ranges::all_of(one_case.name, is_allowed))
@@ -156,23 +158,11 @@ std::vector<fs::path> ct_paths(const fs::path& top, const std::vector<fs::path>&
   return {folder};
 }
 
-// Why a file in a folder of these parts cannot be read: it may be one of them, and without it they are another study.
-std::string unreadable_beside(const StudyParts& parts, const StudyFiles& all) {
-  std::set<std::string> folders;
-  for (const auto& files : {parts.ct, parts.images})
-    for (const fs::path& file : files) folders.insert(file.parent_path().string() + "/");
-  for (const std::string& reason : all.unreadable)  // each begins with the file's name
-    for (const std::string& folder : folders)
-      if (reason.starts_with(folder) &&
-          reason.substr(0, reason.find(": ")).find('/', folder.size()) == std::string::npos)
-        return reason;
-  return "";
-}
-
-std::string joined(const std::vector<fs::path>& paths) {
-  std::string text;
-  for (const fs::path& path : paths) text += (text.empty() ? "" : std::string(1, kBetweenPaths)) + path.string();
-  return text;
+template <class Text>  // or path
+std::string joined(const std::vector<Text>& texts) {
+  std::string cell;
+  for (const Text& text : texts) cell += (cell.empty() ? "" : std::string(1, kBetween)) + fs::path(text).string();
+  return cell;
 }
 
 }  // namespace
@@ -201,9 +191,10 @@ std::vector<BatchCase> read_manifest(const fs::path& path) {
 std::string manifest_csv(const std::vector<BatchCase>& cases) {
   std::string csv = fmt::format("{}\n", fmt::join(kColumns, ","));
   for (const auto& [name, parts, anatomy] : cases)
-    csv += fmt::format("{},{},{},{},{},{},{}\n", name, csv_quoted(parts.study.string()), csv_quoted(joined(parts.ct)),
-                       csv_quoted(parts.plan.string()), csv_quoted(parts.structures.string()),
-                       csv_quoted(joined(parts.images)), anatomy);
+    csv +=
+        fmt::format("{},{},{},{},{},{},{},{}\n", name, csv_quoted(parts.study.string()), csv_quoted(joined(parts.ct)),
+                    csv_quoted(parts.plan.string()), csv_quoted(parts.structures.string()),
+                    csv_quoted(joined(parts.images)), anatomy, csv_quoted(joined(parts.doubts)));
   return csv;
 }
 
@@ -219,7 +210,7 @@ std::vector<BatchCase> scan_cases(const fs::path& folder, bool other_xrays, Note
       const StudyFiles own = files_for(session, files);
       StudyParts parts = choose_parts(own);
       if (const std::string absent = missing_ct_images(own); !absent.empty()) throw Error(absent + " are missing");
-      if (const std::string reason = unreadable_beside(parts, files); !reason.empty())
+      if (const std::string reason = unreadable_beside(parts, files.unreadable); !reason.empty())
         throw Error("a file beside these X-rays may belong to them: " + reason);
       parts.ct = ct_paths(top, parts.ct, files);
       parts.doubts = session.doubts;

@@ -13,6 +13,12 @@ namespace isoshift {
 
 namespace fs = std::filesystem;
 
+namespace {
+
+std::string cannot_be_opened(const fs::path& path) { return fmt::format("{}: cannot be opened", path.string()); }
+
+}  // namespace
+
 // What is there of a file may tell already whose it is.
 FolderSource::Growing FolderSource::growing(const fs::path& file, const Version& version) const {
   Growing growing{.version = version, .since = clock_.now(), .patient_id = ""};
@@ -33,8 +39,14 @@ bool FolderSource::is_coming(const std::string& patient_id) const {
 }
 
 void FolderSource::warn_once(const fs::path& unopened, Notes& notes) {
-  if (unopened_.insert(unopened).second)
-    notes.warnings.push_back(fmt::format("{}: cannot be opened", unopened.string()));
+  if (unopened_.insert(unopened).second) notes.warnings.push_back(cannot_be_opened(unopened));
+}
+
+std::vector<std::string> FolderSource::unreadable() const {
+  std::vector<std::string> messages;
+  for (const auto& [file, message] : files_.unreadable()) messages.push_back(message);
+  for (const fs::path& file : unopened_) messages.push_back(cannot_be_opened(file));
+  return messages;
 }
 
 void FolderSource::read_again(const std::vector<fs::path>& copies) {
@@ -45,6 +57,7 @@ void FolderSource::forget_missing(const std::vector<fs::path>& files) {
   std::vector<fs::path> gone;
   for (const auto& [file, version] : done_)
     if (!std::ranges::binary_search(files, file)) gone.push_back(file);
+  std::erase_if(unopened_, [](const fs::path& path) { return !fs::exists(fs::symlink_status(path)); });
   for (const fs::path& file : gone) {
     done_.erase(file);
     files_.forget_copy(file);

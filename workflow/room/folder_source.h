@@ -19,6 +19,7 @@ class FolderSource : public Source {
 
   void update(Notes& notes) override;
   const std::map<std::string, Patient>& patients() const override { return files_.patients(); }
+  std::vector<std::string> unreadable() const override;
   // True while a file of this patient grows. A file whose patient is not known yet counts for every patient, for a
   // minute.
   bool is_coming(const std::string& patient_id) const override;

@@ -49,6 +49,7 @@ std::optional<KnownFile> known_file_in(const StudyFiles& one) {
 }
 
 std::vector<fs::path> PatientFiles::forget(const fs::path& file) {
+  unreadable_.erase(file);
   std::vector<fs::path> copies;
   const auto known = known_.find(file);
   if (known == known_.end()) return copies;
@@ -77,6 +78,7 @@ PatientFiles::Taken PatientFiles::take(const fs::path& file, Notes& notes) {
     one = scan_file(file);
   } catch (const Error& error) {
     notes.warnings.push_back(fmt::format("left aside: {}", error.what()));
+    unreadable_[file] = error.what();
     taken.is_readable = false;
     return taken;
   }

@@ -26,6 +26,8 @@ class PatientFiles {
 
   const std::map<std::string, Patient>& patients() const { return patients_; }  // by PatientID
   const std::map<std::filesystem::path, KnownFile>& known() const { return known_; }
+  // Why files cannot be read, by file.
+  const std::map<std::filesystem::path, std::string>& unreadable() const { return unreadable_; }
 
   struct Taken {
     bool is_readable = true;
@@ -47,6 +49,7 @@ class PatientFiles {
   const Clock& clock_;
   std::map<std::string, Patient> patients_;
   std::map<std::filesystem::path, KnownFile> known_;
+  std::map<std::filesystem::path, std::string> unreadable_;
   std::map<std::string, std::filesystem::path> file_of_uid_;     // the known file, by SOPInstanceUID
   std::multimap<std::string, std::filesystem::path> copies_of_;  // files that are not used, by SOPInstanceUID
 };

@@ -50,6 +50,7 @@ ResultsPage::Row row_of(const WaitingSession& waiting) {
 }  // namespace
 
 std::string times_of(const std::vector<StudyFiles::Image>& images) { return times_in_words(images); }
+std::string times_of(const std::vector<SetupResult::View>& views) { return times_in_words(views); }
 
 void SessionIndex::add(const std::string& session, const SetupResult& report, const std::string& obstacle) {
   Session added{.name = session,
@@ -59,7 +60,7 @@ void SessionIndex::add(const std::string& session, const SetupResult& report, co
                 .held = obstacle.empty() ? "held" : "held, cannot be released: " + obstacle,
                 .state = "",
                 .first = report.views.front().acquired,
-                .times = times_in_words(report.views)};
+                .times = times_of(report.views)};
   sessions_.insert(std::ranges::upper_bound(sessions_, added.first, std::ranges::greater(), &Session::first),
                    std::move(added));
   is_written_ = false;
@@ -71,6 +72,8 @@ bool SessionIndex::update_states() {
   for (Session& session : sessions_) {
     if (session.is_over) continue;
     std::string state = session.held;
+    if (const std::string newer = newest_.newer_than(session.name); !newer.empty())
+      state += fmt::format("; the patient has newer X-rays: session {}", newer);
     session.is_over = session.verdict == to_string(Verdict::kRejected);
     if (session.is_over) {
       state = "rejected";

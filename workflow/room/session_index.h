@@ -8,23 +8,20 @@
 
 #include "io/study/study_files.h"
 #include "setup/setup_result.h"
+#include "workflow/room/newest_xrays.h"
 #include "workflow/room/results_tree.h"
+#include "workflow/room/waiting_session.h"
 
 namespace isoshift {
 
 // Labels and times of the X-rays of a session: "KV_AP 2026-03-01 10:15:00; KV_LAT 2026-03-01 10:15:10".
 std::string times_of(const std::vector<StudyFiles::Image>& images);
-
-// A session without a result, with the reason.
-struct WaitingSession {
-  std::string name, patient_id, acquired, why;
-  bool has_failed = false;
-  bool operator==(const WaitingSession&) const = default;
-};
+std::string times_of(const std::vector<SetupResult::View>& views);
 
 class SessionIndex {
  public:
-  SessionIndex(const ResultsTree& tree, std::string site) : tree_(tree), site_(std::move(site)) {}
+  SessionIndex(const ResultsTree& tree, const NewestXrays& newest, std::string site)
+      : tree_(tree), newest_(newest), site_(std::move(site)) {}
 
   // `obstacle`: why the session cannot be released; empty if it can be released.
   void add(const std::string& session, const SetupResult& report, const std::string& obstacle);
@@ -47,6 +44,7 @@ class SessionIndex {
   void write(const std::string& page, const std::string& html);
 
   const ResultsTree& tree_;
+  const NewestXrays& newest_;
   std::string site_;
   std::vector<Session> sessions_;  // the newest first
   std::vector<WaitingSession> waiting_;

@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <map>
 #include <string>
+#include <vector>
 
 #include "io/dicom/notes.h"
 #include "io/study/study_files.h"
@@ -26,6 +27,9 @@ class Source {
 
   // By PatientID.
   virtual const std::map<std::string, Patient>& patients() const = 0;
+
+  // Messages on files that cannot be read now, each beginning with the file's path. They may be of any patient.
+  virtual std::vector<std::string> unreadable() const = 0;
 
   // Whether a file of this patient may be arriving now. A file whose patient is not known yet may be of this patient.
   virtual bool is_coming(const std::string& patient_id) const = 0;

@@ -4,6 +4,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <iterator>
 #include <regex>
 #include <thread>
 #include <utility>
@@ -31,7 +32,7 @@ Watch::Watch(const WatchFile& watch, const Parts& parts)
       parts_(parts),
       tree_(watch.results),
       lock_(only_watch_of(tree_)),
-      index_(tree_, watch.site.name),
+      index_(tree_, newest_, watch.site.name),
       deliverer_(watch, parts.sender, parts.clock),
       troubles_(parts.observer),
       sending_troubles_(parts.sending),
@@ -44,11 +45,22 @@ Watch::Watch(const WatchFile& watch, const Parts& parts)
 }
 
 void Watch::round() {
+  if (!lock_.is_in_place())
+    throw Error(
+        fmt::format("{}: its .watch.lock was removed or replaced, so another isoshift watch may be working here: "
+                    "this watch ends",
+                    tree_.path().string()));
   troubles_.attempt("receiving", [&] { receive(); });
   troubles_.attempt("registering", [&] { register_complete(); });
   troubles_.attempt("releasing", [&] { release_automatically(); });
   troubles_.attempt("writing the audit log", [&] { tree_.write_kept_audit(); });
-  troubles_.attempt("writing the index", [&] { index_.update(waiting_, troubles_.lines()); });
+  troubles_.attempt("writing the index", [&] { index_.update(waiting_, troubles()); });
+}
+
+std::vector<std::string> Watch::troubles() const {
+  std::vector<std::string> lines = troubles_.lines();
+  std::ranges::move(parts_.source.unreadable(), std::back_inserter(lines));
+  return lines;
 }
 
 void Watch::deliver(const std::stop_token& stop) {
@@ -112,6 +124,9 @@ Verdict Watch::take_result(const std::string& session) {
   for (const auto& view : report.views) registered_.insert(view.sop_instance_uid);
   const std::string obstacle = obstacle_to_release(session, report.verdict);
   index_.add(session, report, obstacle);
+  std::string last;
+  for (const auto& view : report.views) last = std::max(last, view.acquired);
+  newest_.add_result(session, report.identity.patient_id, last);
   // What was made under another site file waits for a person.
   if (watch_.site.automatic_release && obstacle.empty() && report.verdict == Verdict::kAccepted && report.site &&
       report.site->sha256 == watch_.site.sha256)
@@ -157,11 +172,13 @@ std::vector<Watch::Complete> Watch::complete_sessions() {
       waiting_.push_back({.name = session.name,
                           .patient_id = patient_id,
                           .acquired = times_of(session.images),
+                          .last = session.images.back().acquired,
                           .why = std::move(why),
                           .has_failed = failures_.contains(session.name)});
       if (is_complete) complete.push_back({std::move(session), std::move(own), patient.last});
     }
   }
+  newest_.set_waiting(waiting_);
   std::erase_if(failures_, [&](const auto& failure) { return !found.contains(failure.first); });
   return complete;
 }
@@ -193,6 +210,8 @@ void Watch::begin_registration(const Complete& complete) {
     tree_.check_is_new(session);
     StudyParts parts = choose_parts(complete.files);
     parts.doubts = complete.session.doubts;
+    if (const std::string reason = unreadable_beside(parts, parts_.source.unreadable()); !reason.empty())
+      parts.doubts.push_back("a file beside the X-rays may belong to them: " + reason);
     parts_.runner.begin(parts, tree_.registering(session));
     running_ = Running{.session = session, .news = complete.last};
   } catch (const std::exception& error) {
@@ -232,10 +251,11 @@ void Watch::fail(const std::string& session, Clock::Time news, const Runner::Fai
   tree_.audit("failed", {{"session", session}});
 }
 
-// A release that fails must not block the others.
+// A release that fails must not block the others. A result that is out of date is released by a person or not at all.
 void Watch::release_automatically() {
   std::string trouble;
   for (const std::string& session : std::set(accepted_)) {
+    if (!newest_.newer_than(session).empty()) continue;
     try {
       if (!tree_.is_released(session))
         tree_.release(session,

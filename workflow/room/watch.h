@@ -20,6 +20,7 @@
 #include "workflow/observer.h"
 #include "workflow/room/clock.h"
 #include "workflow/room/deliver.h"
+#include "workflow/room/newest_xrays.h"
 #include "workflow/room/results_tree.h"
 #include "workflow/room/runner.h"
 #include "workflow/room/sender.h"
@@ -50,7 +51,8 @@ class Watch {
   Watch(const WatchFile& watch, const Parts& parts);
 
   // Takes new files, ends and begins registrations, releases results that need no person, and writes the pages. Never
-  // waits. Does not throw for troubles that may be over in the next round.
+  // waits. Does not throw for troubles that may be over in the next round. Throws Error if the file of its lock is
+  // gone: another watch may use the tree.
   void round();
 
   // Sends the deliveries that are due. May run in its own thread beside round().
@@ -75,6 +77,7 @@ class Watch {
     Clock::Time last;
   };
 
+  std::vector<std::string> troubles() const;  // also files that cannot be read
   void take_results();
   Verdict take_result(const std::string& session);
   std::string obstacle_to_release(const std::string& session, Verdict verdict) const;
@@ -92,6 +95,7 @@ class Watch {
   Parts parts_;
   ResultsTree tree_;
   FileLock lock_;
+  NewestXrays newest_;
   SessionIndex index_;
   Deliverer deliverer_;
   std::set<std::string> registered_;  // SOPInstanceUIDs of X-rays that have a result

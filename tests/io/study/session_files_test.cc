@@ -146,6 +146,9 @@ TEST(Sessions, AnXrayWithoutItsPartnerMakesItsNeighborsDoubtful) {
               ElementsAre(HasSubstr("/x/a, 300 s before, has no partner")));
   // A retake long before a pair whose views belong together plainly.
   EXPECT_THAT(doubts_of({image("a", "LAT", 60), image("b", "AP", 300), image("c", "LAT", 310)}), testing::IsEmpty());
+  // All with the time of their series.
+  EXPECT_THAT(doubts_of({image("a", "AP", 0), image("b", "LAT", 0), image("c", "LAT", 0)}),
+              ElementsAre(HasSubstr("has no partner")));
 }
 
 TEST(Sessions, TwoMachinesAreTwoSessions) {

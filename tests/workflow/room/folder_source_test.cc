@@ -82,6 +82,17 @@ TEST_F(FolderSourceTest, AWholeObjectTakesThePlaceOfATruncatedOne) {
   EXPECT_THAT(patient().files.cts.at(0).files, testing::Not(testing::Contains(slice)));
 }
 
+TEST_F(FolderSourceTest, SaysWhatCannotBeReadWhileItIsThere) {
+  EXPECT_THAT(source_.unreadable(), testing::IsEmpty());
+  fs::copy(study_.plan(), in_ / "broken.dcm");
+  fs::resize_file(in_ / "broken.dcm", 300);
+  settle();
+  EXPECT_THAT(source_.unreadable(), testing::ElementsAre(testing::StartsWith((in_ / "broken.dcm").string() + ": ")));
+  fs::remove(in_ / "broken.dcm");
+  settle();
+  EXPECT_THAT(source_.unreadable(), testing::IsEmpty());
+}
+
 TEST_F(FolderSourceTest, WhatIsGoneIsForgotten) {
   const std::size_t before = slices();
   fs::remove(in_ / fs::relative(study_.ct_slice(3), study_.path()));

@@ -36,7 +36,8 @@ class SessionIndexTest : public testing::Test {
 
   TemporaryFolder folder_;
   ResultsTree tree_{folder_ / "results"};
-  SessionIndex index_{tree_, "Site"};
+  NewestXrays newest_;
+  SessionIndex index_{tree_, newest_, "Site"};
 };
 
 TEST_F(SessionIndexTest, ListsWhatWaitsAndTheNewestFirst) {

@@ -96,6 +96,33 @@ TEST_F(WatchReleases, OnlyAcceptedResultsAreReleasedWithoutAPerson) {
   EXPECT_THAT(room_.index(), HasSubstr("released by automatic, allowed by J. Doe on 2026-03-01"));
 }
 
+// LAT is taken again while the pair is registered, or the newer of two sessions that wait is registered first: the
+// couch may have moved since the older X-rays.
+TEST_F(WatchReleases, WhatIsOlderThanOtherXraysOfThePatientWaitsForAPerson) {
+  allow_automatic_release();
+  room_.runner.length = 20s;
+  room_.start();
+  bring("P");
+  bring("Q");
+  room_.pass(15s);
+  room_.source.bring(xray("P", "P3", "LAT", second_of(10, 16)));
+  room_.source.bring(xray("Q", "Q3", "AP", second_of(10, 20)));
+  room_.source.bring(xray("Q", "Q4", "LAT", second_of(10, 20, 10)));
+  room_.pass(120s);
+  EXPECT_THAT(room_.runs(), SizeIs(3));
+  EXPECT_FALSE(is_released("P"));
+  EXPECT_FALSE(is_released("Q"));
+  EXPECT_TRUE(ResultsTree(room_.file.results).is_released(session_name({"Q3", "Q4"})));
+  EXPECT_THAT(room_.index(), HasSubstr("held; the patient has newer X-rays: session " + session_name({"P3"})));
+  EXPECT_THAT(room_.index(), HasSubstr("held; the patient has newer X-rays: session " + session_name({"Q3", "Q4"})));
+  room_.start();
+  room_.pass(60s);
+  EXPECT_FALSE(is_released("P"));
+  EXPECT_FALSE(is_released("Q"));
+  release("P");
+  EXPECT_TRUE(is_released("P"));
+}
+
 // A watch that began while result.json said something else must not remember it.
 TEST_F(WatchReleases, AVerdictThatWasExchangedForAWhileReleasesNothing) {
   allow_automatic_release();

@@ -225,6 +225,35 @@ TEST_F(WatchTest, OneWatchAtATimeWorksOnAResultsTree) {
   }
 }
 
+// A broken file beside the X-rays may be the retake of one of them.
+TEST_F(WatchTest, AFileThatCannotBeReadIsADoubtAndSaid) {
+  bring_pair("P", second_of(10, 15));
+  room_.source.broken = {"/elsewhere/x.dcm: is cut off"};
+  room_.pass(20s);
+  ASSERT_THAT(room_.runs(), SizeIs(1));
+  EXPECT_THAT(room_.runner.runs()[0].doubts, IsEmpty());
+  EXPECT_THAT(room_.index(), HasSubstr("Trouble: /elsewhere/x.dcm: is cut off"));
+  bring_planning("Q");
+  bring_pair("Q", second_of(10, 30));
+  room_.source.broken = {"/in/x.dcm: is cut off"};
+  room_.pass(20s);
+  ASSERT_THAT(room_.runs(), SizeIs(2));
+  EXPECT_THAT(room_.runner.runs()[1].doubts, ElementsAre(HasSubstr("may belong to them: /in/x.dcm: is cut off")));
+  room_.source.broken = {};
+  room_.pass(1s);
+  EXPECT_THAT(room_.index(), Not(HasSubstr("is cut off")));
+}
+
+// Without the file of its lock, a watch could work beside another.
+TEST_F(WatchTest, AWatchWithoutItsLockFileEnds) {
+  room_.start();
+  room_.pass(5s);
+  std::filesystem::remove(room_.file.results / ".watch.lock");
+  EXPECT_THROW(room_.watch->round(), Error);
+  write_text(room_.file.results / ".watch.lock", "");
+  EXPECT_THROW(room_.watch->run([] { return false; }), Error);
+}
+
 TEST_F(WatchTest, WhenItIsToldToEndItGivesUpTheRegistrationUnderWay) {
   room_.runner.length = 30min;
   bring_pair("P", second_of(10, 15));
