@@ -3,7 +3,6 @@
 // mean RMSE over traces, mean over 200, 300 and 500 ms.
 
 #include <fmt/format.h>
-#include <tbb/parallel_for.h>
 
 #include <cstdio>
 #include <filesystem>
@@ -12,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "base/parallel.h"
 #include "io/study/motion_trace.h"
 #include "registration/motion/score.h"
 
@@ -63,7 +63,7 @@ int main(int argc, char** argv) {
   all.push_back({"", PredictorKind::kHoldLast, {}});
   // RMSE by candidate, latency and trace.
   std::vector<std::vector<std::vector<double>>> rmse(all.size());
-  tbb::parallel_for(std::size_t{0}, all.size(), [&](std::size_t c) {
+  parallel_for(std::size_t{0}, all.size(), [&](std::size_t c) {
     for (const double latency_s : kLatenciesS) {
       rmse[c].emplace_back();
       for (const auto& trace : traces)

@@ -1,12 +1,10 @@
 #include "drr/attenuation.h"
 
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <cmath>
 
 #include "base/error.h"
+#include "base/parallel.h"
 
 namespace isoshift {
 namespace {
@@ -39,8 +37,9 @@ float AttenuationModel::attenuation_per_mm(float hu, Beam beam) const {
 
 Volume<float> attenuation_volume(const Volume<float>& ct_hu, const AttenuationModel& model, Beam beam) {
   Volume<float> volume(ct_hu.size, ct_hu.patient_from_voxel);
-  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, volume.voxels.size(), 1 << 16), [&](const auto& range) {
-    for (std::size_t n = range.begin(); n != range.end(); ++n)
+  const std::size_t of_slice = static_cast<std::size_t>(volume.size.x()) * volume.size.y();
+  parallel_for(0, volume.size.z(), [&](int k) {
+    for (std::size_t n = k * of_slice; n != (k + 1) * of_slice; ++n)
       volume.voxels[n] = model.attenuation_per_mm(ct_hu.voxels[n], beam);
   });
   return volume;

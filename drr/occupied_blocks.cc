@@ -1,8 +1,8 @@
 #include "drr/occupied_blocks.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
+
+#include "base/parallel.h"
 
 namespace isoshift {
 namespace {
@@ -21,7 +21,7 @@ Range range_of(int block, int axis, const BlockRule& rule, const Eigen::Vector3i
 
 template <class T>
 void mark(const std::vector<T>& voxels, const Eigen::Vector3i& size, const BlockRule& rule, BlockGrid& grid) {
-  tbb::parallel_for(0, grid.size.z(), [&](int z) {
+  parallel_for(0, grid.size.z(), [&](int z) {
     const Range slices = range_of(z, 2, rule, size);
     for (int y = 0; y < grid.size.y(); ++y) {
       const Range rows = range_of(y, 1, rule, size);

@@ -1,13 +1,12 @@
 #include "drr/quantized_volume.h"
 
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <mutex>
 #include <type_traits>
+
+#include "base/parallel.h"
 
 namespace isoshift {
 namespace {
@@ -63,8 +62,9 @@ QuantizedVolume quantized_attenuation(const Volume<float>& ct_hu, const Attenuat
           volume.unit_per_mm =
               largest_attenuation_per_mm(ct_hu, model, beam) / static_cast<double>(std::numeric_limits<T>::max());
         const auto per_unit = static_cast<float>(1.0 / volume.unit_per_mm);
-        tbb::parallel_for(tbb::blocked_range<std::size_t>(0, voxels.size(), 1 << 16), [&](const auto& range) {
-          for (std::size_t n = range.begin(); n != range.end(); ++n) {
+        const std::size_t of_slice = static_cast<std::size_t>(ct_hu.size.x()) * ct_hu.size.y();
+        parallel_for(0, ct_hu.size.z(), [&](int k) {
+          for (std::size_t n = k * of_slice; n != (k + 1) * of_slice; ++n) {
             const float value = per_unit * model.attenuation_per_mm(ct_hu.voxels[n], beam);
             voxels[n] = static_cast<T>(kInteger ? value + 0.5F : value);
           }
@@ -80,7 +80,7 @@ VoxelBox occupied_voxels(const QuantizedVolume& volume) {
   std::mutex mutex;
   std::visit(
       [&]<class T>(const std::vector<T>& voxels) {
-        tbb::parallel_for(0, size.z(), [&](int k) {
+        parallel_for(0, size.z(), [&](int k) {
           VoxelBox of_slice{.first = size, .last = Eigen::Vector3i::Constant(-1)};
           for (int j = 0; j < size.y(); ++j) {
             const T* row = voxels.data() + (static_cast<std::size_t>(k) * size.y() + j) * size.x();

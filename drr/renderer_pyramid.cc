@@ -1,10 +1,10 @@
 #include "drr/renderer_pyramid.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <cmath>
 #include <limits>
+
+#include "base/parallel.h"
 
 namespace isoshift {
 namespace {
@@ -32,7 +32,7 @@ CoarserCt coarser_ct(const Volume<float>& ct_hu, const AttenuationModel& model, 
   const Eigen::Vector3i size = (ct_hu.size.array() + block.array() - 1) / block.array();
   CoarserCt coarser{.hu = Volume<float>(size, ct_hu.patient_from_voxel * fine_from_coarse), .model = model};
   coarser.model.threshold_hu = nothing_hu;
-  tbb::parallel_for(0, size.z(), [&](int k) {
+  parallel_for(0, size.z(), [&](int k) {
     for (int j = 0; j < size.y(); ++j)
       for (int i = 0; i < size.x(); ++i) {
         float sum = 0.0F;

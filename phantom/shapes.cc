@@ -1,10 +1,10 @@
 #include "phantom/shapes.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <cmath>
 #include <limits>
+
+#include "base/parallel.h"
 
 namespace isoshift {
 namespace {
@@ -98,7 +98,7 @@ Volume<float> ct_of_shapes(const std::vector<Shape>& shapes, const Eigen::Vector
     const Eigen::Vector3i high =
         (voxel_from_unit.translation() + reach).array().ceil().cast<int>().min(size.array() - 1);
     const double hu = 1000.0 * (shape.added.water + kBoneToWaterInCt * shape.added.bone);
-    tbb::parallel_for(low.z(), high.z() + 1, [&](int k) {
+    parallel_for(low.z(), high.z() + 1, [&](int k) {
       for (int j = low.y(); j <= high.y(); ++j)
         for (int i = low.x(); i <= high.x(); ++i) {
           int inside = 0;

@@ -1,7 +1,5 @@
 #include "phantom/xray_simulation.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -10,6 +8,7 @@
 #include <span>
 
 #include "base/error.h"
+#include "base/parallel.h"
 
 namespace isoshift {
 namespace {
@@ -185,7 +184,7 @@ Image<float> simulate_xray(const std::vector<Shape>& shapes, const Placement& pl
   Image<float> intensity(imager.pixels, imager.pixels);
   const std::span<const EnergyBin> spectrum =
       imager.is_megavoltage ? std::span<const EnergyBin>(kMegavoltage) : std::span<const EnergyBin>(kSpectrum);
-  tbb::parallel_for(0, imager.pixels, [&](int row) {
+  parallel_for(0, imager.pixels, [&](int row) {
     for (int column = 0; column < imager.pixels; ++column) {
       double sum = 0.0;
       for (int n = 0; n < 4; ++n)

@@ -1,12 +1,12 @@
 #include "cli/commands/bench_scene.h"
 
 #include <fmt/format.h>
-#include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <cmath>
 
 #include "base/error.h"
+#include "base/parallel.h"
 #include "geometry/rotation.h"
 #include "io/dicom/ct_series.h"
 #include "io/study/study_files.h"
@@ -29,7 +29,7 @@ Eigen::Affine3d centered_lattice(const Vector3i& size, const Vector3d& spacing_m
 Volume<float> resampled(const Volume<float>& from, const Vector3i& size) {
   const Vector3d step = (from.size.array() - 1).cast<double>() / (size.array() - 1).cast<double>();
   Volume<float> to(size, from.patient_from_voxel * Eigen::Scaling(step));
-  tbb::parallel_for(0, size.z(), [&](int k) {
+  parallel_for(0, size.z(), [&](int k) {
     for (int j = 0; j < size.y(); ++j)
       for (int i = 0; i < size.x(); ++i) {
         const Vector3d position = Vector3d(i, j, k).cwiseProduct(step);

@@ -1,7 +1,6 @@
 // isoshift predict: the motion predictors on recorded traces.
 
 #include <fmt/format.h>
-#include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <atomic>
@@ -12,6 +11,7 @@
 
 #include "base/error.h"
 #include "base/output_folder.h"
+#include "base/parallel.h"
 #include "cli/commands/commands.h"
 #include "io/report/line_chart.h"
 #include "io/study/motion_trace.h"
@@ -78,7 +78,7 @@ Scores scores_of(const PredictOptions& options, Console& console) {
   ProgressBar bar(console, "Predicting");
   std::atomic<std::size_t> done = 0;
   std::mutex mutex;
-  tbb::parallel_for(std::size_t{0}, scores.all.size(), [&](std::size_t n) {
+  parallel_for(std::size_t{0}, scores.all.size(), [&](std::size_t n) {
     const std::size_t trace = n / per_trace, method = n % per_trace / scores.latencies_ms.size();
     scores.all[n] = score(scores.kinds[method], {}, traces[trace],
                           scores.latencies_ms[n % scores.latencies_ms.size()] / 1000.0, options.protocol);

@@ -1,7 +1,6 @@
 #include "drr/cpu/cpu_renderer.h"
 
 #include <fmt/format.h>
-#include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 
 #include <algorithm>
@@ -9,6 +8,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "base/parallel.h"
 #include "drr/camera.h"
 
 namespace isoshift {
@@ -88,7 +88,7 @@ RenderResult CpuRenderer::render(std::span<const XrayView> views, std::span<cons
     for (const XrayView& view : views) cameras.push_back(make_camera(view, pose, voxel_from_patient_));
 
   const auto poses = static_cast<int>(room_from_patient.size());
-  tbb::parallel_for(0, poses * group_begins.back(), [&](int work) {
+  parallel_for(0, poses * group_begins.back(), [&](int work) {
     const std::size_t p = work / group_begins.back();
     const int in_pose = work % group_begins.back();
     const std::size_t v = std::ranges::upper_bound(group_begins, in_pose) - group_begins.begin() - 1;

@@ -1,12 +1,12 @@
 #include "drr/cpu/raycast.h"
 
 #include <fmt/format.h>
-#include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <cmath>
 
 #include "base/error.h"
+#include "base/parallel.h"
 #include "drr/cpu/march.h"
 
 namespace isoshift {
@@ -30,7 +30,7 @@ std::vector<T> cropped(const std::vector<T>& voxels, const Vector3i& size, const
   const Vector3i padded = box.size().array() + 3;
   std::vector<T> result(padded.cast<std::size_t>().prod() + kReadBeyond);
   const std::size_t slice = static_cast<std::size_t>(padded.x()) * padded.y();
-  tbb::parallel_for(box.first.z(), box.last.z() + 1, [&](int k) {
+  parallel_for(box.first.z(), box.last.z() + 1, [&](int k) {
     T* out = result.data() + static_cast<std::size_t>(k - box.first.z() + 1) * slice;
     for (int j = box.first.y(); j <= box.last.y(); ++j) {
       const T* row = voxels.data() + (static_cast<std::size_t>(k) * size.y() + j) * size.x();
@@ -45,7 +45,7 @@ template <class T>
 std::vector<T> with_y_fastest(const std::vector<T>& voxels, const Vector3i& size) {
   std::vector<T> result(voxels.size());
   const std::size_t slice = static_cast<std::size_t>(size.x()) * size.y();
-  tbb::parallel_for(0, size.z(), [&](int k) {
+  parallel_for(0, size.z(), [&](int k) {
     const T* in = voxels.data() + k * slice;
     T* out = result.data() + k * slice;
     for (int y = 0; y < size.y(); ++y)

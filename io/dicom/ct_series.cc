@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
-#include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <cmath>
@@ -11,6 +10,7 @@
 #include <set>
 
 #include "base/error.h"
+#include "base/parallel.h"
 #include "base/sha256.h"
 #include "io/dicom/decode.h"
 
@@ -178,7 +178,7 @@ std::vector<Slice> read_slices(std::span<const std::filesystem::path> files, con
   std::vector<std::vector<Slice>> of_files(files.size());
   std::mutex mutex;
   std::size_t done = 0;
-  tbb::parallel_for(std::size_t{0}, files.size(), [&](std::size_t n) {
+  parallel_for(std::size_t{0}, files.size(), [&](std::size_t n) {
     of_files[n] = read_slices_of(files[n]);
     const std::lock_guard lock(mutex);
     if (progress) progress(++done, files.size());

@@ -27,11 +27,11 @@ std::filesystem::path picture_path(const std::filesystem::path& folder, std::siz
 
 // All pictures of a view beside each other, for people without the report.
 std::string comparison_png(const SetupResult::View& view) {
-  constexpr double kPictureWidth = 1600.0, kPictureMargin = 6.0;
-  const double height = 0.2 * kPictureWidth * view.picture.xray.rows / view.picture.xray.columns +
-                        0.022 * kPictureWidth + 2.0 * kPictureMargin;
-  Canvas canvas(Canvas::Kind::kPng, kPictureWidth, height);
-  draw_view(canvas, kPictureMargin, kPictureMargin, kPictureWidth - 2.0 * kPictureMargin, view);
+  constexpr double kWidth = 1600.0, kMargin = 6.0;
+  const double height =
+      0.2 * kWidth * view.picture.xray.rows / view.picture.xray.columns + 0.022 * kWidth + 2.0 * kMargin;
+  Canvas canvas(Canvas::Kind::kPng, kWidth, height);
+  draw_view(canvas, kMargin, kMargin, kWidth - 2.0 * kMargin, view);
   return canvas.finish();
 }
 

@@ -1,11 +1,11 @@
 #include "registration/quality/alternatives.h"
 
 #include <fmt/format.h>
-#include <tbb/parallel_for_each.h>
 
 #include <algorithm>
 #include <array>
 
+#include "base/parallel.h"
 #include "geometry/rotation.h"
 #include "registration/pose_parameters.h"
 
@@ -100,7 +100,7 @@ void for_each_on(const RendererPyramid& renderers, const Items& items, Work&& wo
   if (uses_gl(renderers.finest().kind()))
     std::ranges::for_each(items, work);
   else
-    tbb::parallel_for_each(items, work);
+    parallel_for(std::size_t{0}, items.size(), [&](std::size_t n) { work(items[n]); });
 }
 
 }  // namespace

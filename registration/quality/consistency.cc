@@ -9,7 +9,7 @@ namespace isoshift {
 namespace {
 
 // All lengths at the isocenter.
-constexpr double kPixelMm = 1.5;
+constexpr double kComparedPixelMm = 1.5;
 constexpr double kTileMm = 40.0;
 constexpr double kSearchMm = 12.0;
 constexpr double kSmoothMm = 15.0;  // slower changes are scatter and hardening, not anatomy
@@ -23,13 +23,14 @@ constexpr double kMinGain = 0.1;  // of correlation, by moving the tile
 std::vector<ViewConsistency> regional_consistency(const RendererPyramid& renderers, const FixedViews& fixed,
                                                   const Eigen::Isometry3d& room_from_patient) {
   std::vector<ViewConsistency> views;
-  const std::vector<FixedImage> levels = fixed.reduced_to(kPixelMm, room_from_patient, 0.0);
+  const std::vector<FixedImage> levels = fixed.reduced_to(kComparedPixelMm, room_from_patient, 0.0);
   for (std::size_t n = 0; n < levels.size(); ++n) {
     const FixedImage& level = levels[n];
     const double factor = level.reduced_by;
     const double px_per_mm = pixels_per_mm(level.view);
-    const RenderResult rendered = renderers.with_voxels_up_to(kPixelMm).render(
-        std::span(&level.view, 1), std::span(&room_from_patient, 1), PixelSet::all());
+    const RenderResult rendered =
+        renderers.with_voxels_up_to(kComparedPixelMm)
+            .render(std::span(&level.view, 1), std::span(&room_from_patient, 1), PixelSet::all());
     const Image<float> xray = high_pass(level.line_integral, kSmoothMm * px_per_mm);
     const Image<float> drr = high_pass(image_of(level.view, rendered.line_integrals(0, 0)), kSmoothMm * px_per_mm);
 

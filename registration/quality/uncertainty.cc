@@ -10,8 +10,8 @@
 namespace isoshift {
 namespace {
 
-constexpr double kTileMm = 25.0;  // residuals are alike over about this distance, at the isocenter
-constexpr double kStepMm = 0.3;   // of the differences, also of rotations on the sphere of kLeverMm
+constexpr double kCorrelationMm = 25.0;  // residuals are alike over about this distance, at the isocenter
+constexpr double kStepMm = 0.3;          // of the differences, also of rotations on the sphere of kLeverMm
 
 // What the sandwich leaves out: errors common to all tiles, such as those of the model of beam and scatter, and of
 // voxels of finite size. The factor and the floors bring the share of true errors within one and two sigma to about 68
@@ -64,7 +64,7 @@ Sandwich sandwich_at(Objective& objective, const Eigen::Isometry3d& pose, int ax
   for (std::size_t view = 0; view < objective.views().size(); ++view) {
     const Comparison& comparison = objective.comparison(view);
     const XrayView& camera = objective.views()[view];
-    const int tile_px = std::max(1, static_cast<int>(std::lround(kTileMm * pixels_per_mm(camera))));
+    const int tile_px = std::max(1, static_cast<int>(std::lround(kCorrelationMm * pixels_per_mm(camera))));
     std::vector<int> tile_of;
     for (const std::uint32_t pixel : objective.compared_pixels(view)) {
       const int column = static_cast<int>(pixel) % camera.columns, row = static_cast<int>(pixel) / camera.columns;

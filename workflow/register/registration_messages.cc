@@ -14,7 +14,6 @@ namespace isoshift {
 namespace {
 
 namespace fs = std::filesystem;
-using Json = nlohmann::json;
 
 constexpr const char* kText = "a text";
 constexpr const char* kTexts = "a list of texts";
@@ -47,9 +46,9 @@ Verdict verdict_in(JsonSection& section) {
 }
 
 struct ToJson {
-  Json operator()(const Ready&) const { return {{"ready", Json::object()}}; }
-  Json operator()(const Ended& ended) const { return {{"ended", {{"verdict", to_string(ended.verdict)}}}}; }
-  Json operator()(const Failed& failed) const {
+  nlohmann::json operator()(const Ready&) const { return {{"ready", nlohmann::json::object()}}; }
+  nlohmann::json operator()(const Ended& ended) const { return {{"ended", {{"verdict", to_string(ended.verdict)}}}}; }
+  nlohmann::json operator()(const Failed& failed) const {
     return {{"failed", {{"why", raw(failed.why)}, {"is_of_disk", failed.is_of_disk}}}};
   }
 };
@@ -75,7 +74,7 @@ std::string to_line(const RegistrationOrder& order) {
 std::string to_line(const RegistrationMessage& message) { return line_of(std::visit(ToJson(), message)); }
 
 RegistrationOrder registration_order_from(const std::string& line, const std::string& name) {
-  const Json json = json_from(line, name);
+  const nlohmann::json json = json_from(line, name);
   JsonSection message(json, name);
   std::optional<JsonSection> section = message.section("register");
   if (!section) message.refuse_missing("register", "an order");
@@ -97,7 +96,7 @@ RegistrationOrder registration_order_from(const std::string& line, const std::st
 }
 
 RegistrationMessage registration_message_from(const std::string& line, const std::string& name) {
-  const Json json = json_from(line, name);
+  const nlohmann::json json = json_from(line, name);
   JsonSection message(json, name);
   std::optional<JsonSection> ready = message.section("ready"), ended = message.section("ended"),
                              failed = message.section("failed");
