@@ -166,6 +166,7 @@ int run_check(const CheckOptions& options, Console& console) {
   options.check();
   const std::optional<PlannedSetup> setup = planned_setup(options);
   std::vector<CheckedRegistration> all;
+  all.reserve(options.registrations.size());
   for (const std::filesystem::path& path : options.registrations) all.push_back(check_registration(path));
   std::optional<Eigen::Vector3d> source_isocenter_mm;
   if (!options.source_isocenter.empty()) {

@@ -71,6 +71,7 @@ Sandwich sandwich_at(Objective& objective, const Eigen::Isometry3d& pose, int ax
       tile_of.push_back(row / tile_px * camera.columns + column / tile_px);
     }
     std::vector<Gradients> of_pose;
+    of_pose.reserve(poses.size());
     for (std::size_t p = 0; p < poses.size(); ++p)
       of_pose.push_back(gradients(drrs.line_integrals(p, view), comparison.neighbors()));
     std::map<int, Eigen::VectorXd> scores;
@@ -79,9 +80,9 @@ Sandwich sandwich_at(Objective& objective, const Eigen::Isometry3d& pose, int ax
       const Eigen::VectorXd drr = normalized(of_pose.front().*direction);
       Eigen::MatrixXd derivative(drr.size(), axes);
       for (int axis = 0; axis < axes; ++axis)
-        derivative.col(axis) = (normalized(of_pose[static_cast<std::size_t>(2 * axis + 2)].*direction) -
-                                normalized(of_pose[static_cast<std::size_t>(2 * axis + 1)].*direction)) /
-                               (2.0 * kStepMm);
+        derivative.col(axis) =
+            (normalized(of_pose[2 * axis + 2].*direction) - normalized(of_pose[2 * axis + 1].*direction)) /
+            (2.0 * kStepMm);
       add(xray - drr, derivative, xray.dot(drr), tile_of, sandwich.curvature, scores);
     }
     for (const auto& [tile, score] : scores) sandwich.scatter += score * score.transpose();

@@ -25,7 +25,7 @@ FolderSource::Growing FolderSource::growing(const fs::path& file, const Version&
   try {
     if (const auto known = known_file_in(scan_file(file))) growing.patient_id = known->patient_id;
   } catch (const Error&) {
-    // It does not yet.
+    return growing;  // it does not tell yet
   }
   return growing;
 }
