@@ -133,13 +133,13 @@ class LastFile {
   std::optional<DicomFile> file_;
 };
 
-// Of the child, before it looks at a file. (The address sanitizer needs all addresses there are.)
+// Of the child, before it looks at a file. (The sanitizers of addresses and threads need all addresses there are.)
 void limit_resources() {
   const auto limit = [](auto resource, rlim_t soft, rlim_t hard) {
     const rlimit value{.rlim_cur = soft, .rlim_max = hard};
     ::setrlimit(resource, &value);
   };
-#ifndef __SANITIZE_ADDRESS__
+#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
   limit(RLIMIT_AS, kMaxMemoryBytes, kMaxMemoryBytes);
 #endif
   limit(RLIMIT_FSIZE, 0, 0);

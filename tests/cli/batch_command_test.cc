@@ -147,7 +147,8 @@ exec sleep 600
 )";
   fs::remove_all(results());
   EXPECT_EQ(batch().exit_status, 4);
-  for (const auto& one : summary()["cases"])
+  const nlohmann::json all_again = summary()["cases"];
+  for (const auto& one : all_again)
     EXPECT_THAT(one["error"].get<std::string>(), HasSubstr("the message of a worker: is not JSON"));
 
   std::ofstream(program) << "#!/bin/sh\nexit 3\n";
