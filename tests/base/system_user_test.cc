@@ -23,11 +23,14 @@ constexpr int kKernelRefuses = 2;
 }
 
 TEST(SystemUserTest, TheKernelSaysWhoLoggedIn) {
-  const auto may_log_in = [](int status) {
-    return testing::ExitedWithCode(0)(status) || testing::ExitedWithCode(kKernelRefuses)(status);
+  bool is_refused = false;
+  const auto is_named = [&](int status) {
+    is_refused = testing::ExitedWithCode(kKernelRefuses)(status);
+    return is_refused || testing::ExitedWithCode(0)(status);
   };
-  EXPECT_EXIT(log_in_as(60123, "60123"), may_log_in, "");
-  EXPECT_EXIT(log_in_as(::geteuid(), ""), may_log_in, "");
+  EXPECT_EXIT(log_in_as(60123, "60123"), is_named, "");
+  EXPECT_EXIT(log_in_as(::geteuid(), ""), is_named, "");
+  if (is_refused) GTEST_SKIP() << "the kernel lets nobody log in here; needs root";
 }
 
 TEST(SystemUserTest, SudoSaysWhoItWasWhereTheKernelDoesNot) {

@@ -174,7 +174,7 @@ bool OrthancSource::keep(const fs::path& object, Notes& notes) {
     fs::remove(object);
   else
     rest_.erase(known->second.patient_id);
-  return taken.is_readable;
+  return !files_.unreadable().contains(object);
 }
 
 }  // namespace isoshift

@@ -79,7 +79,6 @@ PatientFiles::Taken PatientFiles::take(const fs::path& file, Notes& notes) {
   } catch (const Error& error) {
     notes.warnings.push_back(fmt::format("left aside: {}", error.what()));
     unreadable_[file] = error.what();
-    taken.is_readable = false;
     return taken;
   }
   const std::optional<KnownFile> found = known_file_in(one);

@@ -30,7 +30,6 @@ class PatientFiles {
   const std::map<std::filesystem::path, std::string>& unreadable() const { return unreadable_; }
 
   struct Taken {
-    bool is_readable = true;
     std::optional<std::filesystem::path> replaced;  // a broken file of the same object, which this file replaces
     std::vector<std::filesystem::path> copies;      // what forget() returned for files that were forgotten
   };
