@@ -9,9 +9,9 @@
 
 #include <chrono>
 #include <fstream>
+#include <future>
 #include <iterator>
 #include <optional>
-#include <thread>
 
 #include "base/process.h"
 #include "base/sha256.h"
@@ -160,23 +160,19 @@ TEST_F(DicomSendTest, AFileThatIsNotWhatWasReleasedIsNotSent) {
   expect_nothing_sent();
 }
 
-// A pipe tells how often it is read: whoever opens it again gets another object.
+// A pipe that is written once is read once: whoever opens it again waits.
 TEST_F(DicomSendTest, WhatIsSentIsReadOnce) {
   certificates_->make("server", "record", "IP:127.0.0.1");
-  std::string bytes = text_of(study_.plan());
   file_ = folder_ / "pipe";
   ASSERT_EQ(::mkfifo(file_.c_str(), 0600), 0);
-  std::jthread writer([&](const std::stop_token& stop) {
-    while (!stop.stop_requested()) {
-      std::ofstream(file_, std::ios::binary) << bytes;
-      bytes = text_of(study_.image(0));
-      std::this_thread::sleep_for(200ms);  // the reader sees the end before the pipe has a writer again
-    }
-  });
-  EXPECT_EQ(error_of_sending("server", "127.0.0.1"), "");
+  auto error = std::async(std::launch::async, [&] { return error_of_sending("server", "127.0.0.1"); });
+  std::ofstream(file_, std::ios::binary) << text_of(study_.plan());
+  while (error.wait_for(30s) != std::future_status::ready) {
+    ADD_FAILURE() << "the file is read again";
+    std::ofstream(file_, std::ios::binary) << text_of(study_.image(0));
+  }
+  EXPECT_EQ(error.get(), "");
   expect_sent();
-  writer.request_stop();
-  std::ifstream(file_).ignore();  // lets the writer go
 }
 
 TEST_F(DicomSendTest, FilesThatCannotBeUsedAreNamed) {
