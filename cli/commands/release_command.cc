@@ -37,7 +37,7 @@ void check_name(const std::string& by) {
 }
 
 void run_release(const std::filesystem::path& file, const std::string& session, const std::string& by,
-                 Console& console) {
+                 bool despite_other_xrays, Console& console) {
   check_name(by);
   const WatchFile watch = read_watch_file(file);
   // The user who runs watch could not read files that another user writes.
@@ -48,12 +48,14 @@ void run_release(const std::filesystem::path& file, const std::string& session, 
         watch.results.string()));
   ResultsTree tree(watch.results);
   const SystemUser user = system_user();
-  const Release release =
-      tree.release(session, {.by = by, .user = user.name, .sudo_user = user.sudo_user}, watch.names_of_peers());
+  const Release release = tree.release(
+      session, {.by = by, .user = user.name, .sudo_user = user.sudo_user, .despite_objection = despite_other_xrays},
+      watch.names_of_peers());
   const SetupResult result = read_report(tree.session(session));
   console.out << fmt::format("{} ({}), {}\n", result.identity.patient_name, result.identity.patient_id,
                              times_of(result.views));
   console.out << fmt::format("released by {}; the verdict was {}\n", to_string(release.releaser), release.verdict);
+  if (!release.despite.empty()) console.out << fmt::format("although {}\n", release.despite);
   if (release.is_again)
     console.err << "warning: the session was released before, as the audit log says, and the file of that release is "
                    "gone\n";
@@ -83,6 +85,7 @@ void add_release_command(CLI::App& app, Console& console, int& exit_status) {
   struct Options {
     std::filesystem::path watch = "/etc/isoshift/watch.json";
     std::string session, by;
+    bool despite_other_xrays = false;
   };
   auto options = std::make_shared<Options>();
   CLI::App* command =
@@ -90,16 +93,20 @@ void add_release_command(CLI::App& app, Console& console, int& exit_status) {
   command->footer(
       "\nExample:\n  isoshift release 3fa94c1e02b7 --by \"J. Doe\"\n\n"
       "Checks that the result was not changed after the registration, and records who released it, as which\n"
-      "user of the system. Then sends report.dcm and, if the result has one, spatial_registration.dcm.");
+      "user of the system. Then sends report.dcm and, if the result has one, spatial_registration.dcm.\n\n"
+      "A result against which other X-rays of the patient speak is refused: if they are newer, the couch may have\n"
+      "moved since.");
   command->add_option("session", options->session, "Name of the session, as index.html shows it")
       ->required()
       ->type_name("SESSION");
   command->add_option("--by", options->by, "Name of the person who has looked at the report and releases the result")
       ->required()
       ->type_name("NAME");
+  command->add_flag("--despite-other-xrays", options->despite_other_xrays,
+                    "Release a result although other X-rays of the patient speak against it, as index.html says");
   command->add_option("--watch", options->watch, "The watch file")->type_name("FILE")->capture_default_str();
   command->callback([options, &console, &exit_status] {
-    run_release(options->watch, options->session, options->by, console);
+    run_release(options->watch, options->session, options->by, options->despite_other_xrays, console);
     exit_status = kExitAccepted;
   });
 }

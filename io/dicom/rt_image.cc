@@ -104,6 +104,7 @@ RtImage read_frame(const std::filesystem::path& path, const DicomItem& d, const 
   if (format.frames > 1) image.label += fmt::format("#{}", frame + 1);
   if (const auto type = d.texts(DCM_ImageType); type.size() > 2) image.image_type = type[2];
   image.reported_values_origin = d.text(DCM_ReportedValuesOrigin);
+  image.fraction_number = d.number(DCM_FractionNumber);
   image.patient_position = d.text(DCM_PatientPosition);
   for (const DicomItem& plan : d.items(DCM_ReferencedRTPlanSequence))
     image.plan_sop_instance_uid = plan.text(DCM_ReferencedSOPInstanceUID);
@@ -125,7 +126,8 @@ RtImage read_frame(const std::filesystem::path& path, const DicomItem& d, const 
   image.gantry_angle_deg = attributes.number(DCM_GantryAngle);
   image.gantry_pitch_angle_deg = attributes.number(DCM_GantryPitchAngle);
   image.collimator_angle_deg = attributes.number(DCM_BeamLimitingDeviceAngle);
-  image.table = read_table_read_outs([&](const DcmTagKey& tag) { return attributes.number(tag); });
+  image.table =
+      read_table_read_outs([&](const DcmTagKey& tag) { return attributes.number(tag); }, image.reported_values_origin);
   image.isocenter_mm = vector_of<3>(d, DCM_IsocenterPosition);
 
   for (const auto& [keyword, tag] : kEquipmentAttributes)

@@ -44,6 +44,7 @@ struct RtImage {
   std::string label;       // RTImageLabel, else the file's name without extension; of several frames with "#2"
   std::string image_type;  // ImageType, third value
   std::optional<std::string> reported_values_origin;
+  std::optional<double> fraction_number;
   std::optional<std::string> patient_position;
   std::optional<std::string> plan_sop_instance_uid;
   std::optional<int> beam_number;

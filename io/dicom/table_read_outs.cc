@@ -38,8 +38,9 @@ bool TableReadOuts::has_same_read_outs(const TableReadOuts& other) const {
   });
 }
 
-TableReadOuts read_table_read_outs(const std::function<std::optional<double>(const DcmTagKey&)>& number) {
-  TableReadOuts table;
+TableReadOuts read_table_read_outs(const std::function<std::optional<double>(const DcmTagKey&)>& number,
+                                   const std::optional<std::string>& origin) {
+  TableReadOuts table{.are_measured = origin == "ACTUAL"};
   for (const TableReadOut& read_out : table_read_outs()) table.*read_out.value = number(read_out.tag);
   return table;
 }

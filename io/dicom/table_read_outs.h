@@ -18,17 +18,21 @@ constexpr double kMaxTableTurnDeg = 0.1;
 struct TableReadOuts {
   std::optional<double> lateral_mm, longitudinal_mm, vertical_mm;
   std::optional<double> support_angle_deg, eccentric_angle_deg, pitch_deg, roll_deg;
+  bool are_measured = false;  // ReportedValuesOrigin is ACTUAL: they were neither planned nor typed in
 
   // Whether the file says where the table stood. Two zeros, or numbers that no table reaches, do not: programs write
   // them where they know no position.
   bool has_position() const;
+  // Whether they tell where the table stood.
+  bool tell_position() const { return are_measured && has_position(); }
   // Whether both have the same read-outs, so that none is missing in one of them only.
   bool has_same_read_outs(const TableReadOuts& other) const;
   bool operator==(const TableReadOuts&) const = default;
 };
 
-// `number` gives the value of an attribute of the X-ray.
-TableReadOuts read_table_read_outs(const std::function<std::optional<double>(const DcmTagKey&)>& number);
+// `number` gives the value of an attribute of the X-ray, and `origin` is its ReportedValuesOrigin.
+TableReadOuts read_table_read_outs(const std::function<std::optional<double>(const DcmTagKey&)>& number,
+                                   const std::optional<std::string>& origin);
 
 // A read-out with its attribute, for loops over all read-outs.
 struct TableReadOut {

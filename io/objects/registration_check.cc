@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <set>
 
 #include "base/error.h"
@@ -98,6 +99,7 @@ class Checker {
         error(fmt::format("{}: moves the registered frame against itself", name));
         means_one_matrix_ = false;
       }
+      check_places(items[n], name, frame, matrix->matrix());
       if (is_identity) continue;
       ++others;
       result_.registered_from_source = matrix;
@@ -121,6 +123,26 @@ class Checker {
           "position (C.20.2.1.1)");
     if (others == 0 && items.size() > 1)
       note("all matrices are the identity: readers that look for the other one find none");
+  }
+
+  // Whether the item contradicts an earlier one: no frame and no image lies in two places.
+  void check_places(const DicomItem& item, const std::string& name, const std::string& frame,
+                    const Eigen::Matrix4d& matrix) {
+    const auto contradiction = [&](std::string text) {
+      error(std::move(text));
+      means_one_matrix_ = false;
+    };
+    if (frame == kIecFixedFrameUid && matrix == Eigen::Matrix4d::Identity())
+      contradiction(fmt::format("{}: says that the room (IEC 61217 Fixed) is the registered frame", name));
+    if (!frame.empty() && frame != result_.registered_frame_uid &&
+        matrix_of_.try_emplace(frame, matrix).first->second != matrix)
+      contradiction(fmt::format("{}: gives the frame {} another matrix than an earlier item does", name, frame));
+    for (const DicomItem& image : item.items(DCM_ReferencedImageSequence)) {
+      const std::string uid = image.text(DCM_ReferencedSOPInstanceUID).value_or("");
+      if (uid.empty() || matrix_of_.try_emplace(uid, matrix).first->second == matrix) continue;
+      contradiction(fmt::format("{}: gives the image {} another matrix than an earlier item does", name, uid));
+      break;
+    }
   }
 
   // The frame an item registers.
@@ -247,7 +269,8 @@ class Checker {
 
   DicomItem dataset_;
   CheckedRegistration result_;
-  bool means_one_matrix_ = true;  // else programs disagree about what the object means
+  std::map<std::string, Eigen::Matrix4d> matrix_of_;  // by the UID of a frame or an image
+  bool means_one_matrix_ = true;                      // else programs disagree about what the object means
 };
 
 }  // namespace

@@ -27,7 +27,8 @@ std::optional<Finding> table_finding(const TableReadOut& read_out, const RtImage
                                             reference.path.string(), described(read_out.tag))};
 }
 
-constexpr const char* kNoReadOuts = "without table positions in all views it is not known whether the table moved";
+constexpr const char* kNoReadOuts =
+    "without measured table positions in all views it is not known whether the table moved";
 
 // Whether both show the same view: from one gantry angle, or, where one of them has none, under one label.
 bool is_retake(const RtImage& image, const RtImage& earlier) {
@@ -48,6 +49,12 @@ std::vector<Finding> setting_doubts(std::span<const RtImage> images) {
       doubts.push_back({"table-moved", fmt::format("{} is of machine \"{}\", {} of \"{}\" ({})", image.label,
                                                    machine_of(image), images.front().label, machine_of(images.front()),
                                                    described(DCM_RadiationMachineName))});
+  for (const RtImage& image : images)
+    if (image.fraction_number && images.front().fraction_number &&
+        image.fraction_number != images.front().fraction_number)
+      doubts.push_back({"table-moved", fmt::format("{} is of fraction {}, {} of {} ({})", image.label,
+                                                   *image.fraction_number, images.front().label,
+                                                   *images.front().fraction_number, described(DCM_FractionNumber))});
   constexpr double kSameIsocenterMm = 0.5;
   for (const RtImage& image : images)
     if (image.isocenter_mm && images.front().isocenter_mm &&
@@ -76,18 +83,24 @@ const char* flag_of(const TableReadOut& read_out) {
   return read_out.tag == DCM_TableTopPitchAngle ? "--couch-pitch" : "--couch-roll";
 }
 
-// Views too far apart in time, or views whose distance in time is not known.
-std::optional<Finding> time_doubt(std::span<const RtImage> images, double max_span_s) {
-  const RtImage* earliest = &images.front();
-  const RtImage* latest = &images.front();
+// Views whose distance in time is not known. A table that stands where it stood does not tell that the patient did not
+// get up.
+std::optional<Finding> unknown_time_doubt(std::span<const RtImage> images, bool is_table_known) {
   for (const RtImage& image : images) {
-    if (!image.has_own_time || !acquisition_seconds(image) ||
+    const bool is_frame_known = image.has_own_time || is_table_known;  // frames of one file are of one exposure series
+    if (!is_frame_known || !acquisition_seconds(image) ||
         image.utc_offset_min.has_value() != images.front().utc_offset_min.has_value())
-      return Finding{"time-span", fmt::format("{}: when it was taken is unknown ({}), and {}", image.label,
-                                              described(DCM_AcquisitionTime), kNoReadOuts)};
-    if (*acquisition_seconds(image) < *acquisition_seconds(*earliest)) earliest = &image;
-    if (*acquisition_seconds(image) > *acquisition_seconds(*latest)) latest = &image;
+      return Finding{
+          "time-span",
+          fmt::format("{}: when it was taken is unknown ({}), and {}", image.label, described(DCM_AcquisitionTime),
+                      is_table_known ? "so it is not known whether the views show one setup" : kNoReadOuts)};
   }
+  return std::nullopt;
+}
+
+// Views too far apart in time.
+std::optional<Finding> time_span_doubt(std::span<const RtImage> images, double max_span_s) {
+  const auto [earliest, latest] = std::ranges::minmax_element(images, {}, acquisition_seconds);
   const double span_s = *acquisition_seconds(*latest) - *acquisition_seconds(*earliest);
   if (span_s <= max_span_s) return std::nullopt;
   return Finding{"time-span", fmt::format("{} was taken {:.0f} s after {}, more than {:.0f} s: {}", latest->label,
@@ -169,11 +182,13 @@ std::vector<Finding> session_doubts(std::span<const RtImage> images, double max_
   std::vector<Finding> doubts = setting_doubts(images);
   // Read-outs that were planned, or that one view lacks, do not tell that the table stood still.
   const auto tells_table = [&](const RtImage& image) {
-    return image.table.has_position() && image.reported_values_origin == "ACTUAL" &&
-           image.table.has_same_read_outs(images.front().table);
+    return image.table.tell_position() && image.table.has_same_read_outs(images.front().table);
   };
-  if (std::ranges::all_of(images, tells_table)) return doubts;
-  if (auto doubt = time_doubt(images, max_span_s)) doubts.push_back(std::move(*doubt));
+  const bool is_table_known = std::ranges::all_of(images, tells_table);
+  auto time_doubt = unknown_time_doubt(images, is_table_known);
+  if (!time_doubt && !is_table_known) time_doubt = time_span_doubt(images, max_span_s);
+  if (time_doubt) doubts.push_back(std::move(*time_doubt));
+  if (is_table_known) return doubts;
   for (std::size_t n = 1; n < images.size(); ++n)
     if (const auto first = std::ranges::find_if(images.first(n),
                                                 [&](const RtImage& earlier) { return is_retake(images[n], earlier); });

@@ -22,9 +22,10 @@ std::vector<Finding> patient_findings(const Identity& reference, const Identity&
 std::vector<Finding> session_findings(std::span<const RtImage> images, Notes& notes);
 
 // Reasons to doubt that the views show one setup, so that a person must review the result:
-// - if not all views have read-outs of the table's position: views more than `max_span_s` apart, views with unknown
-//   times, and a view that was taken twice;
-// - in any case: views of two machines, and a table angle that is not 0 in one view and missing in another.
+// - if not all views have measured read-outs of the table's position: views more than `max_span_s` apart, and a view
+//   that was taken twice;
+// - in any case: views with unknown times, views of two machines or two fractions, and a table angle that is not 0 in
+//   one view and missing in another.
 std::vector<Finding> session_doubts(std::span<const RtImage> images, double max_span_s);
 
 // What a person says by switches against what the X-rays say.

@@ -3,8 +3,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <functional>
 #include <iterator>
 #include <map>
+#include <numeric>
 #include <ranges>
 #include <set>
 #include <span>
@@ -129,10 +131,15 @@ class Doubts {
 
   std::vector<std::string> of(const SessionFiles& session) const {
     Images own = session.images;
-    if (own.size() < 2 || !own.front().at_s ||
-        std::ranges::all_of(own, [](const auto& image) { return image.table.has_position(); }))
-      return {};
     std::vector<std::string> doubts;
+    for (const StudyFiles::Image& image : own)
+      if (!image.other.empty())
+        doubts.push_back(fmt::format("{} and {} have one SOPInstanceUID and different contents", image.file.string(),
+                                     image.other.string()));
+    const auto tells_table = [&](const StudyFiles::Image& image) {
+      return image.table.tell_position() && image.table.has_same_read_outs(own.front().table);
+    };
+    if (own.size() < 2 || !own.front().at_s || std::ranges::all_of(own, tells_table)) return doubts;
     const StudyFiles::Image *before = nullptr, *after = nullptr;
     for (const StudyFiles::Image* const one : of_patient_.at(patient_id_of(session.patient))) {
       const StudyFiles::Image& other = *one;
@@ -143,6 +150,8 @@ class Doubts {
               fmt::format("{} shows {}, too, and when it was taken is not known", other.file.string(), other.label));
       } else if (*other.at_s > *own.front().at_s && *other.at_s < *own.back().at_s) {
         doubts.push_back(fmt::format("{} was taken between these views", other.file.string()));
+      } else if (has_time_of_own_label(own, other)) {
+        doubts.push_back(fmt::format("{} shows {}, too, at the same time", other.file.string(), other.label));
       } else if (*other.at_s <= *own.front().at_s) {
         if (before == nullptr || *other.at_s > *before->at_s) before = &other;
       } else if (after == nullptr || *other.at_s < *after->at_s) {
@@ -157,6 +166,13 @@ class Doubts {
   static bool is_in(const SessionFiles& session, const StudyFiles::Image& image) {
     return std::ranges::find(session.images, image.sop_instance_uid, &StudyFiles::Image::sop_instance_uid) !=
            session.images.end();
+  }
+
+  // Whether the X-ray repeats the label of one of `own` at the time of any of them: then nothing tells which is of
+  // which session.
+  static bool has_time_of_own_label(Images own, const StudyFiles::Image& other) {
+    return has_label(own, other.label) &&
+           std::ranges::any_of(own, [&](const auto& image) { return image.at_s == other.at_s; });
   }
 
   // Whether the X-ray is of a session that lacks a view which `own` has: its own view may be in this one.
@@ -187,7 +203,41 @@ class Doubts {
   std::map<std::string, std::size_t> size_of_session_;                       // by SOPInstanceUID of its X-rays
 };
 
+// The lowest folder that holds all files, with a slash; empty if they lie in one folder, or have only the root in
+// common.
+std::string folder_above(const std::vector<fs::path>& files) {
+  std::set<fs::path> folders;
+  for (const fs::path& file : files) folders.insert(file.parent_path());
+  if (folders.size() < 2) return "";
+  fs::path above = *folders.begin();
+  for (const fs::path& folder : folders) {
+    const auto differs = std::mismatch(above.begin(), above.end(), folder.begin(), folder.end()).first;
+    above = std::accumulate(above.begin(), differs, fs::path(), std::divides());
+  }
+  return above == above.root_path() ? "" : above.string() + "/";
+}
+
 }  // namespace
+
+std::string objection_to(const std::set<std::string>& sop_instance_uids, const StudyFiles& files, bool other_xrays,
+                         std::set<std::string> registered) {
+  for (const std::string& uid : sop_instance_uids) registered.erase(uid);
+  const std::vector<SessionFiles> sessions = sessions_of(files, other_xrays, registered);
+  const auto same = std::ranges::find(sessions, session_name(sop_instance_uids), &SessionFiles::name);
+  if (same == sessions.end()) return "with the X-rays that are known now, these are not one session";
+  return same->doubts.empty() ? "" : same->doubts.front();
+}
+
+void compare_copies(StudyFiles& files) {
+  std::map<std::string, StudyFiles::Image*> first_of;
+  for (auto* images : {&files.images, &files.other_xrays})
+    for (StudyFiles::Image& image : *images) {
+      const auto [first, is_new] = first_of.emplace(image.sop_instance_uid, &image);
+      if (is_new || sha256_of_file(first->second->file) == sha256_of_file(image.file)) continue;
+      image.other = first->second->file;
+      first->second->other = image.file;
+    }
+}
 
 std::string session_name(const std::set<std::string>& sop_instance_uids) {
   std::string all;
@@ -282,11 +332,14 @@ std::string unreadable_beside(const StudyParts& parts, const std::vector<std::st
   std::set<std::string> folders;
   for (const auto& files : {parts.ct, parts.images})
     for (const fs::path& file : files) folders.insert(file.parent_path().string() + "/");
-  for (const std::string& reason : unreadable)
+  const std::string above = folder_above(parts.images);
+  for (const std::string& reason : unreadable) {
+    if (!above.empty() && reason.starts_with(above)) return reason;
     for (const std::string& folder : folders)
       if (reason.starts_with(folder) &&
           reason.substr(0, reason.find(": ")).find('/', folder.size()) == std::string::npos)
         return reason;
+  }
   return "";
 }
 

@@ -30,6 +30,14 @@ struct SessionFiles {
 std::vector<SessionFiles> sessions_of(const StudyFiles& files, bool other_xrays,
                                       const std::set<std::string>& registered = {});
 
+// Why these X-rays, which have a result, would not be accepted as one session any more, now that other X-rays of their
+// patient are known, in words. Empty: they would be. `files`, of that patient, hold them.
+std::string objection_to(const std::set<std::string>& sop_instance_uids, const StudyFiles& files, bool other_xrays,
+                         std::set<std::string> registered);
+
+// Finds X-rays that have one SOPInstanceUID and different contents, and notes in each the file of the other.
+void compare_copies(StudyFiles& files);
+
 // The name of the session of these X-rays.
 std::string session_name(const std::set<std::string>& sop_instance_uids);
 
@@ -41,8 +49,9 @@ StudyFiles files_for(const SessionFiles& session, const StudyFiles& files);
 // structure set tells.
 std::string missing_ct_images(const StudyFiles& of_session);
 
-// Why a file in a folder of these CT images or X-rays cannot be read: it may be one of them. Empty if there is no such
-// file. `unreadable`: messages, each beginning with the file's path.
+// Why a file in a folder of these CT images or X-rays cannot be read: it may be one of them. If the X-rays lie in
+// several folders, a file anywhere below the folder that holds these may be one, too. Empty if there is no such file.
+// `unreadable`: messages, each beginning with the file's path.
 std::string unreadable_beside(const StudyParts& parts, const std::vector<std::string>& unreadable);
 
 // The missing objects to which the session's files refer, in words. Empty if nothing is missing.

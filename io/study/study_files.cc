@@ -71,8 +71,10 @@ StudyFiles::Image xray(const fs::path& path, const DicomItem& dataset) {
           .label = dataset.text(DCM_RTImageLabel).value_or(""),
           .machine = dataset.text(DCM_RadiationMachineName).value_or(""),
           .at_s = acquisition_seconds(timed),
+          .has_utc_offset = timed.utc_offset_min.has_value(),
           .acquired = acquired(timed),
-          .table = read_table_read_outs([&](const DcmTagKey& tag) { return read_out(dataset, tag); })};
+          .table = read_table_read_outs([&](const DcmTagKey& tag) { return read_out(dataset, tag); },
+                                        dataset.text(DCM_ReportedValuesOrigin))};
 }
 
 void add_ct_slice(const fs::path& path, const DicomItem& dataset, StudyFiles& files) {
@@ -262,7 +264,7 @@ StudyParts chosen(StudyFiles files, std::vector<StudyFiles::Plan> other_plans, c
 
 }  // namespace
 
-std::string patient_id_of(const std::string& patient) { return patient.substr(0, patient.find('\\')); }
+std::string patient_id_of(const std::string& patient) { return patient.substr(0, patient.rfind('\\')); }
 
 std::vector<fs::path> files_below(const std::vector<fs::path>& paths, const std::unordered_set<std::string>& but,
                                   std::set<fs::path>* unsearchable) {

@@ -34,12 +34,14 @@ struct StudyFiles {
     std::filesystem::path file;
     std::string patient;
     std::string sop_instance_uid;
-    std::string plan_uid;        // ReferencedRTPlanSequence
-    std::string label;           // RTImageLabel; empty: none
-    std::string machine;         // RadiationMachineName; empty: unknown
-    std::optional<double> at_s;  // when it was acquired, since an epoch
-    std::string acquired;        // the same for people, "2026-03-01 10:15:00"; empty: unknown
+    std::string plan_uid;         // ReferencedRTPlanSequence
+    std::string label;            // RTImageLabel; empty: none
+    std::string machine;          // RadiationMachineName; empty: unknown
+    std::optional<double> at_s;   // when it was acquired, since an epoch
+    bool has_utc_offset = false;  // of at_s; else the time is local
+    std::string acquired;         // the same for people, "2026-03-01 10:15:00"; empty: unknown
     TableReadOuts table;
+    std::filesystem::path other = {};  // a file with this SOPInstanceUID and other contents; empty: none
   };
   struct Structures {
     std::filesystem::path file;

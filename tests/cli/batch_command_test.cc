@@ -187,6 +187,49 @@ TEST_F(BatchCommandTest, ScanWritesTheManifestThatBatchReads) {
   EXPECT_EQ(found[2].parts.plan, exported() / "2" / "RTPLAN.dcm");
 }
 
+// X-rays that come late, or a file that is replaced, change what a case is: its earlier result does not stand for it.
+TEST_F(BatchCommandTest, AResultOfOtherFilesIsSupersededAndNotLost) {
+  fs::remove_all(exported() / "2");
+  ASSERT_EQ(batch().exit_status, 4);
+  const auto before = cases();
+  ASSERT_EQ(before.size(), 2U);
+  const fs::path images = exported() / "1" / "RTIMAGE", plan = exported() / "1" / "RTPLAN.dcm";
+  fs::copy_file(images / "KV_G000.dcm", images / "late.dcm");
+  edit(images / "late.dcm", [](DicomItem d) {
+    d.put(DCM_SOPInstanceUID, "2.25.7");
+    d.put(DCM_RTImageLabel, "OBL");
+  });
+  const CommandOutcome again = batch();
+  EXPECT_THAT(again.err, HasSubstr("its X-rays are no case any more"));
+  EXPECT_EQ(cases().size(), 2U);
+  EXPECT_EQ(std::distance(fs::directory_iterator(results() / "superseded"), {}), 1);
+  EXPECT_THAT(batch().err, HasSubstr("2 of 2 cases have been registered before"));
+
+  fs::last_write_time(plan, fs::last_write_time(plan) + std::chrono::seconds(1));
+  const CommandOutcome replaced = batch();
+  EXPECT_THAT(replaced.err, HasSubstr("its files or its doubts have changed, so it is registered again"));
+  EXPECT_EQ(std::distance(fs::directory_iterator(results() / "superseded"), {}), 3);
+}
+
+TEST_F(BatchCommandTest, AManifestIsOfTheXraysThatWereScanned) {
+  fs::remove_all(exported() / "2");
+  fs::remove_all(exported() / "1" / "RTIMAGE" / "F02");
+  const fs::path manifest = folder_ / "cases.csv", image = exported() / "1" / "RTIMAGE" / "KV_G090.dcm";
+  ASSERT_EQ(run_command({"batch", "--scan", exported().string(), "-o", manifest.string()}).exit_status, 0);
+  edit(image, [](DicomItem d) { d.put(DCM_SOPInstanceUID, "2.25.7"); });
+  run_command({"batch", manifest.string(), "-o", results().string(), "--preset", "fast"});
+  ASSERT_EQ(summary()["cases"].size(), 1U);
+  EXPECT_THAT(summary()["cases"][0]["error"].get<std::string>(), HasSubstr("are not those for which the manifest"));
+}
+
+TEST_F(BatchCommandTest, ANameThatAManifestCannotHoldIsRefused) {
+  fs::rename(exported() / "1", exported() / "1;2");
+  const CommandOutcome outcome =
+      run_command({"batch", "--scan", exported().string(), "-o", (folder_ / "cases.csv").string()});
+  EXPECT_EQ(outcome.exit_status, 1);
+  EXPECT_THAT(outcome.err, HasSubstr("its name holds \";\""));
+}
+
 // AP and LAT, LAT again, the couch moves, AP and LAT: LAT again belongs to neither pair.
 TEST_F(BatchCommandTest, ScanDoesNotPairARetakeAcrossACouchMove) {
   const fs::path images = exported() / "1" / "RTIMAGE";

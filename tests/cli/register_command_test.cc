@@ -186,8 +186,8 @@ TEST_F(RegisterCommandTest, ViewsFarApartWithoutTableReadOutsNeedAReview) {
   EXPECT_EQ(reasons({}), "accepted []");
   take_second_at("101710");
   EXPECT_EQ(reasons({}),
-            "review [\"KV_G090 was taken 130 s after KV_G000, more than 120 s: without table positions in all views "
-            "it is not known whether the table moved (--allow time-span=REASON)\"]");
+            "review [\"KV_G090 was taken 130 s after KV_G000, more than 120 s: without measured table positions in all "
+            "views it is not known whether the table moved (--allow time-span=REASON)\"]");
   EXPECT_EQ(reasons({"--allow", "time-span=the couch stood still"}), "accepted []");
   EXPECT_THAT(result()["overrides"].dump(), HasSubstr("130 s after KV_G000"));
   const std::filesystem::path site = study_.path().parent_path() / "site.json";
@@ -229,8 +229,22 @@ TEST_F(RegisterCommandTest, ViewsThatMayBeOfTwoSetupsNeedAReview) {
               HasSubstr("KV_G090: when it was taken is unknown"));
   EXPECT_THAT(reasons([](DicomItem d) { d.put(DCM_AcquisitionTime, "10:18:00"); }), HasSubstr("was taken 180 s after"));
   EXPECT_THAT(reasons([](DicomItem d) { d.put(DCM_RadiationMachineName, "LINAC2"); }), HasSubstr("LINAC2"));
+  EXPECT_THAT(reasons([](DicomItem d) { d.put(DCM_FractionNumber, 7.0); }), HasSubstr("KV_G090 is of fraction 7"));
   EXPECT_THAT(reasons([](DicomItem d) { d.put(DCM_TableTopEccentricAngle, 3.0); }),
               HasSubstr("is 3 degrees in KV_G090 and missing in KV_G000"));
+}
+
+// A couch returns to its place every day.
+TEST_F(RegisterCommandTest, ATableThatStandsWhereItStoodDoesNotReplaceTheTimes) {
+  for (const int n : {0, 1})
+    edit(study_.image(n), [&](DicomItem d) {
+      d.put(DCM_TableTopLateralPosition, 10.0);
+      d.put(DCM_TableTopLongitudinalPosition, 812.0);
+      d.put(DCM_TableTopVerticalPosition, -150.0);
+      d.put(DCM_AcquisitionTime, n == 0 ? "1015" : "1601");  // hours apart, without seconds
+    });
+  EXPECT_EQ(register_study(study_).exit_status, 3);
+  EXPECT_THAT(result()["reasons"].dump(), HasSubstr("so it is not known whether the views show one setup"));
 }
 
 // The isocenter, in the frame of the CT, tells of a second plan or of a move that no read-out tells.

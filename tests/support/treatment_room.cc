@@ -45,6 +45,7 @@ StudyFiles plan_of(const std::string& patient_id) {
 
 StudyFiles xray(const std::string& patient_id, const std::string& uid, const std::string& label, double second,
                 std::optional<double> table_vertical_mm) {
+  constexpr double kDay = 1772409600.0;  // 2026-03-02, since 1970
   const int whole = static_cast<int>(second);
   StudyFiles files;
   files.images = {{.file = file_of(uid),
@@ -52,10 +53,11 @@ StudyFiles xray(const std::string& patient_id, const std::string& uid, const std
                    .sop_instance_uid = uid,
                    .plan_uid = plan_uid(patient_id),
                    .label = label,
-                   .at_s = second,
+                   .at_s = kDay + second,
                    .acquired = fmt::format("2026-03-02 {:02}:{:02}:{:02}", whole / 3600, whole / 60 % 60, whole % 60)}};
   if (table_vertical_mm)
-    files.images[0].table = {.lateral_mm = 0.0, .longitudinal_mm = 0.0, .vertical_mm = *table_vertical_mm};
+    files.images[0].table = {
+        .lateral_mm = 0.0, .longitudinal_mm = 0.0, .vertical_mm = *table_vertical_mm, .are_measured = true};
   return files;
 }
 

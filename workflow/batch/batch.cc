@@ -26,6 +26,16 @@ std::vector<BatchCase> cases_of_shard(const Shard& shard, std::vector<BatchCase>
   return {cases.begin() + begin(shard.number - 1), cases.begin() + begin(shard.number)};
 }
 
+// True if it is not known, or if a file cannot be read: the registration says which one.
+bool has_xrays_of_manifest(const BatchCase& one) {
+  if (one.xrays_sha256.empty()) return true;
+  try {
+    return xrays_sha256_of(one) == one.xrays_sha256;
+  } catch (const Error&) {
+    return true;
+  }
+}
+
 }  // namespace
 
 std::vector<BatchCase> cases_of(const BatchOptions& options, Observer& observer) {
@@ -54,12 +64,27 @@ bool Batch::run() {
   const Shard shard = options_.shard.value_or(Shard());
   if (shard.count > 1) cases_ = cases_of_shard(shard, std::move(cases_));
   const ShardLock lock = folder_.work_on(shard, cases_);
+  if (shard.count == 1 && std::filesystem::is_directory(options_.cases))
+    for (const std::string& name : folder_.set_aside_others(cases_))
+      observer_.say(
+          fmt::format("case {}: its X-rays are no case any more, now that the folder holds others. Its result "
+                      "is in superseded",
+                      name));
   return register_all();
 }
 
 bool Batch::register_all() {
   std::vector<BatchJob> jobs;
-  for (const BatchCase& one : cases_)
+  for (const BatchCase& one : cases_) {
+    if (folder_.begin(one))
+      observer_.say(
+          fmt::format("case {}: its files or its doubts have changed, so it is registered again. Its earlier "
+                      "result is in superseded",
+                      one.name));
+    if (!folder_.has_ended(one.name) && !has_xrays_of_manifest(one))
+      folder_.fail(one.name,
+                   "its X-rays are not those for which the manifest was written (xrays_sha256). Write the manifest "
+                   "again with --scan; or empty that cell, if you have chosen other X-rays");
     if (!folder_.has_ended(one.name))
       jobs.push_back({.name = one.name,
                       .ct_key = one.ct_key(),
@@ -68,6 +93,7 @@ bool Batch::register_all() {
                                 .anatomy = one.anatomy,
                                 .output = std::filesystem::absolute(folder_.folder_of(one.name)),
                                 .at_a_time = options_.jobs}});
+  }
   if (jobs.size() < cases_.size())
     observer_.say(
         fmt::format("{} of {} cases have been registered before", cases_.size() - jobs.size(), cases_.size()));

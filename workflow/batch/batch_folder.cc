@@ -3,11 +3,14 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
+#include <fstream>
 #include <nlohmann/json.hpp>
 
 #include "base/error.h"
 #include "base/json_file.h"
 #include "base/output_folder.h"
+#include "base/sha256.h"
 
 namespace isoshift {
 namespace {
@@ -65,6 +68,42 @@ ShardLock BatchFolder::work_on(const Shard& shard, const std::vector<BatchCase>&
     if (std::ranges::any_of(cases, is_left_by)) fs::remove_all(entry.path());
   }
   return lock;
+}
+
+void BatchFolder::set_aside(const std::string& name) const {
+  const fs::path folder = path_ / "superseded";
+  fs::create_directories(folder);
+  fs::path to = folder / name;
+  for (int n = 2; fs::exists(to); ++n) to = folder / fmt::format("{}-{}", name, n);
+  fs::rename(folder_of(name), to);
+}
+
+bool BatchFolder::begin(const BatchCase& one) const {
+  const fs::path noted = path_ / "inputs" / (one.name + ".sha256");
+  std::string before;
+  std::getline(std::ifstream(noted), before);
+  std::string now;
+  try {
+    now = sha256_of(inputs_of(one));
+  } catch (const std::exception&) {
+    return false;  // the registration says which file is missing
+  }
+  const bool is_superseded = has_ended(one.name) && !before.empty() && before != now;
+  if (is_superseded) set_aside(one.name);
+  if (has_ended(one.name) || before == now) return is_superseded;
+  fs::create_directories(noted.parent_path());
+  replace_text(noted, now + "\n");
+  return is_superseded;
+}
+
+std::vector<std::string> BatchFolder::set_aside_others(const std::vector<BatchCase>& cases) const {
+  std::vector<std::string> others;
+  for (const auto& entry : fs::directory_iterator(path_ / "cases"))
+    if (const std::string name = entry.path().filename().string();
+        name.find(".partial-") == std::string::npos && std::ranges::find(cases, name, &BatchCase::name) == cases.end())
+      others.push_back(name);
+  for (const std::string& name : others) set_aside(name);
+  return others;
 }
 
 void BatchFolder::fail(const std::string& name, const std::string& message) const {

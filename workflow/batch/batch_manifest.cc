@@ -15,6 +15,7 @@
 
 #include "base/csv.h"
 #include "base/error.h"
+#include "base/sha256.h"
 #include "io/study/session_files.h"
 
 namespace isoshift {
@@ -22,7 +23,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::array kColumns = {"case", "study", "ct", "plan", "structures", "images", "anatomy", "doubts"};
+constexpr std::array kColumns = {"case",   "study",   "ct",     "plan",        "structures",
+                                 "images", "anatomy", "doubts", "xrays_sha256"};
 constexpr std::array kLists = {"ct", "images", "doubts"};  // columns whose cells may hold several texts
 constexpr char kBetween = ';';                             // the texts of one cell
 
@@ -133,7 +135,8 @@ BatchCase case_of(const NumberedRow& row, const fs::path& folder, const std::str
                                .plan = path(one("plan")),
                                .structures = path(one("structures")),
                                .doubts = many("doubts")},
-                     .anatomy = one("anatomy")};
+                     .anatomy = one("anatomy"),
+                     .xrays_sha256 = one("xrays_sha256")};
   const auto is_allowed = [](unsigned char c) { return std::isalnum(c) != 0 || c == '.' || c == '_' || c == '-'; };
   if (one_case.name.empty() || one_case.name.starts_with('.') || !std::ranges::all_of(one_case.name, is_allowed))
     throw Error(fmt::format("{}, line {}: case \"{}\": expected a name of letters, digits, \".\", \"_\" and \"-\"",
@@ -169,6 +172,25 @@ std::string joined(const std::vector<Text>& texts) {
 
 std::string BatchCase::ct_key() const { return parts.ct.empty() ? parts.study.string() : joined(parts.ct); }
 
+std::string xrays_sha256_of(const BatchCase& one) {
+  std::string all;
+  for (const fs::path& file : files_below(one.parts.images)) all += sha256_of_file(file);
+  return sha256_of(all);
+}
+
+std::string inputs_of(const BatchCase& one) {
+  std::string text = fmt::format("{}\n{}\n", one.anatomy, joined(one.parts.doubts));
+  std::vector<fs::path> parts = one.parts.ct;
+  parts.insert(parts.end(), one.parts.images.begin(), one.parts.images.end());
+  for (const fs::path& part : {one.parts.study, one.parts.plan, one.parts.structures})
+    if (!part.empty()) parts.push_back(part);
+  for (const fs::path& part : parts)
+    for (const fs::path& file : files_below({part}))
+      text += fmt::format("{} {} {}\n", file.filename().string(), fs::file_size(file),
+                          fs::last_write_time(file).time_since_epoch().count());
+  return text;
+}
+
 std::vector<BatchCase> read_manifest(const fs::path& path) {
   std::ifstream file(path, std::ios::binary);
   std::string text{std::istreambuf_iterator<char>(file), {}};
@@ -190,17 +212,24 @@ std::vector<BatchCase> read_manifest(const fs::path& path) {
 
 std::string manifest_csv(const std::vector<BatchCase>& cases) {
   std::string csv = fmt::format("{}\n", fmt::join(kColumns, ","));
-  for (const auto& [name, parts, anatomy] : cases)
-    csv +=
-        fmt::format("{},{},{},{},{},{},{},{}\n", name, csv_quoted(parts.study.string()), csv_quoted(joined(parts.ct)),
-                    csv_quoted(parts.plan.string()), csv_quoted(parts.structures.string()),
-                    csv_quoted(joined(parts.images)), anatomy, csv_quoted(joined(parts.doubts)));
+  for (const auto& [name, parts, anatomy, xrays_sha256] : cases) {
+    for (const auto& paths : {parts.ct, parts.images})
+      for (const fs::path& path : paths)
+        if (path.string().find(kBetween) != std::string::npos)
+          throw Error(fmt::format("{}: its name holds \"{}\", which separates the paths in a manifest. Rename it",
+                                  path.string(), kBetween));
+    csv += fmt::format("{},{},{},{},{},{},{},{},{}\n", name, csv_quoted(parts.study.string()),
+                       csv_quoted(joined(parts.ct)), csv_quoted(parts.plan.string()),
+                       csv_quoted(parts.structures.string()), csv_quoted(joined(parts.images)), anatomy,
+                       csv_quoted(joined(parts.doubts)), xrays_sha256);
+  }
   return csv;
 }
 
 std::vector<BatchCase> scan_cases(const fs::path& folder, bool other_xrays, Notes& notes) {
   const fs::path top = fs::absolute(folder).lexically_normal();
-  const StudyFiles files = scan_study({top});
+  StudyFiles files = scan_study({top});
+  compare_copies(files);
   for (const std::string& reason : files.unreadable) notes.warnings.push_back(reason);
   std::vector<BatchCase> cases;
   for (const SessionFiles& session : sessions_of(files, other_xrays)) {
@@ -216,7 +245,8 @@ std::vector<BatchCase> scan_cases(const fs::path& folder, bool other_xrays, Note
       parts.doubts = session.doubts;
       for (const std::string& doubt : session.doubts)
         notes.warnings.push_back(fmt::format("case {}: {}", session.name, doubt));
-      cases.push_back({.name = session.name, .parts = std::move(parts), .anatomy = ""});
+      cases.push_back({.name = session.name, .parts = std::move(parts), .anatomy = "", .xrays_sha256 = ""});
+      cases.back().xrays_sha256 = xrays_sha256_of(cases.back());
     } catch (const Error& error) {
       notes.warnings.push_back(
           fmt::format("{} and {} more X-rays belong to no case: {}\n       Or name their files in a manifest; --scan "

@@ -13,16 +13,24 @@ namespace isoshift {
 struct BatchCase {
   std::string name;  // also the name of its folder: letters, digits, ".", "_" and "-"
   StudyParts parts;
-  std::string anatomy;  // empty: the anatomy of --anatomy
+  std::string anatomy;       // empty: the anatomy of --anatomy
+  std::string xrays_sha256;  // what xrays_sha256_of() said when the case was found; empty: not known
 
   // Cases with equal keys share their CT.
   std::string ct_key() const;
 };
 
+// Of the contents of the case's X-ray files, in their order. Throws Error for a file that cannot be read.
+std::string xrays_sha256_of(const BatchCase& one);
+
+// What the case is registered from: the names, sizes and times of all its files, its doubts and its anatomy. Another
+// text if any of these changes. Throws Error for a file that does not exist.
+std::string inputs_of(const BatchCase& one);
+
 // Paths in a manifest are relative to its folder. Throws Error naming the line and the column of a mistake.
 std::vector<BatchCase> read_manifest(const std::filesystem::path& path);
 
-// The manifest as CSV. Paths are not changed.
+// The manifest as CSV. Paths are not changed. Throws Error for a path that holds the separator of paths.
 std::string manifest_csv(const std::vector<BatchCase>& cases);
 
 // Makes a case for every session of X-rays below a folder. X-rays that belong to no case are listed in the notes, with

@@ -117,6 +117,7 @@ void AuditLog::Proofs::add(const std::string& text) {
   if (event == "not released") releases.erase(session);
   if (event != "released") return;
   releases[session] = text_of(line, "release");
+  release_numbers[session] = ++releases_so_far;
   if (line.contains("objects") && line["objects"].is_array())
     for (const Json& object : line["objects"])
       if (object.is_object()) objects.emplace(text_of(object, "sha256"), session);
@@ -161,6 +162,12 @@ bool AuditLog::has_been_released(const std::string& session) const { return proo
 
 bool AuditLog::has_release(const std::string& session, const std::string& release_sha256) const {
   return has(proofs().releases, session, release_sha256);
+}
+
+std::size_t AuditLog::release_number(const std::string& session) const {
+  const std::map<std::string, std::size_t>& numbers = proofs().release_numbers;
+  const auto found = numbers.find(session);
+  return found == numbers.end() ? 0 : found->second;
 }
 
 bool AuditLog::has_sending(const std::string& session, const std::string& peer,

@@ -36,6 +36,8 @@ class AuditLog {
   bool has_been_released(const std::string& session) const;
   // True if the newest release of the session has this file.
   bool has_release(const std::string& session, const std::string& release_sha256) const;
+  // Which line of the log has the newest release of the session, counted among all releases from 1; 0 without one.
+  std::size_t release_number(const std::string& session) const;
   // True if the peer has confirmed the object. Lines that were kept count, too.
   bool has_sending(const std::string& session, const std::string& peer, const std::string& object_sha256) const;
   // The session with which an object was released; nothing if the object was not released.
@@ -48,10 +50,12 @@ class AuditLog {
     timespec written{};
   };
   struct Proofs {
-    std::map<std::string, std::string> registrations;  // SHA-256 of the newest record, by session
-    std::map<std::string, std::string> releases;       // SHA-256 of the newest release file, by session
-    std::map<std::string, std::string> objects;        // session, by SHA-256 of a released object
-    std::set<std::array<std::string, 3>> sendings;     // session, peer, SHA-256 of the object
+    std::map<std::string, std::string> registrations;    // SHA-256 of the newest record, by session
+    std::map<std::string, std::string> releases;         // SHA-256 of the newest release file, by session
+    std::map<std::string, std::size_t> release_numbers;  // by session
+    std::size_t releases_so_far = 0;
+    std::map<std::string, std::string> objects;     // session, by SHA-256 of a released object
+    std::set<std::array<std::string, 3>> sendings;  // session, peer, SHA-256 of the object
 
     void add_lines(const std::string& text);
     void add(const std::string& line);

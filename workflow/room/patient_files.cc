@@ -35,6 +35,13 @@ void remove_from(StudyFiles& files, const fs::path& file, const std::string& uid
   std::erase_if(files.other_xrays, is_it);
 }
 
+// Notes in the X-ray of `file` that `other` has its SOPInstanceUID and other contents.
+void note_other(StudyFiles& files, const fs::path& file, const fs::path& other) {
+  for (auto* images : {&files.images, &files.other_xrays})
+    for (StudyFiles::Image& image : *images)
+      if (image.file == file) image.other = other;
+}
+
 }  // namespace
 
 std::optional<KnownFile> known_file_in(const StudyFiles& one) {
@@ -68,6 +75,9 @@ std::vector<fs::path> PatientFiles::forget(const fs::path& file) {
 }
 
 void PatientFiles::forget_copy(const fs::path& file) {
+  for (const auto& [uid, copy] : copies_of_)
+    if (const auto used = file_of_uid_.find(uid); copy == file && used != file_of_uid_.end())
+      note_other(patients_.at(known_.at(used->second).patient_id).files, used->second, "");
   std::erase_if(copies_of_, [&](const auto& copy) { return copy.second == file; });
 }
 
@@ -86,11 +96,14 @@ PatientFiles::Taken PatientFiles::take(const fs::path& file, Notes& notes) {
   if (const auto earlier = file_of_uid_.find(found->uid); earlier != file_of_uid_.end()) {
     const fs::path before = earlier->second;
     if (is_whole(before)) {
-      patients_.at(known_.at(before).patient_id).last = clock_.now();
+      Patient& patient = patients_.at(known_.at(before).patient_id);
+      patient.last = clock_.now();
       copies_of_.emplace(found->uid, file);
-      if (sha256_of_file(before) != sha256_of_file(file))
+      if (sha256_of_file(before) != sha256_of_file(file)) {
+        note_other(patient.files, before, file);
         notes.warnings.push_back(fmt::format("{}: left aside: differs from {}, which has the same SOPInstanceUID",
                                              file.string(), before.string()));
+      }
       return taken;
     }
     std::ranges::move(forget(before), std::back_inserter(taken.copies));

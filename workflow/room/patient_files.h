@@ -41,7 +41,7 @@ class PatientFiles {
   // place.
   std::vector<std::filesystem::path> forget(const std::filesystem::path& file);
 
-  // Forgets a copy that was not used and has been removed.
+  // Forgets a copy that was not used and has been removed, even if its contents differed.
   void forget_copy(const std::filesystem::path& file);
 
  private:

@@ -53,11 +53,14 @@ Release release_from(const nlohmann::json& json) {
                   .on = json.at("on"),
                   .verdict = json.at("verdict"),
                   .record = json.at("record"),
+                  .despite = json.value("despite", ""),
                   .objects = {},
                   .peers = json.at("peers")};
   for (const auto& object : json.at("objects")) release.objects.push_back({object.at("file"), object.at("sha256")});
   return release;
 }
+
+constexpr const char* kObjectionsFile = "objections.json";
 
 // Folders of registrations under way: ".NAME.registering-PROCESS", and what isoshift register writes beside them.
 constexpr const char* kRegistering = ".registering-";
@@ -85,6 +88,20 @@ fs::path ResultsTree::record_file(const std::string& session) const {
 
 fs::path ResultsTree::release_file(const std::string& session) const {
   return path_ / "released" / (session + ".json");
+}
+
+std::map<std::string, std::string> ResultsTree::objections() const {
+  const fs::path file = path_ / kObjectionsFile;
+  if (!fs::exists(file)) return {};
+  try {
+    return read_json_file(file).json.get<std::map<std::string, std::string>>();
+  } catch (const nlohmann::json::exception&) {
+    throw Error(fmt::format("{}: expected an object of texts", file.string()));
+  }
+}
+
+void ResultsTree::keep_objections(const std::map<std::string, std::string>& objections) {
+  replace_text(path_ / kObjectionsFile, Json(objections).dump(2) + "\n");
 }
 
 bool ResultsTree::is_released(const std::string& session) const { return fs::exists(release_file(session)); }
@@ -195,8 +212,7 @@ void ResultsTree::check_objects_are_new(const Release& release) const {
 
 Release ResultsTree::release(const std::string& session, const Releaser& releaser,
                              const std::vector<std::string>& peers) {
-  const std::vector<std::string> known = sessions();
-  if (!std::ranges::binary_search(known, session))
+  if (!std::ranges::binary_search(sessions(), session))
     throw Error(fmt::format("{}: holds no session {}", path_.string(), session));
   const FileLock lock = lock_releases();
   if (const auto before = release_of(session))
@@ -213,11 +229,19 @@ Release ResultsTree::release(const std::string& session, const Releaser& release
         fmt::format("session {}: was released before, as audit.jsonl says, and {} is gone: only a person can release "
                     "it again",
                     session, release_file(session).string()));
+  const auto known = objections();
+  const auto objection = known.find(session);
+  if (objection != known.end() && !releaser.despite_objection)
+    throw Error(
+        fmt::format("session {}: {}. The couch may have moved since this session's X-rays or between them. If you know "
+                    "that and want the result to be sent: --despite-other-xrays",
+                    session, objection->second));
   Release release{.session = session,
                   .releaser = releaser,
                   .on = local_time(),
                   .verdict = record.verdict,
                   .record = record.sha256,
+                  .despite = objection == known.end() ? "" : objection->second,
                   .is_again = is_again,
                   .objects = {},
                   .peers = peers};
@@ -236,11 +260,13 @@ void ResultsTree::put_release(const Release& release) {
                  aside = path_ / "released" / fmt::format(".{}.json", release.session);
   Json json = {{"schema", 1}, {"on", release.on}};
   json.update(release_json(release));
+  if (!release.despite.empty()) json["despite"] = release.despite;
   const std::string text = json.dump(2) + "\n";
   replace_text(aside, text);
   std::error_code ignored;
   Json line = release_json(release);
   line["release"] = sha256_of(text);
+  if (!release.despite.empty()) line["despite_other_xrays"] = true;  // in words it may name a patient's file
   if (release.is_again) line["again"] = true;
   try {
     audit_.append("released", line);
@@ -291,6 +317,7 @@ std::vector<Delivery> ResultsTree::pending_of(const Release& release) const {
 
 ResultsTree::Pending ResultsTree::pending() {
   Pending pending;
+  std::map<std::size_t, std::vector<Delivery>> by_release;
   for (const std::string& session : released()) {
     if (delivered_.contains(session)) continue;
     try {
@@ -298,11 +325,12 @@ ResultsTree::Pending ResultsTree::pending() {
       if (!release) continue;  // removed since
       std::vector<Delivery> left = pending_of(*release);
       if (left.empty()) delivered_.insert(session);
-      std::ranges::move(left, std::back_inserter(pending.deliveries));
+      by_release[audit_.release_number(session)] = std::move(left);
     } catch (const std::exception& error) {
       pending.refused[session] = error.what();
     }
   }
+  for (auto& [number, left] : by_release) std::ranges::move(left, std::back_inserter(pending.deliveries));
   return pending;
 }
 

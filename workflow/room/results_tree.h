@@ -6,6 +6,7 @@
 //   registered/NAME.json     the SHA-256 of every file in that folder when it was registered
 //   released/NAME.json       who released the session, and which objects are sent to which peers
 //   sent/NAME.PEER.FILE      the mark that this peer has confirmed this file; it counts with its line in the audit log
+//   objections.json          what other X-rays of the patient say against results
 //   audit.jsonl              the audit log, without names of patients and without UIDs
 //
 // A session is released or sent only if its folder is unchanged since its record was written, and if the audit log has
@@ -30,6 +31,7 @@ namespace isoshift {
 struct Releaser {
   std::string by, user, sudo_user;  // sudo_user: empty without sudo
   bool is_person = true;            // false: the site's rule; it releases only what was accepted, and only once
+  bool despite_objection = false;   // a person knows what other X-rays say against the result
 };
 
 // "J. Doe (user isoshift, sudo of jdoe)".
@@ -45,6 +47,7 @@ struct Release {
   std::string on;  // local time
   std::string verdict;
   std::string record;     // SHA-256 of the session's record at the time of the release
+  std::string despite;    // what other X-rays say against the result; empty: nothing
   bool is_again = false;  // the audit log has an earlier release of the session, whose file is gone
   std::vector<Object> objects;
   std::vector<std::string> peers;
@@ -81,20 +84,26 @@ class ResultsTree {
   // The record of a session. Throws Error if there is no record, or if the audit log has no line for it.
   SessionRecord registered(const std::string& session) const;
 
+  // What other X-rays say against results, in words, by session.
+  std::map<std::string, std::string> objections() const;
+  // The caller must hold the lock of the tree.
+  void keep_objections(const std::map<std::string, std::string>& objections);
+
   bool is_released(const std::string& session) const;
   // The release of a session, if there is one. Throws Error for a release file that isoshift release did not write, or
   // that was changed.
   std::optional<Release> release_of(const std::string& session) const;
   // Releases a session with its objects. Throws Error, and releases nothing, if the session does not exist, was
-  // rejected, has been released before, or has changed since its registration, or if the audit log cannot be written.
+  // rejected, has been released before, or has changed since its registration, if other X-rays speak against it and the
+  // releaser does not say so, or if the audit log cannot be written.
   Release release(const std::string& session, const Releaser& releaser, const std::vector<std::string>& peers);
 
   struct Pending {
     std::vector<Delivery> deliveries;
     std::map<std::string, std::string> refused;  // reason why a session is not sent, by session
   };
-  // The released objects that their peers have not confirmed yet. A session whose objects have all been delivered is
-  // not read again.
+  // The released objects that their peers have not confirmed yet, in the order of the releases, so that a peer receives
+  // the newest last. A session whose objects have all been delivered is not read again.
   Pending pending();
   std::vector<Delivery> pending_of(const Release& release) const;
   // The file to send. Throws Error if it is no longer released, or if its session has changed since its registration.

@@ -52,12 +52,18 @@ ResultsPage::Row row_of(const WaitingSession& waiting) {
 std::string times_of(const std::vector<StudyFiles::Image>& images) { return times_in_words(images); }
 std::string times_of(const std::vector<SetupResult::View>& views) { return times_in_words(views); }
 
-void SessionIndex::add(const std::string& session, const SetupResult& report, const std::string& obstacle) {
+void SessionIndex::add(const std::string& session, const SetupResult& report, const std::string& obstacle,
+                       const std::string& reason_for_person) {
+  std::string held = "held";
+  if (!obstacle.empty())
+    held += ", cannot be released: " + obstacle;
+  else if (!reason_for_person.empty())
+    held += " for a person: " + reason_for_person;
   Session added{.name = session,
                 .patient = fmt::format("{} ({})", report.identity.patient_name, report.identity.patient_id),
                 .verdict = std::string(to_string(report.verdict)),
                 .action = std::string(to_string(shown_shift(report).decision.action)),
-                .held = obstacle.empty() ? "held" : "held, cannot be released: " + obstacle,
+                .held = std::move(held),
                 .state = "",
                 .first = report.views.front().acquired,
                 .times = times_of(report.views)};
@@ -67,13 +73,13 @@ void SessionIndex::add(const std::string& session, const SetupResult& report, co
 }
 
 // Whether any is another one now.
-bool SessionIndex::update_states() {
+bool SessionIndex::update_states(const std::map<std::string, std::string>& objections) {
   bool has_changed = false;
   for (Session& session : sessions_) {
     if (session.is_over) continue;
     std::string state = session.held;
-    if (const std::string newer = newest_.newer_than(session.name); !newer.empty())
-      state += fmt::format("; the patient has newer X-rays: session {}", newer);
+    const auto objection = objections.find(session.name);
+    if (objection != objections.end()) state += "; " + objection->second;
     session.is_over = session.verdict == to_string(Verdict::kRejected);
     if (session.is_over) {
       state = "rejected";
@@ -82,7 +88,8 @@ bool SessionIndex::update_states() {
         const Release release = tree_.release_of(session.name).value();
         const auto left = tree_.pending_of(release).size();
         session.is_over = left == 0;
-        state = fmt::format("released by {} on {}", to_string(release.releaser), release.on);
+        state = fmt::format("released by {} on {}{}", to_string(release.releaser), release.on,
+                            release.despite.empty() ? "" : ", although " + release.despite);
         if (left > 0) state += fmt::format("; {} to be sent", left);
         if (left == 0 && !release.peers.empty()) state += "; sent";
       } catch (const std::exception& error) {
@@ -101,8 +108,9 @@ void SessionIndex::write(const std::string& page, const std::string& html) {
   written_[page] = std::move(content);
 }
 
-void SessionIndex::update(const std::vector<WaitingSession>& waiting, const std::vector<std::string>& troubles) {
-  const bool has_changed = update_states();
+void SessionIndex::update(const std::vector<WaitingSession>& waiting, const std::vector<std::string>& troubles,
+                          const std::map<std::string, std::string>& objections) {
+  const bool has_changed = update_states(objections);
   if (is_written_ && !has_changed && waiting == waiting_ && troubles == troubles_) return;
   is_written_ = false;  // until all of it is
   waiting_ = waiting;

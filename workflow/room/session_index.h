@@ -8,7 +8,6 @@
 
 #include "io/study/study_files.h"
 #include "setup/setup_result.h"
-#include "workflow/room/newest_xrays.h"
 #include "workflow/room/results_tree.h"
 #include "workflow/room/waiting_session.h"
 
@@ -20,16 +19,18 @@ std::string times_of(const std::vector<SetupResult::View>& views);
 
 class SessionIndex {
  public:
-  SessionIndex(const ResultsTree& tree, const NewestXrays& newest, std::string site)
-      : tree_(tree), newest_(newest), site_(std::move(site)) {}
+  SessionIndex(const ResultsTree& tree, std::string site) : tree_(tree), site_(std::move(site)) {}
 
-  // `obstacle`: why the session cannot be released; empty if it can be released.
-  void add(const std::string& session, const SetupResult& report, const std::string& obstacle);
+  // `obstacle`: why the session cannot be released; `reason_for_person`: why the site's rule does not release it.
+  // Either is empty if nothing is in the way.
+  void add(const std::string& session, const SetupResult& report, const std::string& obstacle,
+           const std::string& reason_for_person = "");
   std::size_t size() const { return sessions_.size(); }
 
   // Finds out which sessions have been released and sent, and writes the pages that have changed. `troubles`: the
-  // current troubles, such as a full disk.
-  void update(const std::vector<WaitingSession>& waiting, const std::vector<std::string>& troubles);
+  // current troubles, such as a full disk. `objections`: what other X-rays say against results, by session.
+  void update(const std::vector<WaitingSession>& waiting, const std::vector<std::string>& troubles,
+              const std::map<std::string, std::string>& objections);
 
  private:
   struct Session {
@@ -40,11 +41,10 @@ class SessionIndex {
     std::string times;     // of all X-rays
     bool is_over = false;  // the state cannot change any more
   };
-  bool update_states();
+  bool update_states(const std::map<std::string, std::string>& objections);
   void write(const std::string& page, const std::string& html);
 
   const ResultsTree& tree_;
-  const NewestXrays& newest_;
   std::string site_;
   std::vector<Session> sessions_;  // the newest first
   std::vector<WaitingSession> waiting_;

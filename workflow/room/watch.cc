@@ -32,7 +32,8 @@ Watch::Watch(const WatchFile& watch, const Parts& parts)
       parts_(parts),
       tree_(watch.results),
       lock_(only_watch_of(tree_)),
-      index_(tree_, newest_, watch.site.name),
+      objections_(tree_.objections(), parts.takes_other_xrays),
+      index_(tree_, watch.site.name),
       deliverer_(watch, parts.sender, parts.clock),
       troubles_(parts.observer),
       sending_troubles_(parts.sending),
@@ -52,9 +53,10 @@ void Watch::round() {
                     tree_.path().string()));
   troubles_.attempt("receiving", [&] { receive(); });
   troubles_.attempt("registering", [&] { register_complete(); });
+  troubles_.attempt("comparing X-rays with results", [&] { look_for_objections(); });
   troubles_.attempt("releasing", [&] { release_automatically(); });
   troubles_.attempt("writing the audit log", [&] { tree_.write_kept_audit(); });
-  troubles_.attempt("writing the index", [&] { index_.update(waiting_, troubles()); });
+  troubles_.attempt("writing the index", [&] { index_.update(waiting_, troubles(), objections_.by_session()); });
 }
 
 std::vector<std::string> Watch::troubles() const {
@@ -87,6 +89,7 @@ void Watch::run(const std::function<bool()>& is_end_asked_for) {
 // While a server is down nothing is known to be quiet.
 void Watch::receive() {
   const Clock::Time begin = parts_.clock.now();
+  is_source_read_ = false;
   Notes notes;
   const auto say_warnings = [&] {
     for (const std::string& warning : notes.warnings) parts_.observer.say("warning: " + warning);
@@ -100,6 +103,7 @@ void Watch::receive() {
   }
   say_warnings();
   seen_at_ = begin;
+  is_source_read_ = true;
   if (parts_.clock.now() < next_forgetting_) return;
   parts_.source.forget_before(parts_.clock.file_time() - kKeptFor);
   next_forgetting_ = parts_.clock.now() + std::chrono::days(1);
@@ -118,20 +122,26 @@ void Watch::take_results() {
   }
 }
 
-Verdict Watch::take_result(const std::string& session) {
+void Watch::take_result(const std::string& session, const std::optional<Running>& made) {
   const SetupResult report = read_report(tree_.session(session));
   if (report.views.empty()) throw Error(fmt::format("{}: names no views", tree_.session(session).string()));
   for (const auto& view : report.views) registered_.insert(view.sop_instance_uid);
   const std::string obstacle = obstacle_to_release(session, report.verdict);
-  index_.add(session, report, obstacle);
-  std::string last;
-  for (const auto& view : report.views) last = std::max(last, view.acquired);
-  newest_.add_result(session, report.identity.patient_id, last);
-  // What was made under another site file waits for a person.
-  if (watch_.site.automatic_release && obstacle.empty() && report.verdict == Verdict::kAccepted && report.site &&
-      report.site->sha256 == watch_.site.sha256)
-    accepted_.insert(session);
-  return report.verdict;
+  const std::string reason = reason_for_person(report, made);
+  index_.add(session, report, obstacle, reason);
+  objections_.add_result(session, report);
+  if (made) parts_.observer.say(fmt::format("session {}: {}", session, to_string(report.verdict)));
+  if (made && watch_.site.automatic_release && report.verdict == Verdict::kAccepted && obstacle.empty() &&
+      reason.empty())
+    accepted_[session] = {.patient_id = report.identity.patient_id, .parts = made->parts};
+}
+
+// Why the site's rule does not release an accepted result. Empty: it may, or there is no such rule.
+std::string Watch::reason_for_person(const SetupResult& result, const std::optional<Running>& made) const {
+  if (!watch_.site.automatic_release || result.verdict != Verdict::kAccepted) return "";
+  if (!result.site || result.site->sha256 != watch_.site.sha256) return "it was made under another site file";
+  if (!made) return "an earlier run of watch registered it";  // X-rays may have come and gone since
+  return made->names_plan ? "" : "not all of its X-rays name their plan";
 }
 
 // Empty: there is a record of its registration. What the folder holds is checked when it is released.
@@ -172,13 +182,11 @@ std::vector<Watch::Complete> Watch::complete_sessions() {
       waiting_.push_back({.name = session.name,
                           .patient_id = patient_id,
                           .acquired = times_of(session.images),
-                          .last = session.images.back().acquired,
                           .why = std::move(why),
                           .has_failed = failures_.contains(session.name)});
       if (is_complete) complete.push_back({std::move(session), std::move(own), patient.last});
     }
   }
-  newest_.set_waiting(waiting_);
   std::erase_if(failures_, [&](const auto& failure) { return !found.contains(failure.first); });
   return complete;
 }
@@ -213,7 +221,11 @@ void Watch::begin_registration(const Complete& complete) {
     if (const std::string reason = unreadable_beside(parts, parts_.source.unreadable()); !reason.empty())
       parts.doubts.push_back("a file beside the X-rays may belong to them: " + reason);
     parts_.runner.begin(parts, tree_.registering(session));
-    running_ = Running{.session = session, .news = complete.last};
+    const auto names_plan = [](const StudyFiles::Image& image) { return !image.plan_uid.empty(); };
+    running_ = Running{.session = session,
+                       .news = complete.last,
+                       .parts = std::move(parts),
+                       .names_plan = std::ranges::all_of(complete.session.images, names_plan)};
   } catch (const std::exception& error) {
     fail(session, complete.last, {.why = error.what()});
   }
@@ -222,14 +234,14 @@ void Watch::begin_registration(const Complete& complete) {
 void Watch::end_registration() {
   const std::optional<Runner::End> end = parts_.runner.end();
   if (!end) return;
-  const auto [session, news] = *std::exchange(running_, std::nullopt);
+  const std::optional<Running> made = std::exchange(running_, std::nullopt);
+  const auto& [session, news, parts, names_plan] = *made;
   try {
     if (end->failure) {
       fail(session, news, *end->failure);
     } else {
       tree_.publish(session);
-      const Verdict verdict = take_result(session);
-      parts_.observer.say(fmt::format("session {}: {}", session, to_string(verdict)));
+      take_result(session, made);
     }
   } catch (const std::exception& error) {
     fail(session, news, {.why = error.what()});
@@ -251,11 +263,22 @@ void Watch::fail(const std::string& session, Clock::Time news, const Runner::Fai
   tree_.audit("failed", {{"session", session}});
 }
 
-// A release that fails must not block the others. A result that is out of date is released by a person or not at all.
+void Watch::look_for_objections() {
+  const auto before = objections_.by_session();
+  objections_.update(parts_.source.patients(), registered_);
+  if (objections_.by_session() != before) tree_.keep_objections(objections_.by_session());
+}
+
+// A release that fails must not block the others. A result against which other X-rays speak is released by a person or
+// not at all; while the source does not answer, or a file is on its way, it is not known whether any do.
 void Watch::release_automatically() {
+  if (!is_source_read_) return;
+  std::erase_if(accepted_, [&](const auto& one) { return objections_.by_session().contains(one.first); });
   std::string trouble;
-  for (const std::string& session : std::set(accepted_)) {
-    if (!newest_.newer_than(session).empty()) continue;
+  for (const auto& [session, accepted] : std::map(accepted_)) {
+    if (parts_.source.is_coming(accepted.patient_id) ||
+        !unreadable_beside(accepted.parts, parts_.source.unreadable()).empty())
+      continue;
     try {
       if (!tree_.is_released(session))
         tree_.release(session,

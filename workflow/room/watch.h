@@ -20,7 +20,7 @@
 #include "workflow/observer.h"
 #include "workflow/room/clock.h"
 #include "workflow/room/deliver.h"
-#include "workflow/room/newest_xrays.h"
+#include "workflow/room/objections.h"
 #include "workflow/room/results_tree.h"
 #include "workflow/room/runner.h"
 #include "workflow/room/sender.h"
@@ -65,6 +65,13 @@ class Watch {
   struct Running {
     std::string session;
     Clock::Time news;  // when the patient's last file had arrived, as the registration began
+    StudyParts parts;
+    bool names_plan = false;  // all X-rays do
+  };
+  // A result that will be released without a person.
+  struct Accepted {
+    std::string patient_id;
+    StudyParts parts;
   };
   struct Failure {
     std::string why;
@@ -79,7 +86,9 @@ class Watch {
 
   std::vector<std::string> troubles() const;  // also files that cannot be read
   void take_results();
-  Verdict take_result(const std::string& session);
+  // `made`: unset for what an earlier run has registered.
+  void take_result(const std::string& session, const std::optional<Running>& made = std::nullopt);
+  std::string reason_for_person(const SetupResult& result, const std::optional<Running>& made) const;
   std::string obstacle_to_release(const std::string& session, Verdict verdict) const;
   void receive();
   void register_complete();
@@ -89,17 +98,19 @@ class Watch {
   void begin_registration(const Complete& complete);
   void end_registration();
   void fail(const std::string& session, Clock::Time news, const Runner::Failure& failure);
+  void look_for_objections();
   void release_automatically();
 
   const WatchFile& watch_;
   Parts parts_;
   ResultsTree tree_;
   FileLock lock_;
-  NewestXrays newest_;
+  Objections objections_;
   SessionIndex index_;
   Deliverer deliverer_;
-  std::set<std::string> registered_;  // SOPInstanceUIDs of X-rays that have a result
-  std::set<std::string> accepted_;    // sessions that will be released without a person
+  std::set<std::string> registered_;          // SOPInstanceUIDs of X-rays that have a result
+  std::map<std::string, Accepted> accepted_;  // by session
+  bool is_source_read_ = false;               // in this round
   std::vector<WaitingSession> waiting_;
   std::optional<Running> running_;
   std::map<std::string, Failure> failures_;  // by session

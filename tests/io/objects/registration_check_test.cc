@@ -121,6 +121,34 @@ TEST_F(RegistrationCheckTest, AFrameMovedAgainstItselfIsFound) {
                [](DicomItem d) { item(d, 1).put(DCM_FrameOfReferenceUID, study_->ct->frame_of_reference_uid); });
 }
 
+// Programs that take one item each would place the patient differently.
+TEST_F(RegistrationCheckTest, ItemsThatContradictEachOtherAreFound) {
+  const auto third_item = [](DicomItem d, const std::string& frame) {
+    DicomItem third = d.append_item(DCM_RegistrationSequence);
+    third.put(DCM_FrameOfReferenceUID, frame);
+    DicomItem identity = third.append_item(DCM_MatrixRegistrationSequence).append_item(DCM_MatrixSequence);
+    identity.put(DCM_FrameOfReferenceTransformationMatrix, R"(1\0\0\0\0\1\0\0\0\0\1\0\0\0\0\1)");
+    identity.put(DCM_FrameOfReferenceTransformationMatrixType, "RIGID");
+  };
+  const auto before = folder_ / "before.dcm";
+  std::filesystem::copy_file(path_, before);
+  const auto start_again = [&] {
+    std::filesystem::copy_file(before, path_, std::filesystem::copy_options::overwrite_existing);
+  };
+  expect_error("item 3: gives the frame",
+               [&](DicomItem d) { third_item(d, item(d, 1).text(DCM_FrameOfReferenceUID).value()); });
+  EXPECT_FALSE(check_registration(path_).registered_from_source);
+  start_again();
+  expect_error("item 3: says that the room (IEC 61217 Fixed) is the registered frame",
+               [&](DicomItem d) { third_item(d, kIecFixedFrameUid); });
+  start_again();
+  expect_error("item 2: gives the image", [&](DicomItem d) {
+    const DicomItem image = item(d, 0).items(DCM_ReferencedImageSequence)[0];
+    item(d, 1).append_reference(DCM_ReferencedImageSequence, image.required_text(DCM_ReferencedSOPClassUID),
+                                image.required_text(DCM_ReferencedSOPInstanceUID));
+  });
+}
+
 TEST_F(RegistrationCheckTest, SeveralMatricesInAnItemAreComposedAndFound) {
   const Eigen::Matrix4d once = result();
   expect_error("SlicerRT multiplies them the other way", [&](DicomItem d) {
@@ -158,8 +186,9 @@ TEST_F(RegistrationCheckTest, NoIsocenterIsPlacedWhereNoFrameIsNamed) {
     d.put(DCM_Manufacturer, "Somebody");
     item(d, 1).erase(DCM_FrameOfReferenceUID);
     const DicomItem image = item(d, 0).items(DCM_ReferencedImageSequence)[0];
-    item(d, 1).append_reference(DCM_ReferencedImageSequence, image.required_text(DCM_ReferencedSOPClassUID),
-                                image.required_text(DCM_ReferencedSOPInstanceUID));
+    item(d, 1).append_reference(DCM_ReferencedImageSequence, image.required_text(DCM_ReferencedSOPClassUID), "1.2.3");
+    DicomItem instance = d.items(DCM_ReferencedSeriesSequence)[0].append_item(DCM_ReferencedInstanceSequence);
+    instance.put(DCM_ReferencedSOPInstanceUID, "1.2.3");
   });
   CheckedRegistration checked = check_registration(path_);
   ASSERT_FALSE(checked.has_errors());

@@ -1,9 +1,13 @@
 #include "io/study/session_files.h"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <set>
+
+#include "base/output_folder.h"
+#include "tests/support/temporary_folder.h"
 
 namespace isoshift {
 namespace {
@@ -49,7 +53,7 @@ std::vector<std::string> grouped(const std::vector<StudyFiles::Image>& images,
 }
 
 StudyFiles::Image at_table(StudyFiles::Image image, double vertical_mm) {
-  image.table = {.lateral_mm = 0.0, .longitudinal_mm = 0.0, .vertical_mm = vertical_mm};
+  image.table = {.lateral_mm = 0.0, .longitudinal_mm = 0.0, .vertical_mm = vertical_mm, .are_measured = true};
   return image;
 }
 
@@ -133,6 +137,61 @@ TEST(Sessions, AnXrayBetweenTheViewsMakesThemDoubtful) {
   StudyFiles::Image at_couch = at_table(ap, -150), too = at_table(lat, -150);
   at_couch.table.longitudinal_mm = too.table.longitudinal_mm = 812.0;
   EXPECT_THAT(doubts_of({at_couch, of_other_machine, too}), testing::IsEmpty());  // the table did not move
+  at_couch.table.are_measured = too.table.are_measured = false;                   // planned, or typed in
+  EXPECT_THAT(doubts_of({at_couch, of_other_machine, too}), ElementsAre(HasSubstr("between these views")));
+}
+
+// Two setups whose X-rays all have the time of the export: which AP goes with which LAT is a guess.
+TEST(Sessions, EqualTimesTellNoOrder) {
+  StudyFiles files;
+  files.images = {image("a", "AP", 0), image("b", "LAT", 0), image("c", "AP", 0), image("d", "LAT", 0)};
+  const std::vector<SessionFiles> sessions = sessions_of(files, false);
+  ASSERT_EQ(sessions.size(), 2U);
+  for (const SessionFiles& session : sessions)
+    EXPECT_THAT(session.doubts, testing::Contains(testing::HasSubstr("too, at the same time")));
+}
+
+TEST(Sessions, OneUidOfTwoXraysIsADoubt) {
+  const TemporaryFolder folder;
+  StudyFiles files;
+  files.images = {image("1", "AP", 0), image("1", "AP", 50), image("2", "LAT", 60)};
+  for (std::size_t n = 0; n < files.images.size(); ++n) {
+    files.images[n].file = folder / fmt::format("image{}", n);
+    write_text(files.images[n].file, n == 1 ? "another" : "one");
+  }
+  compare_copies(files);
+  const std::vector<SessionFiles> sessions = sessions_of(files, false);
+  ASSERT_EQ(sessions.size(), 1U);
+  EXPECT_THAT(sessions[0].doubts,
+              testing::Contains(testing::HasSubstr("have one SOPInstanceUID and different contents")));
+  replace_text(files.images[1].file, "one");
+  for (StudyFiles::Image& one : files.images) one.other.clear();
+  compare_copies(files);
+  EXPECT_THAT(sessions_of(files, false)[0].doubts, testing::IsEmpty());
+}
+
+TEST(Sessions, WhatComesLaterMayObjectToAResult) {
+  StudyFiles files;
+  files.images = {image("a", "AP", 0), image("b", "LAT", 60)};
+  EXPECT_EQ(objection_to({"a", "b"}, files, false, {"a", "b"}), "");
+  files.images.push_back(image("c", "LAT", 200));
+  EXPECT_THAT(objection_to({"a", "b"}, files, false, {"a", "b"}),
+              testing::HasSubstr("/x/c, 140 s after, has no partner"));
+  files.images.push_back(image("d", "AP", 190));
+  EXPECT_EQ(objection_to({"a", "b"}, files, false, {"a", "b"}), "");
+  files.images.push_back(image("e", "AP", 55));
+  EXPECT_EQ(objection_to({"a", "b"}, files, false, {"a", "b"}),
+            "with the X-rays that are known now, these are not one session");
+}
+
+// One folder per X-ray.
+TEST(Sessions, AFileThatCannotBeReadCountsBelowTheFolderOfAllXrays) {
+  const StudyParts apart{.ct = {"/a/ct/1"}, .images = {"/a/b/1/ap.dcm", "/a/b/2/lat.dcm"}};
+  EXPECT_EQ(unreadable_beside(apart, {"/a/b/3/x.dcm: is cut off"}), "/a/b/3/x.dcm: is cut off");
+  EXPECT_EQ(unreadable_beside(apart, {"/a/c/x.dcm: is cut off", "/a/bb/x.dcm: is cut off"}), "");
+  const StudyParts together{.ct = {"/a/ct/1"}, .images = {"/a/b/ap.dcm", "/a/b/lat.dcm"}};
+  EXPECT_EQ(unreadable_beside(together, {"/a/b/3/x.dcm: is cut off"}), "");
+  EXPECT_EQ(unreadable_beside(together, {"/a/b/x.dcm: is cut off"}), "/a/b/x.dcm: is cut off");
 }
 
 TEST(Sessions, AnXrayWithoutItsPartnerMakesItsNeighborsDoubtful) {
@@ -148,7 +207,7 @@ TEST(Sessions, AnXrayWithoutItsPartnerMakesItsNeighborsDoubtful) {
   EXPECT_THAT(doubts_of({image("a", "LAT", 60), image("b", "AP", 300), image("c", "LAT", 310)}), testing::IsEmpty());
   // All with the time of their series.
   EXPECT_THAT(doubts_of({image("a", "AP", 0), image("b", "LAT", 0), image("c", "LAT", 0)}),
-              ElementsAre(HasSubstr("has no partner")));
+              ElementsAre(HasSubstr("shows LAT, too, at the same time")));
 }
 
 TEST(Sessions, TwoMachinesAreTwoSessions) {

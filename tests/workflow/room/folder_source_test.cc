@@ -124,6 +124,22 @@ TEST_F(FolderSourceTest, AnotherObjectOfOneUidIsAnAlarm) {
   EXPECT_THAT(notes_.warnings, testing::ElementsAre(HasSubstr("has the same SOPInstanceUID")));
 }
 
+TEST_F(FolderSourceTest, AnotherXrayOfOneUidIsNotedInTheFirst) {
+  fs::copy(study_.image(0), in_ / "other.dcm");
+  edit(in_ / "other.dcm", [](DicomItem d) { d.put(DCM_AcquisitionTime, "101700"); });
+  settle();
+  const auto others = [&] {
+    std::vector<fs::path> found;
+    for (const StudyFiles::Image& image : patient().files.images)
+      if (!image.other.empty()) found.push_back(image.other);
+    return found;
+  };
+  EXPECT_THAT(others(), testing::ElementsAre(in_ / "other.dcm"));
+  fs::remove(in_ / "other.dcm");
+  settle();
+  EXPECT_THAT(others(), testing::IsEmpty());
+}
+
 TEST_F(FolderSourceTest, AnotherContentUnderANameReplacesTheFirst) {
   edit(in_ / "RTPLAN.dcm", [](DicomItem d) { d.put(DCM_SOPInstanceUID, "2.25.7"); });
   settle();
