@@ -229,7 +229,6 @@ TEST_F(RegisterCommandTest, ViewsThatMayBeOfTwoSetupsNeedAReview) {
               HasSubstr("KV_G090: when it was taken is unknown"));
   EXPECT_THAT(reasons([](DicomItem d) { d.put(DCM_AcquisitionTime, "10:18:00"); }), HasSubstr("was taken 180 s after"));
   EXPECT_THAT(reasons([](DicomItem d) { d.put(DCM_RadiationMachineName, "LINAC2"); }), HasSubstr("LINAC2"));
-  EXPECT_THAT(reasons([](DicomItem d) { d.put(DCM_FractionNumber, 7.0); }), HasSubstr("KV_G090 is of fraction 7"));
   EXPECT_THAT(reasons([](DicomItem d) { d.put(DCM_TableTopEccentricAngle, 3.0); }),
               HasSubstr("is 3 degrees in KV_G090 and missing in KV_G000"));
 }
@@ -245,6 +244,12 @@ TEST_F(RegisterCommandTest, ATableThatStandsWhereItStoodDoesNotReplaceTheTimes) 
     });
   EXPECT_EQ(register_study(study_).exit_status, 3);
   EXPECT_THAT(result()["reasons"].dump(), HasSubstr("so it is not known whether the views show one setup"));
+}
+
+TEST_F(RegisterCommandTest, ViewsOfTwoFractionsNeedAReview) {
+  for (const int n : {0, 1}) edit(study_.image(n), [&](DicomItem d) { d.put(DCM_FractionNumber, 6.0 + n); });
+  EXPECT_EQ(register_study(study_).exit_status, 3);
+  EXPECT_THAT(result()["reasons"].dump(), HasSubstr("KV_G090 is of fraction 7, KV_G000 of 6"));
 }
 
 // The isocenter, in the frame of the CT, tells of a second plan or of a move that no read-out tells.
@@ -279,10 +284,10 @@ TEST_F(RegisterCommandTest, PlaceholdersAreNoTablePosition) {
     register_study(study, {"--allow", "planned-geometry=a test"});
     return nlohmann::json::parse(std::ifstream(study.output() / "result.json"))["reasons"].dump();
   };
-  EXPECT_THAT(reasons(0.0), HasSubstr("without table positions in all views"));
-  EXPECT_THAT(reasons(99999.0), HasSubstr("without table positions in all views"));
-  EXPECT_THAT(reasons(812.0), testing::Not(HasSubstr("without table positions")));
-  EXPECT_THAT(reasons(812.0, "PLAN"), HasSubstr("without table positions in all views"));
+  EXPECT_THAT(reasons(0.0), HasSubstr("without measured table positions in all views"));
+  EXPECT_THAT(reasons(99999.0), HasSubstr("without measured table positions in all views"));
+  EXPECT_THAT(reasons(812.0), testing::Not(HasSubstr("table positions")));
+  EXPECT_THAT(reasons(812.0, "PLAN"), HasSubstr("without measured table positions in all views"));
 }
 
 TEST_F(RegisterCommandTest, ASwitchThatContradictsAReadOutNeedsAReview) {
