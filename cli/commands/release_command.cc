@@ -55,7 +55,7 @@ void run_release(const std::filesystem::path& file, const std::string& session, 
   console.out << fmt::format("{} ({}), {}\n", result.identity.patient_name, result.identity.patient_id,
                              times_of(result.views));
   console.out << fmt::format("released by {}; the verdict was {}\n", to_string(release.releaser), release.verdict);
-  if (!release.despite.empty()) console.out << fmt::format("although {}\n", release.despite);
+  if (!release.despite.empty()) console.err << fmt::format("warning: {}\n", release.despite);
   if (release.is_again)
     console.err << "warning: the session was released before, as the audit log says, and the file of that release is "
                    "gone\n";
@@ -94,8 +94,8 @@ void add_release_command(CLI::App& app, Console& console, int& exit_status) {
       "\nExample:\n  isoshift release 3fa94c1e02b7 --by \"J. Doe\"\n\n"
       "Checks that the result was not changed after the registration, and records who released it, as which\n"
       "user of the system. Then sends report.dcm and, if the result has one, spatial_registration.dcm.\n\n"
-      "A result against which other X-rays of the patient speak is refused: if they are newer, the couch may have\n"
-      "moved since.");
+      "A result against which other X-rays of the patient speak is refused, unless they are newer and have a\n"
+      "result of their own: then a warning says so.");
   command->add_option("session", options->session, "Name of the session, as index.html shows it")
       ->required()
       ->type_name("SESSION");

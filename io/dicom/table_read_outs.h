@@ -1,6 +1,7 @@
 #pragma once
 // Where the treatment table stood when an X-ray was taken, as its file says, and whether it moved between two X-rays.
 
+#include <algorithm>
 #include <functional>
 #include <optional>
 #include <string>
@@ -33,6 +34,14 @@ struct TableReadOuts {
 // `number` gives the value of an attribute of the X-ray, and `origin` is its ReportedValuesOrigin.
 TableReadOuts read_table_read_outs(const std::function<std::optional<double>(const DcmTagKey&)>& number,
                                    const std::optional<std::string>& origin);
+
+// Whether the read-outs of all these X-rays tell where the table stood, each by the same read-outs.
+template <class Xrays>
+bool all_tell_position(const Xrays& xrays) {
+  return std::ranges::all_of(xrays, [&](const auto& xray) {
+    return xray.table.tell_position() && xray.table.has_same_read_outs(xrays.front().table);
+  });
+}
 
 // A read-out with its attribute, for loops over all read-outs.
 struct TableReadOut {

@@ -132,14 +132,17 @@ class Checker {
       error(std::move(text));
       means_one_matrix_ = false;
     };
+    const auto differs_from_earlier = [&](const std::string& uid) {
+      constexpr double kRounding = 1e-6;  // of a DS
+      return (matrix_of_.try_emplace(uid, matrix).first->second - matrix).cwiseAbs().maxCoeff() > kRounding;
+    };
     if (frame == kIecFixedFrameUid && matrix == Eigen::Matrix4d::Identity())
       contradiction(fmt::format("{}: says that the room (IEC 61217 Fixed) is the registered frame", name));
-    if (!frame.empty() && frame != result_.registered_frame_uid &&
-        matrix_of_.try_emplace(frame, matrix).first->second != matrix)
+    if (!frame.empty() && frame != result_.registered_frame_uid && differs_from_earlier(frame))
       contradiction(fmt::format("{}: gives the frame {} another matrix than an earlier item does", name, frame));
     for (const DicomItem& image : item.items(DCM_ReferencedImageSequence)) {
       const std::string uid = image.text(DCM_ReferencedSOPInstanceUID).value_or("");
-      if (uid.empty() || matrix_of_.try_emplace(uid, matrix).first->second == matrix) continue;
+      if (uid.empty() || !differs_from_earlier(uid)) continue;
       contradiction(fmt::format("{}: gives the image {} another matrix than an earlier item does", name, uid));
       break;
     }

@@ -83,17 +83,18 @@ const char* flag_of(const TableReadOut& read_out) {
   return read_out.tag == DCM_TableTopPitchAngle ? "--couch-pitch" : "--couch-roll";
 }
 
-// Views whose distance in time is not known. A table that stands where it stood does not tell that the patient did not
-// get up.
+// Views whose distance in time is not known. An unmoved table does not prove that the patient stayed on it.
 std::optional<Finding> unknown_time_doubt(std::span<const RtImage> images, bool is_table_known) {
+  const char* const unknown = is_table_known ? "so it is not known whether the views show one setup" : kNoReadOuts;
   for (const RtImage& image : images) {
     const bool is_frame_known = image.has_own_time || is_table_known;  // frames of one file are of one exposure series
-    if (!is_frame_known || !acquisition_seconds(image) ||
-        image.utc_offset_min.has_value() != images.front().utc_offset_min.has_value())
-      return Finding{
-          "time-span",
-          fmt::format("{}: when it was taken is unknown ({}), and {}", image.label, described(DCM_AcquisitionTime),
-                      is_table_known ? "so it is not known whether the views show one setup" : kNoReadOuts)};
+    if (!is_frame_known || !acquisition_seconds(image))
+      return Finding{"time-span", fmt::format("{}: when it was taken is unknown ({}), and {}", image.label,
+                                              described(DCM_AcquisitionTime), unknown)};
+    if (image.utc_offset_min.has_value() != images.front().utc_offset_min.has_value())
+      return Finding{"time-span",
+                     fmt::format("{} and {}: only one of them says how far its time is from UTC ({}), and {}",
+                                 images.front().label, image.label, described(DCM_TimezoneOffsetFromUTC), unknown)};
   }
   return std::nullopt;
 }
@@ -181,10 +182,7 @@ std::vector<Finding> session_doubts(std::span<const RtImage> images, double max_
   if (images.size() < 2) return {};
   std::vector<Finding> doubts = setting_doubts(images);
   // Read-outs that were planned, or that one view lacks, do not tell that the table stood still.
-  const auto tells_table = [&](const RtImage& image) {
-    return image.table.tell_position() && image.table.has_same_read_outs(images.front().table);
-  };
-  const bool is_table_known = std::ranges::all_of(images, tells_table);
+  const bool is_table_known = all_tell_position(images);
   auto time_doubt = unknown_time_doubt(images, is_table_known);
   if (!time_doubt && !is_table_known) time_doubt = time_span_doubt(images, max_span_s);
   if (time_doubt) doubts.push_back(std::move(*time_doubt));

@@ -136,10 +136,7 @@ class Doubts {
       if (!image.other.empty())
         doubts.push_back(fmt::format("{} and {} have one SOPInstanceUID and different contents", image.file.string(),
                                      image.other.string()));
-    const auto tells_table = [&](const StudyFiles::Image& image) {
-      return image.table.tell_position() && image.table.has_same_read_outs(own.front().table);
-    };
-    if (own.size() < 2 || !own.front().at_s || std::ranges::all_of(own, tells_table)) return doubts;
+    if (own.size() < 2 || !own.front().at_s || all_tell_position(own)) return doubts;
     const StudyFiles::Image *before = nullptr, *after = nullptr;
     for (const StudyFiles::Image* const one : of_patient_.at(patient_id_of(session.patient))) {
       const StudyFiles::Image& other = *one;
@@ -148,10 +145,13 @@ class Doubts {
         if (has_label(own, other.label))
           doubts.push_back(
               fmt::format("{} shows {}, too, and when it was taken is not known", other.file.string(), other.label));
+      } else if (is_copy_of_one(own, other)) {
+        continue;
       } else if (*other.at_s > *own.front().at_s && *other.at_s < *own.back().at_s) {
         doubts.push_back(fmt::format("{} was taken between these views", other.file.string()));
       } else if (has_time_of_own_label(own, other)) {
-        doubts.push_back(fmt::format("{} shows {}, too, at the same time", other.file.string(), other.label));
+        doubts.push_back(
+            fmt::format("{} is another {} with the time of one of these views", other.file.string(), other.label));
       } else if (*other.at_s <= *own.front().at_s) {
         if (before == nullptr || *other.at_s > *before->at_s) before = &other;
       } else if (after == nullptr || *other.at_s < *after->at_s) {
@@ -166,6 +166,12 @@ class Doubts {
   static bool is_in(const SessionFiles& session, const StudyFiles::Image& image) {
     return std::ranges::find(session.images, image.sop_instance_uid, &StudyFiles::Image::sop_instance_uid) !=
            session.images.end();
+  }
+
+  // Whether the X-ray may be a copy of one of `own` in another class: it has that time, and no label.
+  static bool is_copy_of_one(Images own, const StudyFiles::Image& other) {
+    return other.label.empty() && std::ranges::find(own, other.at_s, &StudyFiles::Image::at_s) != own.end() &&
+           std::ranges::none_of(own, [](const auto& image) { return image.label.empty(); });
   }
 
   // Whether the X-ray repeats the label of one of `own` at the time of any of them: then nothing tells which is of
@@ -208,7 +214,7 @@ class Doubts {
 std::string folder_above(const std::vector<fs::path>& files) {
   std::set<fs::path> folders;
   for (const fs::path& file : files) folders.insert(file.parent_path());
-  if (folders.size() < 2) return "";
+  if (folders.size() < 2 || folders.size() < files.size()) return "";
   fs::path above = *folders.begin();
   for (const fs::path& folder : folders) {
     const auto differs = std::mismatch(above.begin(), above.end(), folder.begin(), folder.end()).first;
@@ -224,7 +230,7 @@ std::string objection_to(const std::set<std::string>& sop_instance_uids, const S
   for (const std::string& uid : sop_instance_uids) registered.erase(uid);
   const std::vector<SessionFiles> sessions = sessions_of(files, other_xrays, registered);
   const auto same = std::ranges::find(sessions, session_name(sop_instance_uids), &SessionFiles::name);
-  if (same == sessions.end()) return "with the X-rays that are known now, these are not one session";
+  if (same == sessions.end()) return "together with X-rays that have come later, these would be grouped in another way";
   return same->doubts.empty() ? "" : same->doubts.front();
 }
 

@@ -49,8 +49,8 @@ StudyFiles files_for(const SessionFiles& session, const StudyFiles& files);
 // structure set tells.
 std::string missing_ct_images(const StudyFiles& of_session);
 
-// Why a file in a folder of these CT images or X-rays cannot be read: it may be one of them. If the X-rays lie in
-// several folders, a file anywhere below the folder that holds these may be one, too. Empty if there is no such file.
+// Why a file in a folder of these CT images or X-rays cannot be read: it may be one of them. If every X-ray lies in a
+// folder of its own, a file anywhere below the folder that holds these may be one, too. Empty if there is no such file.
 // `unreadable`: messages, each beginning with the file's path.
 std::string unreadable_beside(const StudyParts& parts, const std::vector<std::string>& unreadable);
 

@@ -194,21 +194,37 @@ TEST_F(BatchCommandTest, AResultOfOtherFilesIsSupersededAndNotLost) {
   const auto before = cases();
   ASSERT_EQ(before.size(), 2U);
   const fs::path images = exported() / "1" / "RTIMAGE", plan = exported() / "1" / "RTPLAN.dcm";
+  const auto superseded = [&] {
+    return fs::exists(results() / "superseded") ? std::distance(fs::directory_iterator(results() / "superseded"), {})
+                                                : 0;
+  };
   fs::copy_file(images / "KV_G000.dcm", images / "late.dcm");
   edit(images / "late.dcm", [](DicomItem d) {
     d.put(DCM_SOPInstanceUID, "2.25.7");
     d.put(DCM_RTImageLabel, "OBL");
   });
-  const CommandOutcome again = batch();
-  EXPECT_THAT(again.err, HasSubstr("its X-rays are no case any more"));
+  EXPECT_THAT(batch().err, HasSubstr("its X-rays are grouped in another way now"));
   EXPECT_EQ(cases().size(), 2U);
-  EXPECT_EQ(std::distance(fs::directory_iterator(results() / "superseded"), {}), 1);
-  EXPECT_THAT(batch().err, HasSubstr("2 of 2 cases have been registered before"));
+  EXPECT_EQ(superseded(), 1);
 
-  fs::last_write_time(plan, fs::last_write_time(plan) + std::chrono::seconds(1));
-  const CommandOutcome replaced = batch();
-  EXPECT_THAT(replaced.err, HasSubstr("its files or its doubts have changed, so it is registered again"));
-  EXPECT_EQ(std::distance(fs::directory_iterator(results() / "superseded"), {}), 3);
+  // Times and places of files do not matter, nor do files of others.
+  for (const fs::path& file : {plan, images / "KV_G000.dcm"})
+    fs::last_write_time(file, fs::last_write_time(file) + std::chrono::hours(1));
+  fs::create_directories(exported() / "3");
+  fs::copy_file(plan, exported() / "3" / "broken.dcm");
+  fs::resize_file(exported() / "3" / "broken.dcm", 300);
+  EXPECT_THAT(batch().err, HasSubstr("2 of 2 cases have been registered before"));
+  EXPECT_EQ(superseded(), 1);
+
+  edit(plan, [](DicomItem d) { d.put(DCM_RTPlanLabel, "OTHER"); });
+  EXPECT_THAT(batch().err, HasSubstr("its files, its doubts or its anatomy have changed, so it is registered again"));
+  EXPECT_EQ(superseded(), 3);
+
+  // What is taken out of the folder keeps its result.
+  fs::remove_all(images / "F02");
+  batch();
+  EXPECT_EQ(superseded(), 3);
+  EXPECT_EQ(cases().size(), 2U);
 }
 
 TEST_F(BatchCommandTest, AManifestIsOfTheXraysThatWereScanned) {
@@ -220,6 +236,9 @@ TEST_F(BatchCommandTest, AManifestIsOfTheXraysThatWereScanned) {
   run_command({"batch", manifest.string(), "-o", results().string(), "--preset", "fast"});
   ASSERT_EQ(summary()["cases"].size(), 1U);
   EXPECT_THAT(summary()["cases"][0]["error"].get<std::string>(), HasSubstr("are not those for which the manifest"));
+  ASSERT_EQ(run_command({"batch", "--scan", exported().string(), "-o", manifest.string()}).exit_status, 0);
+  run_command({"batch", manifest.string(), "-o", results().string(), "--preset", "fast"});
+  EXPECT_EQ(summary()["cases"][0].value("error", ""), "");
 }
 
 TEST_F(BatchCommandTest, ANameThatAManifestCannotHoldIsRefused) {

@@ -10,6 +10,7 @@
 #include "base/graceful_end.h"
 #include "base/output_folder.h"
 #include "workflow/batch/batch_workers.h"
+#include "workflow/batch/case_inputs.h"
 
 namespace isoshift {
 namespace {
@@ -65,22 +66,26 @@ bool Batch::run() {
   if (shard.count > 1) cases_ = cases_of_shard(shard, std::move(cases_));
   const ShardLock lock = folder_.work_on(shard, cases_);
   if (shard.count == 1 && std::filesystem::is_directory(options_.cases))
-    for (const std::string& name : folder_.set_aside_others(cases_))
+    for (const std::string& name : folder_.set_aside_regrouped(cases_))
       observer_.say(
-          fmt::format("case {}: its X-rays are no case any more, now that the folder holds others. Its result "
-                      "is in superseded",
-                      name));
+          fmt::format("case {}: its X-rays are grouped in another way now. Its result is in superseded", name));
   return register_all();
 }
 
 bool Batch::register_all() {
   std::vector<BatchJob> jobs;
+  CaseInputs inputs(folder_.path() / "inputs");
+  std::size_t ended_before = 0, compared = 0;
   for (const BatchCase& one : cases_) {
-    if (folder_.begin(one))
+    if (inputs.renew(one, folder_.has_ended(one.name))) {
       observer_.say(
-          fmt::format("case {}: its files or its doubts have changed, so it is registered again. Its earlier "
-                      "result is in superseded",
+          fmt::format("case {}: its files, its doubts or its anatomy have changed, so it is registered again. "
+                      "Its earlier result is in superseded",
                       one.name));
+      folder_.set_aside(one.name);
+    }
+    ended_before += folder_.has_ended(one.name) ? 1 : 0;
+    observer_.progress("Comparing files of cases", ++compared, cases_.size());
     if (!folder_.has_ended(one.name) && !has_xrays_of_manifest(one))
       folder_.fail(one.name,
                    "its X-rays are not those for which the manifest was written (xrays_sha256). Write the manifest "
@@ -94,9 +99,8 @@ bool Batch::register_all() {
                                 .output = std::filesystem::absolute(folder_.folder_of(one.name)),
                                 .at_a_time = options_.jobs}});
   }
-  if (jobs.size() < cases_.size())
-    observer_.say(
-        fmt::format("{} of {} cases have been registered before", cases_.size() - jobs.size(), cases_.size()));
+  if (ended_before > 0)
+    observer_.say(fmt::format("{} of {} cases have been registered before", ended_before, cases_.size()));
   const GracefulEnd end;
   const std::string step = fmt::format("Registering {}", jobs.size());
   const std::size_t total = jobs.size();

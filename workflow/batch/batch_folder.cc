@@ -4,13 +4,13 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <fstream>
 #include <nlohmann/json.hpp>
+#include <set>
 
 #include "base/error.h"
 #include "base/json_file.h"
 #include "base/output_folder.h"
-#include "base/sha256.h"
+#include "io/report/result_folder.h"
 
 namespace isoshift {
 namespace {
@@ -78,32 +78,22 @@ void BatchFolder::set_aside(const std::string& name) const {
   fs::rename(folder_of(name), to);
 }
 
-bool BatchFolder::begin(const BatchCase& one) const {
-  const fs::path noted = path_ / "inputs" / (one.name + ".sha256");
-  std::string before;
-  std::getline(std::ifstream(noted), before);
-  std::string now;
-  try {
-    now = sha256_of(inputs_of(one));
-  } catch (const std::exception&) {
-    return false;  // the registration says which file is missing
+std::vector<std::string> BatchFolder::set_aside_regrouped(const std::vector<BatchCase>& cases) const {
+  std::set<std::string> names, uids;
+  for (const BatchCase& one : cases) {
+    names.insert(one.name);
+    uids.insert(one.xray_uids.begin(), one.xray_uids.end());
   }
-  const bool is_superseded = has_ended(one.name) && !before.empty() && before != now;
-  if (is_superseded) set_aside(one.name);
-  if (has_ended(one.name) || before == now) return is_superseded;
-  fs::create_directories(noted.parent_path());
-  replace_text(noted, now + "\n");
-  return is_superseded;
-}
-
-std::vector<std::string> BatchFolder::set_aside_others(const std::vector<BatchCase>& cases) const {
-  std::vector<std::string> others;
-  for (const auto& entry : fs::directory_iterator(path_ / "cases"))
-    if (const std::string name = entry.path().filename().string();
-        name.find(".partial-") == std::string::npos && std::ranges::find(cases, name, &BatchCase::name) == cases.end())
-      others.push_back(name);
-  for (const std::string& name : others) set_aside(name);
-  return others;
+  std::vector<std::string> regrouped;
+  for (const auto& entry : fs::directory_iterator(path_ / "cases")) {
+    const std::string name = entry.path().filename().string();
+    if (names.contains(name) || !fs::exists(entry.path() / kResultFile)) continue;
+    const SetupResult result = read_report(entry.path());
+    if (std::ranges::any_of(result.views, [&](const auto& view) { return uids.contains(view.sop_instance_uid); }))
+      regrouped.push_back(name);
+  }
+  for (const std::string& name : regrouped) set_aside(name);
+  return regrouped;
 }
 
 void BatchFolder::fail(const std::string& name, const std::string& message) const {

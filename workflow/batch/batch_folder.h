@@ -36,18 +36,15 @@ class BatchFolder {
   std::filesystem::path folder_of(const std::string& name) const { return path_ / "cases" / name; }
   bool has_ended(const std::string& name) const { return std::filesystem::exists(folder_of(name)); }
 
-  // Moves a case that has ended to superseded/ if it was registered from other files or doubts than now, and notes what
-  // it is registered from now. Returns true if it was moved. To be called before the case is registered.
-  bool begin(const BatchCase& one) const;
-  // Moves cases that have ended, and are none of `cases`, to superseded/. Returns their names.
-  std::vector<std::string> set_aside_others(const std::vector<BatchCase>& cases) const;
+  // Moves the result of a case to superseded/.
+  void set_aside(const std::string& name) const;
+  // Moves the results of which an X-ray is in another case now to superseded/. Returns their names.
+  std::vector<std::string> set_aside_regrouped(const std::vector<BatchCase>& cases) const;
 
   // Writes an error in place of the case's result, unless the case has ended already.
   void fail(const std::string& name, const std::string& message) const;
 
  private:
-  void set_aside(const std::string& name) const;
-
   std::filesystem::path path_;
 };
 

@@ -148,17 +148,13 @@ BatchCase case_of(const NumberedRow& row, const fs::path& folder, const std::str
   return one_case;
 }
 
-// The folder of a CT where nothing else of CTs lies below it, else its files.
-std::vector<fs::path> ct_paths(const fs::path& top, const std::vector<fs::path>& files, const StudyFiles& all) {
-  fs::path folder = files.front().parent_path();
+// The folder of a CT if nothing but the CT lies below it, else the CT's files: a file that is added to the folder later
+// is none of the CT.
+std::vector<fs::path> ct_paths(const fs::path& top, const std::vector<fs::path>& files) {
+  const fs::path folder = files.front().parent_path();
   for (const fs::path& file : files)
     if (file.parent_path() != folder) return files;
-  if (folder == top) return files;
-  for (const StudyFiles::Ct& ct : all.cts)
-    if (ct.files.front() != files.front())
-      for (const fs::path& other : ct.files)
-        if (other.string().starts_with(folder.string() + "/")) return files;
-  return {folder};
+  return folder == top || files_below({folder}).size() != files.size() ? files : std::vector{folder};
 }
 
 template <class Text>  // or path
@@ -176,19 +172,6 @@ std::string xrays_sha256_of(const BatchCase& one) {
   std::string all;
   for (const fs::path& file : files_below(one.parts.images)) all += sha256_of_file(file);
   return sha256_of(all);
-}
-
-std::string inputs_of(const BatchCase& one) {
-  std::string text = fmt::format("{}\n{}\n", one.anatomy, joined(one.parts.doubts));
-  std::vector<fs::path> parts = one.parts.ct;
-  parts.insert(parts.end(), one.parts.images.begin(), one.parts.images.end());
-  for (const fs::path& part : {one.parts.study, one.parts.plan, one.parts.structures})
-    if (!part.empty()) parts.push_back(part);
-  for (const fs::path& part : parts)
-    for (const fs::path& file : files_below({part}))
-      text += fmt::format("{} {} {}\n", file.filename().string(), fs::file_size(file),
-                          fs::last_write_time(file).time_since_epoch().count());
-  return text;
 }
 
 std::vector<BatchCase> read_manifest(const fs::path& path) {
@@ -212,7 +195,7 @@ std::vector<BatchCase> read_manifest(const fs::path& path) {
 
 std::string manifest_csv(const std::vector<BatchCase>& cases) {
   std::string csv = fmt::format("{}\n", fmt::join(kColumns, ","));
-  for (const auto& [name, parts, anatomy, xrays_sha256] : cases) {
+  for (const auto& [name, parts, anatomy, xrays_sha256, xray_uids] : cases) {
     for (const auto& paths : {parts.ct, parts.images})
       for (const fs::path& path : paths)
         if (path.string().find(kBetween) != std::string::npos)
@@ -241,12 +224,13 @@ std::vector<BatchCase> scan_cases(const fs::path& folder, bool other_xrays, Note
       if (const std::string absent = missing_ct_images(own); !absent.empty()) throw Error(absent + " are missing");
       if (const std::string reason = unreadable_beside(parts, files.unreadable); !reason.empty())
         throw Error("a file beside these X-rays may belong to them: " + reason);
-      parts.ct = ct_paths(top, parts.ct, files);
+      parts.ct = ct_paths(top, parts.ct);
       parts.doubts = session.doubts;
       for (const std::string& doubt : session.doubts)
         notes.warnings.push_back(fmt::format("case {}: {}", session.name, doubt));
-      cases.push_back({.name = session.name, .parts = std::move(parts), .anatomy = "", .xrays_sha256 = ""});
-      cases.back().xrays_sha256 = xrays_sha256_of(cases.back());
+      BatchCase& found = cases.emplace_back(
+          BatchCase{.name = session.name, .parts = std::move(parts), .anatomy = "", .xrays_sha256 = ""});
+      for (const StudyFiles::Image& image : session.images) found.xray_uids.insert(image.sop_instance_uid);
     } catch (const Error& error) {
       notes.warnings.push_back(
           fmt::format("{} and {} more X-rays belong to no case: {}\n       Or name their files in a manifest; --scan "

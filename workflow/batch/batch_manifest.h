@@ -2,6 +2,7 @@
 // The list of studies that a batch registers: a table (CSV) or JSON lines, one case per line (docs/commands/batch.md).
 
 #include <filesystem>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -13,8 +14,9 @@ namespace isoshift {
 struct BatchCase {
   std::string name;  // also the name of its folder: letters, digits, ".", "_" and "-"
   StudyParts parts;
-  std::string anatomy;       // empty: the anatomy of --anatomy
-  std::string xrays_sha256;  // what xrays_sha256_of() said when the case was found; empty: not known
+  std::string anatomy;                   // empty: the anatomy of --anatomy
+  std::string xrays_sha256;              // what xrays_sha256_of() said when the manifest was written; empty: not known
+  std::set<std::string> xray_uids = {};  // SOPInstanceUIDs; known only of a case that was found in a folder
 
   // Cases with equal keys share their CT.
   std::string ct_key() const;
@@ -22,10 +24,6 @@ struct BatchCase {
 
 // Of the contents of the case's X-ray files, in their order. Throws Error for a file that cannot be read.
 std::string xrays_sha256_of(const BatchCase& one);
-
-// What the case is registered from: the names, sizes and times of all its files, its doubts and its anatomy. Another
-// text if any of these changes. Throws Error for a file that does not exist.
-std::string inputs_of(const BatchCase& one);
 
 // Paths in a manifest are relative to its folder. Throws Error naming the line and the column of a mistake.
 std::vector<BatchCase> read_manifest(const std::filesystem::path& path);

@@ -36,7 +36,7 @@ class AuditLog {
   bool has_been_released(const std::string& session) const;
   // True if the newest release of the session has this file.
   bool has_release(const std::string& session, const std::string& release_sha256) const;
-  // Which line of the log has the newest release of the session, counted among all releases from 1; 0 without one.
+  // The place of the session's newest release among all releases in the log, from 1; 0 if there is none.
   std::size_t release_number(const std::string& session) const;
   // True if the peer has confirmed the object. Lines that were kept count, too.
   bool has_sending(const std::string& session, const std::string& peer, const std::string& object_sha256) const;

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <set>
 #include <utility>
 
 namespace isoshift {
@@ -25,9 +26,14 @@ void Deliverer::refuse(const std::string& session, const std::string& why, Obser
 void Deliverer::deliver(const std::stop_token& stop, Observer& observer) {
   const ResultsTree::Pending pending = tree_.pending();
   for (const auto& [session, why] : pending.refused) refuse(session, why, observer);
+  // A peer that is not due now may be due later in this loop: then it would receive the older releases last.
+  std::set<std::string> not_due;
   for (const Delivery& delivery : pending.deliveries) {
     if (stop.stop_requested()) return;
+    if (!is_due(delivery.peer)) not_due.insert(delivery.peer);
+    if (not_due.contains(delivery.peer)) continue;
     deliver(delivery, observer);
+    if (!is_due(delivery.peer)) not_due.insert(delivery.peer);
   }
   tree_.write_kept_audit();
 }
@@ -35,7 +41,7 @@ void Deliverer::deliver(const std::stop_token& stop, Observer& observer) {
 void Deliverer::deliver(const Delivery& delivery, Observer& observer) {
   const auto& [session, peer_name, object] = delivery;
   const std::string session_key = "/" + session, key = fmt::format("{}/{}/{}", peer_name, session, object.file);
-  if (!is_due(peer_name) || !is_due(session_key) || !is_due(key)) return;
+  if (!is_due(session_key) || !is_due(key)) return;
   std::filesystem::path file;
   try {
     file = tree_.checked_file(delivery);

@@ -30,66 +30,78 @@ void Objections::add_result(const std::string& session, const SetupResult& resul
     own.emplace(view.sop_instance_uid, view.acquired);
     // If its file has been seen, that tells more.
     patient.xrays.try_emplace(Xray(view.sop_instance_uid, view.acquired),
-                              Seen{.label = view.label, .moment = {.at_s = seconds_of(view.acquired)}});
+                              Seen{.label = view.label, .moment = {.local_s = seconds_of(view.acquired)}});
   }
 }
 
 void Objections::update(const std::map<std::string, Patient>& patients, const std::set<std::string>& registered) {
   for (const auto& [patient_id, arrived] : patients) {
     OfPatient& patient = patients_[patient_id];
-    if (patient.last == arrived.last) continue;
-    patient.last = arrived.last;
+    if (patient.looked_at == arrived.last) continue;
+    patient.looked_at = arrived.last;
     patient.is_news = true;
     for (const auto* images : {&arrived.files.images, &arrived.files.other_xrays})
       for (const StudyFiles::Image& image : *images)
         patient.xrays[Xray(image.sop_instance_uid, image.acquired)] = {
-            .label = image.label, .moment = {.at_s = image.at_s, .has_utc_offset = image.has_utc_offset}};
+            .label = image.label,
+            .moment = {
+                .at_s = image.at_s, .local_s = seconds_of(image.acquired), .has_utc_offset = image.has_utc_offset}};
   }
   for (auto& [patient_id, patient] : patients_) {
     if (!std::exchange(patient.is_news, false)) continue;
     const auto arrived = patients.find(patient_id);
+    const StudyFiles* files = arrived == patients.end() ? nullptr : &arrived->second.files;
     for (const auto& [session, own] : patient.results)
-      if (std::string words =
-              objection(patient, own, arrived == patients.end() ? nullptr : &arrived->second.files, registered);
-          !words.empty())
-        by_session_[session] = std::move(words);
+      if (Objection found = objection(patient, own, files, registered); !found.words.empty())
+        by_session_[session] = std::move(found);
   }
 }
 
 // Times with and without an offset from UTC may be 14 hours apart at the same moment.
 bool Objections::may_be_later(const Moment& moment, const Moment& than) {
   constexpr double kLargestOffsetS = 14 * 3600.0;
+  if (!moment.has_utc_offset || !than.has_utc_offset)
+    return !moment.local_s || !than.local_s || *moment.local_s > *than.local_s;
   if (!moment.at_s || !than.at_s) return true;
-  return *moment.at_s > *than.at_s - (moment.has_utc_offset == than.has_utc_offset ? 0.0 : kLargestOffsetS);
+  return *moment.at_s > *than.at_s - (*moment.has_utc_offset == *than.has_utc_offset ? 0.0 : kLargestOffsetS);
 }
 
-std::string Objections::newer_xrays(const OfPatient& patient, const std::set<Xray>& own) {
-  Moment last = patient.xrays.at(*own.begin()).moment;
+Objection Objections::newer_xrays(const OfPatient& patient, const std::set<Xray>& own,
+                                  const std::set<std::string>& registered) {
+  Moment latest_own = patient.xrays.at(*own.begin()).moment;
   for (const Xray& xray : own)
-    if (const Moment& moment = patient.xrays.at(xray).moment; may_be_later(moment, last)) last = moment;
+    if (const Moment& moment = patient.xrays.at(xray).moment; may_be_later(moment, latest_own)) latest_own = moment;
   const std::pair<const Xray, Seen>* newest = nullptr;
-  for (const auto& one : patient.xrays)
-    if (!own.contains(one.first) && may_be_later(one.second.moment, last) &&
-        (newest == nullptr || may_be_later(one.second.moment, newest->second.moment)))
-      newest = &one;
-  if (newest == nullptr) return "";
+  bool have_results = true;
+  for (const auto& one : patient.xrays) {
+    if (own.contains(one.first) || !may_be_later(one.second.moment, latest_own)) continue;
+    if (newest == nullptr || may_be_later(one.second.moment, newest->second.moment)) newest = &one;
+    have_results = have_results && registered.contains(one.first.first);
+  }
+  if (newest == nullptr) return {};
   const std::string& acquired = newest->first.second;
   const std::string label = newest->second.label.empty() ? "an X-ray" : newest->second.label;
-  return acquired.empty()
-             ? fmt::format("the patient has other X-rays, which may be newer: {} of an unknown time", label)
-             : fmt::format("the patient has newer X-rays: {} {}", label, acquired);
+  return {.words = acquired.empty()
+                       ? fmt::format("the patient has other X-rays, which may be newer: {} of an unknown time", label)
+                       : fmt::format("the patient has newer X-rays: {} {}", label, acquired),
+          .newer_have_results = have_results && !acquired.empty()};
 }
 
-std::string Objections::objection(const OfPatient& patient, const std::set<Xray>& own, const StudyFiles* files,
-                                  const std::set<std::string>& registered) const {
-  if (std::string words = newer_xrays(patient, own); !words.empty() || files == nullptr) return words;
+Objection Objections::objection(const OfPatient& patient, const std::set<Xray>& own, const StudyFiles* files,
+                                const std::set<std::string>& registered) const {
   std::set<std::string> uids;
+  bool are_here = files != nullptr;
   for (const auto& [uid, acquired] : own) {
     const auto has_uid = [&](const StudyFiles::Image& image) { return image.sop_instance_uid == uid; };
-    if (std::ranges::none_of(files->images, has_uid) && std::ranges::none_of(files->other_xrays, has_uid)) return "";
+    are_here =
+        are_here && (std::ranges::any_of(files->images, has_uid) || std::ranges::any_of(files->other_xrays, has_uid));
     uids.insert(uid);
   }
-  return objection_to(uids, *files, takes_other_xrays_, registered);
+  Objection found = newer_xrays(patient, own, registered);
+  if (are_here)
+    if (const std::string words = objection_to(uids, *files, takes_other_xrays_, registered); !words.empty())
+      found = {.words = found.words + (found.words.empty() ? "" : "; ") + words};
+  return found;
 }
 
 }  // namespace isoshift

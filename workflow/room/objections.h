@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "setup/setup_result.h"
+#include "workflow/room/results_tree.h"
 #include "workflow/room/source.h"
 
 namespace isoshift {
@@ -16,7 +17,7 @@ namespace isoshift {
 class Objections {
  public:
   // `earlier`: what by_session() returned in an earlier run.
-  Objections(std::map<std::string, std::string> earlier, bool takes_other_xrays)
+  Objections(std::map<std::string, Objection> earlier, bool takes_other_xrays)
       : by_session_(std::move(earlier)), takes_other_xrays_(takes_other_xrays) {}
 
   void add_result(const std::string& session, const SetupResult& result);
@@ -24,13 +25,14 @@ class Objections {
   // Looks at the X-rays that have arrived, by PatientID. `registered`: the SOPInstanceUIDs of those that have a result.
   void update(const std::map<std::string, Patient>& patients, const std::set<std::string>& registered);
 
-  // In words. An objection is never withdrawn: X-rays that are moved away have been taken all the same.
-  const std::map<std::string, std::string>& by_session() const { return by_session_; }
+  // An objection is never withdrawn: X-rays that are moved away have been taken all the same.
+  const std::map<std::string, Objection>& by_session() const { return by_session_; }
 
  private:
   struct Moment {
-    std::optional<double> at_s;  // since an epoch
-    bool has_utc_offset = false;
+    std::optional<double> at_s;          // since an epoch
+    std::optional<double> local_s;       // the same without the offset from UTC
+    std::optional<bool> has_utc_offset;  // unset: not known, because only a result tells of the X-ray
   };
   // Its UID and its time: if one UID comes with two times, it is that of two X-rays.
   using Xray = std::pair<std::string, std::string>;
@@ -41,15 +43,16 @@ class Objections {
   struct OfPatient {
     std::map<Xray, Seen> xrays;
     std::map<std::string, std::set<Xray>> results;  // by session
-    std::optional<Clock::Time> last;                // when the last file had arrived that was looked at
+    std::optional<Clock::Time> looked_at;           // Patient::last at that time
     bool is_news = false;                           // files or results that were not compared yet
   };
   static bool may_be_later(const Moment& moment, const Moment& than);
-  static std::string newer_xrays(const OfPatient& patient, const std::set<Xray>& own);
-  std::string objection(const OfPatient& patient, const std::set<Xray>& own, const StudyFiles* files,
-                        const std::set<std::string>& registered) const;
+  static Objection newer_xrays(const OfPatient& patient, const std::set<Xray>& own,
+                               const std::set<std::string>& registered);
+  Objection objection(const OfPatient& patient, const std::set<Xray>& own, const StudyFiles* files,
+                      const std::set<std::string>& registered) const;
 
-  std::map<std::string, std::string> by_session_;
+  std::map<std::string, Objection> by_session_;
   bool takes_other_xrays_;
   std::map<std::string, OfPatient> patients_;  // by PatientID
 };

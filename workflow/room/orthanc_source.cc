@@ -165,15 +165,16 @@ void OrthancSource::forget_before(fs::file_time_type time) {
   }
 }
 
-// An object of which nothing is made goes again: the server has it.
+// An object of which nothing is made goes again: the server has it. What differs from another of its UID stays as
+// evidence.
 bool OrthancSource::keep(const fs::path& object, Notes& notes) {
   const PatientFiles::Taken taken = files_.take(object, notes);
   if (taken.replaced) fs::remove(*taken.replaced);
   const auto known = files_.known().find(object);
-  if (known == files_.known().end())
-    fs::remove(object);
-  else
+  if (known != files_.known().end())
     rest_.erase(known->second.patient_id);
+  else if (!taken.differs)
+    fs::remove(object);
   return !files_.unreadable().contains(object);
 }
 

@@ -22,9 +22,9 @@ class OrthancSource : public Source {
   // Throws ServerError if the server does not answer.
   void update(Notes& notes) override;
   const std::map<std::string, Patient>& patients() const override { return files_.patients(); }
+  std::vector<std::string> unreadable() const override { return {}; }  // the server stores only what it could read
   // True while the server has changes that were not read yet. An instance that the server fails to deliver counts for
   // every patient, for a minute, since its patient is not known.
-  std::vector<std::string> unreadable() const override { return {}; }  // the server stores only what it could read
   bool is_coming(const std::string& patient_id) const override;
   // The next update asks the server once which other objects it has of a patient, and again after each new object.
   void ask_for_rest(const std::string& patient_id) override { rest_.emplace(patient_id, Clock::Time()); }

@@ -24,6 +24,15 @@ bool is_whole(const fs::path& file) {
   }
 }
 
+// A file that is gone by now may have differed.
+bool differ(const fs::path& a, const fs::path& b) {
+  try {
+    return sha256_of_file(a) != sha256_of_file(b);
+  } catch (const Error&) {
+    return true;
+  }
+}
+
 void remove_from(StudyFiles& files, const fs::path& file, const std::string& uid) {
   for (StudyFiles::Ct& ct : files.cts)
     if (std::erase(ct.files, file) > 0) ct.sop_instance_uids.erase(uid);
@@ -75,10 +84,14 @@ std::vector<fs::path> PatientFiles::forget(const fs::path& file) {
 }
 
 void PatientFiles::forget_copy(const fs::path& file) {
-  for (const auto& [uid, copy] : copies_of_)
-    if (const auto used = file_of_uid_.find(uid); copy == file && used != file_of_uid_.end())
-      note_other(patients_.at(known_.at(used->second).patient_id).files, used->second, "");
-  std::erase_if(copies_of_, [&](const auto& copy) { return copy.second == file; });
+  const auto gone = std::ranges::find(copies_of_, file, [](const auto& copy) { return copy.second; });
+  if (gone == copies_of_.end()) return;
+  const std::string uid = gone->first;
+  copies_of_.erase(gone);
+  const fs::path used = file_of_uid_.at(uid);
+  const auto [first, end] = copies_of_.equal_range(uid);
+  const auto other = std::find_if(first, end, [&](const auto& copy) { return differ(copy.second, used); });
+  note_other(patients_.at(known_.at(used).patient_id).files, used, other == end ? fs::path() : other->second);
 }
 
 PatientFiles::Taken PatientFiles::take(const fs::path& file, Notes& notes) {
@@ -99,8 +112,9 @@ PatientFiles::Taken PatientFiles::take(const fs::path& file, Notes& notes) {
       Patient& patient = patients_.at(known_.at(before).patient_id);
       patient.last = clock_.now();
       copies_of_.emplace(found->uid, file);
-      if (sha256_of_file(before) != sha256_of_file(file)) {
+      if (differ(before, file)) {
         note_other(patient.files, before, file);
+        taken.differs = true;
         notes.warnings.push_back(fmt::format("{}: left aside: differs from {}, which has the same SOPInstanceUID",
                                              file.string(), before.string()));
       }

@@ -31,6 +31,7 @@ class PatientFiles {
 
   struct Taken {
     std::optional<std::filesystem::path> replaced;  // a broken file of the same object, which this file replaces
+    bool differs = false;                           // from the known file of the same object
     std::vector<std::filesystem::path> copies;      // what forget() returned for files that were forgotten
   };
   // Reads a file, and forgets an earlier version of it. If another complete file of the same object is known, the new

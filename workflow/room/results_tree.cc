@@ -62,6 +62,9 @@ Release release_from(const nlohmann::json& json) {
 
 constexpr const char* kObjectionsFile = "objections.json";
 
+// A label or a file's name need not be UTF-8.
+std::string text_of(const Json& json) { return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n"; }
+
 // Folders of registrations under way: ".NAME.registering-PROCESS", and what isoshift register writes beside them.
 constexpr const char* kRegistering = ".registering-";
 
@@ -90,18 +93,24 @@ fs::path ResultsTree::release_file(const std::string& session) const {
   return path_ / "released" / (session + ".json");
 }
 
-std::map<std::string, std::string> ResultsTree::objections() const {
+std::map<std::string, Objection> ResultsTree::objections() const {
   const fs::path file = path_ / kObjectionsFile;
-  if (!fs::exists(file)) return {};
+  std::map<std::string, Objection> all;
+  if (!fs::exists(file)) return all;
   try {
-    return read_json_file(file).json.get<std::map<std::string, std::string>>();
+    for (const auto& [session, objection] : read_json_file(file).json.get<std::map<std::string, nlohmann::json>>())
+      all[session] = {.words = objection.at("words"), .newer_have_results = objection.at("newer_have_results")};
   } catch (const nlohmann::json::exception&) {
-    throw Error(fmt::format("{}: expected an object of texts", file.string()));
+    throw Error(fmt::format("{}: is not a list of objections as isoshift watch writes it", file.string()));
   }
+  return all;
 }
 
-void ResultsTree::keep_objections(const std::map<std::string, std::string>& objections) {
-  replace_text(path_ / kObjectionsFile, Json(objections).dump(2) + "\n");
+void ResultsTree::keep_objections(const std::map<std::string, Objection>& objections) {
+  Json json = Json::object();
+  for (const auto& [session, objection] : objections)
+    json[session] = {{"words", objection.words}, {"newer_have_results", objection.newer_have_results}};
+  replace_text(path_ / kObjectionsFile, text_of(json));
 }
 
 bool ResultsTree::is_released(const std::string& session) const { return fs::exists(release_file(session)); }
@@ -229,19 +238,22 @@ Release ResultsTree::release(const std::string& session, const Releaser& release
         fmt::format("session {}: was released before, as audit.jsonl says, and {} is gone: only a person can release "
                     "it again",
                     session, release_file(session).string()));
-  const auto known = objections();
-  const auto objection = known.find(session);
-  if (objection != known.end() && !releaser.despite_objection)
+  const std::map<std::string, Objection> all = objections();
+  const auto said = all.find(session);
+  const Objection objection = said == all.end() ? Objection() : said->second;
+  const bool is_allowed =
+      objection.words.empty() || releaser.despite_objection || (releaser.is_person && objection.newer_have_results);
+  if (!is_allowed)
     throw Error(
-        fmt::format("session {}: {}. The couch may have moved since this session's X-rays or between them. If you know "
-                    "that and want the result to be sent: --despite-other-xrays",
-                    session, objection->second));
+        fmt::format("session {}: {}.\n       To release its result all the same, repeat the command with "
+                    "--despite-other-xrays",
+                    session, objection.words));
   Release release{.session = session,
                   .releaser = releaser,
                   .on = local_time(),
                   .verdict = record.verdict,
                   .record = record.sha256,
-                  .despite = objection == known.end() ? "" : objection->second,
+                  .despite = objection.words,
                   .is_again = is_again,
                   .objects = {},
                   .peers = peers};
@@ -261,7 +273,7 @@ void ResultsTree::put_release(const Release& release) {
   Json json = {{"schema", 1}, {"on", release.on}};
   json.update(release_json(release));
   if (!release.despite.empty()) json["despite"] = release.despite;
-  const std::string text = json.dump(2) + "\n";
+  const std::string text = text_of(json);
   replace_text(aside, text);
   std::error_code ignored;
   Json line = release_json(release);

@@ -37,6 +37,14 @@ struct Releaser {
 // "J. Doe (user isoshift, sudo of jdoe)".
 std::string to_string(const Releaser& releaser);
 
+// What other X-rays of the patient say against a result.
+struct Objection {
+  std::string words;
+  bool newer_have_results = false;  // there are newer X-rays, and nothing else: all of them have results of their own
+
+  bool operator==(const Objection&) const = default;
+};
+
 struct Release {
   struct Object {
     std::string file;  // of the session's folder
@@ -84,10 +92,10 @@ class ResultsTree {
   // The record of a session. Throws Error if there is no record, or if the audit log has no line for it.
   SessionRecord registered(const std::string& session) const;
 
-  // What other X-rays say against results, in words, by session.
-  std::map<std::string, std::string> objections() const;
+  // What other X-rays say against results, by session.
+  std::map<std::string, Objection> objections() const;
   // The caller must hold the lock of the tree.
-  void keep_objections(const std::map<std::string, std::string>& objections);
+  void keep_objections(const std::map<std::string, Objection>& objections);
 
   bool is_released(const std::string& session) const;
   // The release of a session, if there is one. Throws Error for a release file that isoshift release did not write, or

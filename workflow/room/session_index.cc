@@ -73,13 +73,13 @@ void SessionIndex::add(const std::string& session, const SetupResult& report, co
 }
 
 // Whether any is another one now.
-bool SessionIndex::update_states(const std::map<std::string, std::string>& objections) {
+bool SessionIndex::update_states(const std::map<std::string, Objection>& objections) {
   bool has_changed = false;
   for (Session& session : sessions_) {
     if (session.is_over) continue;
     std::string state = session.held;
     const auto objection = objections.find(session.name);
-    if (objection != objections.end()) state += "; " + objection->second;
+    if (objection != objections.end()) state += "; " + objection->second.words;
     session.is_over = session.verdict == to_string(Verdict::kRejected);
     if (session.is_over) {
       state = "rejected";
@@ -109,7 +109,7 @@ void SessionIndex::write(const std::string& page, const std::string& html) {
 }
 
 void SessionIndex::update(const std::vector<WaitingSession>& waiting, const std::vector<std::string>& troubles,
-                          const std::map<std::string, std::string>& objections) {
+                          const std::map<std::string, Objection>& objections) {
   const bool has_changed = update_states(objections);
   if (is_written_ && !has_changed && waiting == waiting_ && troubles == troubles_) return;
   is_written_ = false;  // until all of it is

@@ -30,7 +30,7 @@ class SessionIndex {
   // Finds out which sessions have been released and sent, and writes the pages that have changed. `troubles`: the
   // current troubles, such as a full disk. `objections`: what other X-rays say against results, by session.
   void update(const std::vector<WaitingSession>& waiting, const std::vector<std::string>& troubles,
-              const std::map<std::string, std::string>& objections);
+              const std::map<std::string, Objection>& objections);
 
  private:
   struct Session {
@@ -41,7 +41,7 @@ class SessionIndex {
     std::string times;     // of all X-rays
     bool is_over = false;  // the state cannot change any more
   };
-  bool update_states(const std::map<std::string, std::string>& objections);
+  bool update_states(const std::map<std::string, Objection>& objections);
   void write(const std::string& page, const std::string& html);
 
   const ResultsTree& tree_;

@@ -33,6 +33,7 @@ Watch::Watch(const WatchFile& watch, const Parts& parts)
       tree_(watch.results),
       lock_(only_watch_of(tree_)),
       objections_(tree_.objections(), parts.takes_other_xrays),
+      kept_objections_(objections_.by_session()),
       index_(tree_, watch.site.name),
       deliverer_(watch, parts.sender, parts.clock),
       troubles_(parts.observer),
@@ -264,9 +265,21 @@ void Watch::fail(const std::string& session, Clock::Time news, const Runner::Fai
 }
 
 void Watch::look_for_objections() {
-  const auto before = objections_.by_session();
   objections_.update(parts_.source.patients(), registered_);
-  if (objections_.by_session() != before) tree_.keep_objections(objections_.by_session());
+  if (objections_.by_session() == kept_objections_) return;
+  tree_.keep_objections(objections_.by_session());
+  kept_objections_ = objections_.by_session();
+}
+
+void Watch::release_by_rule(const std::string& session) {
+  if (tree_.is_released(session)) return;
+  tree_.release(session,
+                {.by = fmt::format("automatic, allowed by {} on {}", watch_.site.automatic_release->by,
+                                   watch_.site.automatic_release->on),
+                 .user = user_.name,
+                 .sudo_user = user_.sudo_user,
+                 .is_person = false},
+                watch_.names_of_peers());
 }
 
 // A release that fails must not block the others. A result against which other X-rays speak is released by a person or
@@ -275,24 +288,19 @@ void Watch::release_automatically() {
   if (!is_source_read_) return;
   std::erase_if(accepted_, [&](const auto& one) { return objections_.by_session().contains(one.first); });
   std::string trouble;
-  for (const auto& [session, accepted] : std::map(accepted_)) {
+  std::erase_if(accepted_, [&](const auto& one) {
+    const auto& [session, accepted] = one;
     if (parts_.source.is_coming(accepted.patient_id) ||
         !unreadable_beside(accepted.parts, parts_.source.unreadable()).empty())
-      continue;
+      return false;
     try {
-      if (!tree_.is_released(session))
-        tree_.release(session,
-                      {.by = fmt::format("automatic, allowed by {} on {}", watch_.site.automatic_release->by,
-                                         watch_.site.automatic_release->on),
-                       .user = user_.name,
-                       .sudo_user = user_.sudo_user,
-                       .is_person = false},
-                      watch_.names_of_peers());
-      accepted_.erase(session);
+      release_by_rule(session);
+      return true;
     } catch (const std::exception& error) {
       trouble = error.what();
+      return false;
     }
-  }
+  });
   if (!trouble.empty()) throw Error(trouble);
 }
 

@@ -100,12 +100,14 @@ class Watch {
   void fail(const std::string& session, Clock::Time news, const Runner::Failure& failure);
   void look_for_objections();
   void release_automatically();
+  void release_by_rule(const std::string& session);
 
   const WatchFile& watch_;
   Parts parts_;
   ResultsTree tree_;
   FileLock lock_;
   Objections objections_;
+  std::map<std::string, Objection> kept_objections_;  // those on the disk
   SessionIndex index_;
   Deliverer deliverer_;
   std::set<std::string> registered_;          // SOPInstanceUIDs of X-rays that have a result

@@ -141,6 +141,16 @@ TEST(Sessions, AnXrayBetweenTheViewsMakesThemDoubtful) {
   EXPECT_THAT(doubts_of({at_couch, of_other_machine, too}), ElementsAre(HasSubstr("between these views")));
 }
 
+// A copy in another class has the time of what it copies, and no label.
+TEST(Sessions, ACopyOfAViewIsNoEvidence) {
+  StudyFiles files;
+  files.images = {image("a", "AP", 0), image("b", "LAT", 60), image("c", "OBL", 80)};
+  files.other_xrays = {image("d", "", 60)};
+  EXPECT_THAT(sessions_of(files, false).at(0).doubts, testing::IsEmpty());
+  files.other_xrays = {image("d", "", 61)};
+  EXPECT_THAT(sessions_of(files, false).at(0).doubts, testing::SizeIs(1));
+}
+
 // Two setups whose X-rays all have the time of the export: which AP goes with which LAT is a guess.
 TEST(Sessions, EqualTimesTellNoOrder) {
   StudyFiles files;
@@ -148,7 +158,7 @@ TEST(Sessions, EqualTimesTellNoOrder) {
   const std::vector<SessionFiles> sessions = sessions_of(files, false);
   ASSERT_EQ(sessions.size(), 2U);
   for (const SessionFiles& session : sessions)
-    EXPECT_THAT(session.doubts, testing::Contains(testing::HasSubstr("too, at the same time")));
+    EXPECT_THAT(session.doubts, testing::Contains(testing::HasSubstr("with the time of one of these views")));
 }
 
 TEST(Sessions, OneUidOfTwoXraysIsADoubt) {
@@ -181,7 +191,7 @@ TEST(Sessions, WhatComesLaterMayObjectToAResult) {
   EXPECT_EQ(objection_to({"a", "b"}, files, false, {"a", "b"}), "");
   files.images.push_back(image("e", "AP", 55));
   EXPECT_EQ(objection_to({"a", "b"}, files, false, {"a", "b"}),
-            "with the X-rays that are known now, these are not one session");
+            "together with X-rays that have come later, these would be grouped in another way");
 }
 
 // One folder per X-ray.
@@ -189,6 +199,8 @@ TEST(Sessions, AFileThatCannotBeReadCountsBelowTheFolderOfAllXrays) {
   const StudyParts apart{.ct = {"/a/ct/1"}, .images = {"/a/b/1/ap.dcm", "/a/b/2/lat.dcm"}};
   EXPECT_EQ(unreadable_beside(apart, {"/a/b/3/x.dcm: is cut off"}), "/a/b/3/x.dcm: is cut off");
   EXPECT_EQ(unreadable_beside(apart, {"/a/c/x.dcm: is cut off", "/a/bb/x.dcm: is cut off"}), "");
+  EXPECT_EQ(unreadable_beside({.images = {"/a/b/1/ap.dcm", "/a/b/1/lat.dcm", "/a/b/2/obl.dcm"}}, {"/a/b/3/x.dcm: bad"}),
+            "");
   const StudyParts together{.ct = {"/a/ct/1"}, .images = {"/a/b/ap.dcm", "/a/b/lat.dcm"}};
   EXPECT_EQ(unreadable_beside(together, {"/a/b/3/x.dcm: is cut off"}), "");
   EXPECT_EQ(unreadable_beside(together, {"/a/b/x.dcm: is cut off"}), "/a/b/x.dcm: is cut off");
@@ -207,7 +219,7 @@ TEST(Sessions, AnXrayWithoutItsPartnerMakesItsNeighborsDoubtful) {
   EXPECT_THAT(doubts_of({image("a", "LAT", 60), image("b", "AP", 300), image("c", "LAT", 310)}), testing::IsEmpty());
   // All with the time of their series.
   EXPECT_THAT(doubts_of({image("a", "AP", 0), image("b", "LAT", 0), image("c", "LAT", 0)}),
-              ElementsAre(HasSubstr("shows LAT, too, at the same time")));
+              ElementsAre(HasSubstr("another LAT with the time of one of these views")));
 }
 
 TEST(Sessions, TwoMachinesAreTwoSessions) {

@@ -135,6 +135,11 @@ TEST_F(FolderSourceTest, AnotherXrayOfOneUidIsNotedInTheFirst) {
     return found;
   };
   EXPECT_THAT(others(), testing::ElementsAre(in_ / "other.dcm"));
+  fs::copy(study_.image(0), in_ / "copy.dcm");
+  settle();
+  fs::remove(in_ / "copy.dcm");
+  settle();
+  EXPECT_THAT(others(), testing::ElementsAre(in_ / "other.dcm"));
   fs::remove(in_ / "other.dcm");
   settle();
   EXPECT_THAT(others(), testing::IsEmpty());

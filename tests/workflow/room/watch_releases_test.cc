@@ -143,20 +143,55 @@ TEST_F(WatchReleases, OtherXraysThatSpeakAgainstAResultAreSaidInItsRelease) {
   room_.pass(60s);
   room_.source.bring(xray("P", "P3", "AP", second_of(10, 15, 5)));
   room_.pass(60s);
-  EXPECT_THAT(room_.index(), HasSubstr("held; with the X-rays that are known now, these are not one session"));
+  EXPECT_THAT(room_.index(),
+              HasSubstr("held; together with X-rays that have come later, these would be grouped in another way"));
   room_.start();  // what was known is remembered
   room_.pass(60s);
-  EXPECT_THAT(error_of_release("P"), AllOf(HasSubstr("with the X-rays that are known now, these are not one session"),
-                                           HasSubstr("--despite-other-xrays")));
+  EXPECT_THAT(error_of_release("P"),
+              AllOf(HasSubstr("together with X-rays that have come later, these would be grouped in another way"),
+                    HasSubstr("--despite-other-xrays")));
   EXPECT_FALSE(is_released("P"));
   ResultsTree tree(room_.file.results);
   const Release release =
       tree.release(session("P"), {.by = "J. Doe", .user = "u", .despite_objection = true}, {"record"});
-  EXPECT_EQ(release.despite, "with the X-rays that are known now, these are not one session");
+  EXPECT_EQ(release.despite, "together with X-rays that have come later, these would be grouped in another way");
   EXPECT_EQ(tree.release_of(session("P"))->despite, release.despite);
   room_.pass(1s);
-  EXPECT_THAT(room_.index(), HasSubstr(", although with the X-rays that are known now, these are not one session"));
-  EXPECT_THAT(audit(), AllOf(HasSubstr("\"despite_other_xrays\":true"), Not(HasSubstr("known now"))));
+  EXPECT_THAT(room_.index(),
+              HasSubstr(", although together with X-rays that have come later, these would be grouped in another way"));
+  EXPECT_THAT(audit(), AllOf(HasSubstr("\"despite_other_xrays\":true"), Not(HasSubstr("have come later"))));
+}
+
+// A verification after the couch has moved is everyday work.
+TEST_F(WatchReleases, APersonReleasesWhatIsOlderThanAnotherResultWithAWarning) {
+  room_.start();
+  bring("P");
+  room_.pass(60s);
+  room_.source.bring(xray("P", "P3", "AP", second_of(10, 20)));
+  room_.source.bring(xray("P", "P4", "LAT", second_of(10, 20, 10)));
+  room_.pass(60s);
+  ASSERT_THAT(room_.runs(), SizeIs(2));
+  release("P");
+  EXPECT_EQ(ResultsTree(room_.file.results).release_of(session("P"))->despite,
+            "the patient has newer X-rays: LAT 2026-03-02 10:20:10");
+}
+
+TEST_F(WatchReleases, AnObjectionReachesTheDiskWhateverItHoldsAndHoweverLate) {
+  room_.start();
+  bring("P");
+  room_.pass(60s);
+  const fs::path kept = room_.file.results / "objections.json";
+  fs::create_directory(kept);  // cannot be replaced
+  write_text(kept / "x", "");
+  room_.source.bring(xray("P", "P3",
+                          "Sch\xE4"
+                          "del",
+                          second_of(10, 20)));  // not UTF-8
+  room_.pass(5s);
+  EXPECT_THAT(room_.index(), HasSubstr("Trouble: comparing X-rays with results: "));
+  fs::remove_all(kept);
+  room_.pass(5s);
+  EXPECT_THAT(error_of_release("P"), HasSubstr("the patient has newer X-rays: Sch"));
 }
 
 // X-rays after which the couch may have moved, in every form in which they came through once.

@@ -1,0 +1,79 @@
+#include "workflow/batch/case_inputs.h"
+
+#include <fmt/format.h>
+
+#include <vector>
+
+#include "base/error.h"
+#include "base/json_file.h"
+#include "base/output_folder.h"
+#include "base/sha256.h"
+
+namespace isoshift {
+namespace {
+
+namespace fs = std::filesystem;
+
+// The files of the case but for those of a CT that is named by itself.
+std::vector<fs::path> files_beside_ct(const BatchCase& one) {
+  std::vector<fs::path> parts = one.parts.images;
+  for (const fs::path& part : {one.parts.study, one.parts.plan, one.parts.structures})
+    if (!part.empty()) parts.push_back(part);
+  return files_below(parts);
+}
+
+// Another text for another anatomy, number of doubts, or expected X-rays.
+std::string orders_of(const BatchCase& one) {
+  return fmt::format("{} {} {}\n", one.anatomy, one.parts.doubts.size(), one.xrays_sha256);
+}
+
+std::string contents_of_files(const std::vector<fs::path>& files) {
+  std::string all;
+  for (const fs::path& file : files) all += sha256_of_file(file) + "\n";
+  return all;
+}
+
+}  // namespace
+
+std::string CaseInputs::quick_of(const BatchCase& one) const {
+  std::string all = orders_of(one);
+  for (const auto& files : {files_beside_ct(one), files_below(one.parts.ct)})
+    for (const fs::path& file : files)
+      all += fmt::format("{} {} {}\n", file.filename().string(), fs::file_size(file),
+                         fs::last_write_time(file).time_since_epoch().count());
+  return sha256_of(all);
+}
+
+std::string CaseInputs::contents_of(const BatchCase& one) {
+  std::string& ct = contents_of_ct_[one.ct_key()];
+  if (ct.empty()) ct = contents_of_files(files_below(one.parts.ct)) + "CT\n";
+  return sha256_of(orders_of(one) + contents_of_files(files_beside_ct(one)) + ct);
+}
+
+std::optional<CaseInputs::Note> CaseInputs::note_of(const BatchCase& one) const {
+  if (!fs::exists(file_of(one))) return std::nullopt;
+  const nlohmann::json json = read_json_file(file_of(one)).json;
+  try {
+    return Note{.quick = json.at("quick"), .contents = json.at("contents")};
+  } catch (const nlohmann::json::exception&) {
+    throw Error(fmt::format("{}: is not a note of isoshift batch. Remove it", file_of(one).string()));
+  }
+}
+
+bool CaseInputs::renew(const BatchCase& one, bool has_ended) {
+  const std::optional<Note> before = note_of(one);
+  Note now;
+  try {
+    now.quick = quick_of(one);
+    if (before && before->quick == now.quick) return false;
+    now.contents = contents_of(one);
+  } catch (const std::exception&) {
+    if (has_ended) return false;
+    now = {};  // the registration says which file is missing; once that is there, the case has changed
+  }
+  fs::create_directories(folder_);
+  replace_text(file_of(one), nlohmann::ordered_json{{"quick", now.quick}, {"contents", now.contents}}.dump() + "\n");
+  return has_ended && before && before->contents != now.contents;
+}
+
+}  // namespace isoshift
