@@ -34,8 +34,9 @@ std::string to_string(const PixelIntensity& intensity);
 // lengths in mm.
 struct RtImage {
   std::filesystem::path path;
-  std::string sha256;  // of the file, where it was read whole
-  int frame = 0;       // of the file, counted from 0
+  std::string sha256;        // of the file, where it was read whole
+  int frame = 0;             // of the file, counted from 0
+  bool has_own_time = true;  // false: a later frame of a file that does not say when it was taken
   Identity identity;
   std::string sop_class_uid;
   std::string sop_instance_uid;
@@ -52,7 +53,6 @@ struct RtImage {
   std::optional<std::string> acquisition_time;  // of the same attribute as the date
   std::optional<int> utc_offset_min;            // east of Greenwich; unset: the file does not say
   double frame_offset_s = 0.0;                  // of a later frame, from the first one
-  bool has_own_time = true;                     // false: a later frame of a file that does not say when it was taken
   std::optional<double> kvp;
 
   std::optional<std::string> plane;
