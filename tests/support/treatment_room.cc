@@ -79,6 +79,11 @@ void FakeSource::take(const std::string& patient_id, const std::string& uid, con
   if (here_.insert(uid).second) merge(object, patient.files);
 }
 
+void FakeSource::lose(const std::string& patient_id, const std::set<std::string>& uids) {
+  std::erase_if(patients_.at(patient_id).files.images,
+                [&](const StudyFiles::Image& image) { return uids.contains(image.sop_instance_uid); });
+}
+
 void FakeSource::update(Notes& /*notes*/) {
   if (is_down_) throw Error("the server is down");
   for (const std::string& patient_id : std::exchange(asked_, {}))

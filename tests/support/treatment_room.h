@@ -53,7 +53,8 @@ class FakeSource : public Source {
 
   std::vector<std::string> broken;  // messages on files that cannot be read
 
-  void bring(const StudyFiles& object);  // comes with the next update
+  void bring(const StudyFiles& object);                                         // comes with the next update
+  void lose(const std::string& patient_id, const std::set<std::string>& uids);  // X-rays
   void set_down(bool is_down) { is_down_ = is_down; }
   void set_coming(bool is_coming) { is_coming_ = is_coming; }
 

@@ -14,12 +14,15 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// The files of the case but for those of a CT that is named by itself.
-std::vector<fs::path> files_beside_ct(const BatchCase& one) {
+// The files of the case but for those of a CT that is named by itself, and for the batch's own.
+std::vector<fs::path> files_beside_ct(const BatchCase& one, const fs::path& batch) {
   std::vector<fs::path> parts = one.parts.images;
   for (const fs::path& part : {one.parts.study, one.parts.plan, one.parts.structures})
     if (!part.empty()) parts.push_back(part);
-  return files_below(parts);
+  std::vector<fs::path> files = files_below(parts);
+  const std::string own = fs::weakly_canonical(batch).string() + "/";
+  std::erase_if(files, [&](const fs::path& file) { return fs::weakly_canonical(file).string().starts_with(own); });
+  return files;
 }
 
 // Another text for another anatomy, number of doubts, or expected X-rays.
@@ -37,7 +40,7 @@ std::string contents_of_files(const std::vector<fs::path>& files) {
 
 std::string CaseInputs::quick_of(const BatchCase& one) const {
   std::string all = orders_of(one);
-  for (const auto& files : {files_beside_ct(one), files_below(one.parts.ct)})
+  for (const auto& files : {files_beside_ct(one, folder_.parent_path()), files_below(one.parts.ct)})
     for (const fs::path& file : files)
       all += fmt::format("{} {} {}\n", file.filename().string(), fs::file_size(file),
                          fs::last_write_time(file).time_since_epoch().count());
@@ -47,7 +50,7 @@ std::string CaseInputs::quick_of(const BatchCase& one) const {
 std::string CaseInputs::contents_of(const BatchCase& one) {
   std::string& ct = contents_of_ct_[one.ct_key()];
   if (ct.empty()) ct = contents_of_files(files_below(one.parts.ct)) + "CT\n";
-  return sha256_of(orders_of(one) + contents_of_files(files_beside_ct(one)) + ct);
+  return sha256_of(orders_of(one) + contents_of_files(files_beside_ct(one, folder_.parent_path())) + ct);
 }
 
 std::optional<CaseInputs::Note> CaseInputs::note_of(const BatchCase& one) const {

@@ -28,10 +28,39 @@ void Objections::add_result(const std::string& session, const SetupResult& resul
   std::set<Xray>& own = patient.results[session];
   for (const SetupResult::View& view : result.views) {
     own.emplace(view.sop_instance_uid, view.acquired);
+    patient_of_uid_[view.sop_instance_uid] = result.identity.patient_id;
     // If its file has been seen, that tells more.
     patient.xrays.try_emplace(Xray(view.sop_instance_uid, view.acquired),
                               Seen{.label = view.label, .moment = {.local_s = seconds_of(view.acquired)}});
   }
+}
+
+void Objections::see(const std::string& patient_id, const StudyFiles& files) {
+  OfPatient& patient = patients_[patient_id];
+  for (const auto* images : {&files.images, &files.other_xrays})
+    for (const StudyFiles::Image& image : *images) {
+      const auto known = patient_of_uid_.find(image.sop_instance_uid);
+      if (known != patient_of_uid_.end() && known->second != patient_id) {
+        OfPatient same = std::exchange(patients_[known->second], {});
+        for (const auto& [session, own] : same.results)
+          for (const auto& [uid, acquired] : own) patient_of_uid_[uid] = patient_id;
+        patient.results.merge(same.results);
+        patient.xrays.merge(same.xrays);
+      }
+      patient.xrays[Xray(image.sop_instance_uid, image.acquired)] = {
+          .label = image.label,
+          .moment = {
+              .at_s = image.at_s, .local_s = seconds_of(image.acquired), .has_utc_offset = image.has_utc_offset}};
+    }
+}
+
+bool Objections::has_lost_xrays(const OfPatient& patient, const StudyFiles* files) {
+  if (files == nullptr) return true;
+  std::set<Xray> here;
+  for (const auto* images : {&files->images, &files->other_xrays})
+    for (const StudyFiles::Image& image : *images) here.emplace(image.sop_instance_uid, image.acquired);
+  return std::ranges::any_of(
+      patient.xrays, [&](const auto& one) { return one.second.moment.has_utc_offset && !here.contains(one.first); });
 }
 
 void Objections::update(const std::map<std::string, Patient>& patients, const std::set<std::string>& registered) {
@@ -40,20 +69,19 @@ void Objections::update(const std::map<std::string, Patient>& patients, const st
     if (patient.looked_at == arrived.last) continue;
     patient.looked_at = arrived.last;
     patient.is_news = true;
-    for (const auto* images : {&arrived.files.images, &arrived.files.other_xrays})
-      for (const StudyFiles::Image& image : *images)
-        patient.xrays[Xray(image.sop_instance_uid, image.acquired)] = {
-            .label = image.label,
-            .moment = {
-                .at_s = image.at_s, .local_s = seconds_of(image.acquired), .has_utc_offset = image.has_utc_offset}};
+    see(patient_id, arrived.files);
   }
   for (auto& [patient_id, patient] : patients_) {
     if (!std::exchange(patient.is_news, false)) continue;
     const auto arrived = patients.find(patient_id);
     const StudyFiles* files = arrived == patients.end() ? nullptr : &arrived->second.files;
-    for (const auto& [session, own] : patient.results)
-      if (Objection found = objection(patient, own, files, registered); !found.words.empty())
-        by_session_[session] = std::move(found);
+    const bool has_lost = has_lost_xrays(patient, files);
+    for (const auto& [session, own] : patient.results) {
+      Objection found = objection(patient, own, files, registered);
+      const auto earlier = by_session_.find(session);
+      const bool is_final = has_lost && earlier != by_session_.end() && !earlier->second.newer_have_results;
+      if (!found.words.empty() && !is_final) by_session_[session] = std::move(found);
+    }
   }
 }
 

@@ -25,7 +25,7 @@ class Objections {
   // Looks at the X-rays that have arrived, by PatientID. `registered`: the SOPInstanceUIDs of those that have a result.
   void update(const std::map<std::string, Patient>& patients, const std::set<std::string>& registered);
 
-  // An objection is never withdrawn: X-rays that are moved away have been taken all the same.
+  // An objection is never withdrawn, and not weakened once an X-ray has gone: it has been taken all the same.
   const std::map<std::string, Objection>& by_session() const { return by_session_; }
 
  private:
@@ -46,6 +46,11 @@ class Objections {
     std::optional<Clock::Time> looked_at;           // Patient::last at that time
     bool is_news = false;                           // files or results that were not compared yet
   };
+  // Notes the X-rays. Takes over what is known of a result of one of them: a PatientID outside ASCII may read
+  // differently in a result than in a file.
+  void see(const std::string& patient_id, const StudyFiles& files);
+  // Whether X-rays whose files were seen are not among the files any more.
+  static bool has_lost_xrays(const OfPatient& patient, const StudyFiles* files);
   static bool may_be_later(const Moment& moment, const Moment& than);
   static Objection newer_xrays(const OfPatient& patient, const std::set<Xray>& own,
                                const std::set<std::string>& registered);
@@ -54,7 +59,8 @@ class Objections {
 
   std::map<std::string, Objection> by_session_;
   bool takes_other_xrays_;
-  std::map<std::string, OfPatient> patients_;  // by PatientID
+  std::map<std::string, OfPatient> patients_;          // by PatientID
+  std::map<std::string, std::string> patient_of_uid_;  // PatientID, by the SOPInstanceUID of an X-ray that has a result
 };
 
 }  // namespace isoshift

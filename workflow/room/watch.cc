@@ -134,7 +134,7 @@ void Watch::take_result(const std::string& session, const std::optional<Running>
   if (made) parts_.observer.say(fmt::format("session {}: {}", session, to_string(report.verdict)));
   if (made && watch_.site.automatic_release && report.verdict == Verdict::kAccepted && obstacle.empty() &&
       reason.empty())
-    accepted_[session] = {.patient_id = report.identity.patient_id, .parts = made->parts};
+    accepted_[session] = {.patient_id = made->patient_id, .parts = made->parts};
 }
 
 // Why the site's rule does not release an accepted result. Empty: it may, or there is no such rule.
@@ -225,6 +225,7 @@ void Watch::begin_registration(const Complete& complete) {
     const auto names_plan = [](const StudyFiles::Image& image) { return !image.plan_uid.empty(); };
     running_ = Running{.session = session,
                        .news = complete.last,
+                       .patient_id = patient_id_of(complete.session.patient),
                        .parts = std::move(parts),
                        .names_plan = std::ranges::all_of(complete.session.images, names_plan)};
   } catch (const std::exception& error) {
@@ -236,7 +237,8 @@ void Watch::end_registration() {
   const std::optional<Runner::End> end = parts_.runner.end();
   if (!end) return;
   const std::optional<Running> made = std::exchange(running_, std::nullopt);
-  const auto& [session, news, parts, names_plan] = *made;
+  const std::string& session = made->session;
+  const Clock::Time news = made->news;
   try {
     if (end->failure) {
       fail(session, news, *end->failure);

@@ -64,7 +64,8 @@ class Watch {
  private:
   struct Running {
     std::string session;
-    Clock::Time news;  // when the patient's last file had arrived, as the registration began
+    Clock::Time news;        // when the patient's last file had arrived, as the registration began
+    std::string patient_id;  // in the source
     StudyParts parts;
     bool names_plan = false;  // all X-rays do
   };
