@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <functional>
 #include <iterator>
 #include <map>
@@ -141,10 +142,10 @@ class Doubts {
     for (const StudyFiles::Image* const one : of_patient_.at(patient_id_of(session.patient))) {
       const StudyFiles::Image& other = *one;
       if (is_in(session, other)) continue;
-      if (!other.at_s) {
+      if (!is_comparable(own.front(), other)) {
         if (has_label(own, other.label))
-          doubts.push_back(
-              fmt::format("{} shows {}, too, and when it was taken is not known", other.file.string(), other.label));
+          doubts.push_back(fmt::format("{} shows {}, too, and whether it was taken before or after is not known",
+                                       other.file.string(), other.label));
       } else if (is_copy_of_one(own, other)) {
         continue;
       } else if (*other.at_s > *own.front().at_s && *other.at_s < *own.back().at_s) {
@@ -166,6 +167,14 @@ class Doubts {
   static bool is_in(const SessionFiles& session, const StudyFiles::Image& image) {
     return std::ranges::find(session.images, image.sop_instance_uid, &StudyFiles::Image::sop_instance_uid) !=
            session.images.end();
+  }
+
+  // Whether the times tell which was taken first: not if one of them is unknown, or has an offset from UTC where the
+  // other has none, which may be 14 hours.
+  static bool is_comparable(const StudyFiles::Image& a, const StudyFiles::Image& b) {
+    constexpr double kLargestOffsetS = 14 * 3600.0;
+    return a.at_s && b.at_s &&
+           (a.has_utc_offset == b.has_utc_offset || std::abs(*a.at_s - *b.at_s) > kLargestOffsetS + kMaxTimeSpanS);
   }
 
   // Whether the X-ray may be a copy of one of `own` in another class: it has that time, and no label.
@@ -194,6 +203,13 @@ class Doubts {
     for (std::size_t n = 1; n < own.size(); ++n) longest_s = std::max(longest_s, *own[n].at_s - *own[n - 1].at_s);
     const double before_s = before != nullptr ? *own.front().at_s - *before->at_s : kMaxTimeSpanS + 1.0;
     const double after_s = after != nullptr ? *after->at_s - *own.back().at_s : kMaxTimeSpanS + 1.0;
+    // Two X-rays that follow each other closely are of one setup rather than two that do not.
+    constexpr double kClearlyNearer = 0.5;
+    for (const auto& [other, apart_s, when] :
+         {std::tuple(before, before_s, "before"), std::tuple(after, after_s, "after")})
+      if (apart_s < kClearlyNearer * longest_s)
+        return fmt::format("{}, {:.0f} s {}, lies nearer to one of these views than they lie to each other",
+                           other->file.string(), apart_s, when);
     const bool lacks_before = before_s <= kMaxTimeSpanS && is_incomplete(*before, own);
     const bool lacks_after = after_s <= kMaxTimeSpanS && is_incomplete(*after, own);
     if (lacks_before && (lacks_after || before_s <= kMuchLonger * longest_s))

@@ -42,7 +42,7 @@ std::string CaseInputs::quick_of(const BatchCase& one) const {
   std::string all = orders_of(one);
   for (const auto& files : {files_beside_ct(one, folder_.parent_path()), files_below(one.parts.ct)})
     for (const fs::path& file : files)
-      all += fmt::format("{} {} {}\n", file.filename().string(), fs::file_size(file),
+      all += fmt::format("{} {} {}\n", file.string(), fs::file_size(file),
                          fs::last_write_time(file).time_since_epoch().count());
   return sha256_of(all);
 }

@@ -23,7 +23,7 @@ class CaseInputs {
 
  private:
   struct Note {
-    std::string quick;  // names, sizes and times of the files: if it is the same, the contents are not read again
+    std::string quick;  // paths, sizes and times of the files: if it is the same, the contents are not read again
     std::string contents;
   };
   std::optional<Note> note_of(const BatchCase& one) const;

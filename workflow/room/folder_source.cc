@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <fstream>
 #include <vector>
 
@@ -14,6 +15,15 @@ namespace isoshift {
 namespace fs = std::filesystem;
 
 namespace {
+
+// Programs that copy may make the file whole first, and fill it then.
+bool begins_with_zeros(const fs::path& file) {
+  constexpr std::size_t kBeforeData = 132;  // PS3.10 7.1
+  std::array<char, kBeforeData> begin;
+  std::ifstream stream(file, std::ios::binary);
+  stream.read(begin.data(), begin.size());
+  return std::all_of(begin.begin(), begin.begin() + stream.gcount(), [](char c) { return c == 0; });
+}
 
 std::string cannot_be_opened(const fs::path& path) { return fmt::format("{}: cannot be opened", path.string()); }
 
@@ -85,13 +95,14 @@ void FolderSource::look_at(const fs::path& file, std::map<fs::path, Growing>& st
     return;
   }
   unopened_.erase(file);
-  if (version.size > 0 && !begins_like_dicom(file)) {
+  const bool is_not_filled = version.size > 0 && begins_with_zeros(file);
+  if (version.size > 0 && !is_not_filled && !begins_like_dicom(file)) {
     done_[file] = version;
     read_again(files_.forget(file));
     return;
   }
   const auto before = growing_.find(file);
-  if (before != growing_.end() && before->second.version == version) {
+  if (before != growing_.end() && before->second.version == version && !is_not_filled) {
     done_[file] = version;
     read_again(files_.take(file, notes).copies);
     return;

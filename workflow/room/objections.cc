@@ -49,18 +49,10 @@ void Objections::see(const std::string& patient_id, const StudyFiles& files) {
       }
       patient.xrays[Xray(image.sop_instance_uid, image.acquired)] = {
           .label = image.label,
-          .moment = {
-              .at_s = image.at_s, .local_s = seconds_of(image.acquired), .has_utc_offset = image.has_utc_offset}};
+          .moment = {.at_s = image.at_s, .local_s = seconds_of(image.acquired), .has_utc_offset = image.has_utc_offset},
+          .image = image,
+          .is_rt_image = images == &files.images};
     }
-}
-
-bool Objections::has_lost_xrays(const OfPatient& patient, const StudyFiles* files) {
-  if (files == nullptr) return true;
-  std::set<Xray> here;
-  for (const auto* images : {&files->images, &files->other_xrays})
-    for (const StudyFiles::Image& image : *images) here.emplace(image.sop_instance_uid, image.acquired);
-  return std::ranges::any_of(
-      patient.xrays, [&](const auto& one) { return one.second.moment.has_utc_offset && !here.contains(one.first); });
 }
 
 void Objections::update(const std::map<std::string, Patient>& patients, const std::set<std::string>& registered) {
@@ -73,16 +65,18 @@ void Objections::update(const std::map<std::string, Patient>& patients, const st
   }
   for (auto& [patient_id, patient] : patients_) {
     if (!std::exchange(patient.is_news, false)) continue;
-    const auto arrived = patients.find(patient_id);
-    const StudyFiles* files = arrived == patients.end() ? nullptr : &arrived->second.files;
-    const bool has_lost = has_lost_xrays(patient, files);
     for (const auto& [session, own] : patient.results) {
-      Objection found = objection(patient, own, files, registered);
+      Objection found = objection(patient, own, registered);
       const auto earlier = by_session_.find(session);
-      const bool is_final = has_lost && earlier != by_session_.end() && !earlier->second.newer_have_results;
+      const bool is_final =  // of an earlier run, which has seen more
+          earlier != by_session_.end() && !earlier->second.newer_have_results && !are_seen(patient, own);
       if (!found.words.empty() && !is_final) by_session_[session] = std::move(found);
     }
   }
+}
+
+bool Objections::are_seen(const OfPatient& patient, const std::set<Xray>& own) {
+  return std::ranges::all_of(own, [&](const Xray& xray) { return patient.xrays.at(xray).image.has_value(); });
 }
 
 // Times with and without an offset from UTC may be 14 hours apart at the same moment.
@@ -115,20 +109,17 @@ Objection Objections::newer_xrays(const OfPatient& patient, const std::set<Xray>
           .newer_have_results = have_results && !acquired.empty()};
 }
 
-Objection Objections::objection(const OfPatient& patient, const std::set<Xray>& own, const StudyFiles* files,
+Objection Objections::objection(const OfPatient& patient, const std::set<Xray>& own,
                                 const std::set<std::string>& registered) const {
-  std::set<std::string> uids;
-  bool are_here = files != nullptr;
-  for (const auto& [uid, acquired] : own) {
-    const auto has_uid = [&](const StudyFiles::Image& image) { return image.sop_instance_uid == uid; };
-    are_here =
-        are_here && (std::ranges::any_of(files->images, has_uid) || std::ranges::any_of(files->other_xrays, has_uid));
-    uids.insert(uid);
-  }
   Objection found = newer_xrays(patient, own, registered);
-  if (are_here)
-    if (const std::string words = objection_to(uids, *files, takes_other_xrays_, registered); !words.empty())
-      found = {.words = found.words + (found.words.empty() ? "" : "; ") + words};
+  if (!are_seen(patient, own)) return found;
+  StudyFiles all;
+  for (const auto& [xray, seen] : patient.xrays)
+    if (seen.image) (seen.is_rt_image ? all.images : all.other_xrays).push_back(*seen.image);
+  std::set<std::string> uids;
+  for (const auto& [uid, acquired] : own) uids.insert(uid);
+  if (const std::string words = objection_to(uids, all, takes_other_xrays_, registered); !words.empty())
+    found = {.words = found.words + (found.words.empty() ? "" : "; ") + words};
   return found;
 }
 

@@ -25,7 +25,7 @@ class Objections {
   // Looks at the X-rays that have arrived, by PatientID. `registered`: the SOPInstanceUIDs of those that have a result.
   void update(const std::map<std::string, Patient>& patients, const std::set<std::string>& registered);
 
-  // An objection is never withdrawn, and not weakened once an X-ray has gone: it has been taken all the same.
+  // An objection is never withdrawn, and X-rays that are moved away count on: they have been taken all the same.
   const std::map<std::string, Objection>& by_session() const { return by_session_; }
 
  private:
@@ -39,6 +39,8 @@ class Objections {
   struct Seen {
     std::string label;
     Moment moment;
+    std::optional<StudyFiles::Image> image;  // unset: only a result tells of it
+    bool is_rt_image = true;
   };
   struct OfPatient {
     std::map<Xray, Seen> xrays;
@@ -49,12 +51,11 @@ class Objections {
   // Notes the X-rays. Takes over what is known of a result of one of them: a PatientID outside ASCII may read
   // differently in a result than in a file.
   void see(const std::string& patient_id, const StudyFiles& files);
-  // Whether X-rays whose files were seen are not among the files any more.
-  static bool has_lost_xrays(const OfPatient& patient, const StudyFiles* files);
   static bool may_be_later(const Moment& moment, const Moment& than);
   static Objection newer_xrays(const OfPatient& patient, const std::set<Xray>& own,
                                const std::set<std::string>& registered);
-  Objection objection(const OfPatient& patient, const std::set<Xray>& own, const StudyFiles* files,
+  static bool are_seen(const OfPatient& patient, const std::set<Xray>& own);
+  Objection objection(const OfPatient& patient, const std::set<Xray>& own,
                       const std::set<std::string>& registered) const;
 
   std::map<std::string, Objection> by_session_;

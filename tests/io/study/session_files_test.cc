@@ -132,7 +132,7 @@ TEST(Sessions, AnXrayBetweenTheViewsMakesThemDoubtful) {
   EXPECT_THAT(doubts_of({ap, image("b", "AP", 40, "P", "2"), lat}), ElementsAre(HasSubstr("between these views")));
   EXPECT_THAT(doubts_of({ap, lat}, {image("b", "AP", 40)}), ElementsAre(HasSubstr("between these views")));
   EXPECT_THAT(doubts_of({ap, image("b", "AP", std::nullopt), lat}),
-              ElementsAre(HasSubstr("/x/b shows AP, too, and when it was taken is not known")));
+              ElementsAre(HasSubstr("/x/b shows AP, too, and whether it was taken before or after is not known")));
   EXPECT_THAT(doubts_of({ap, image("b", "AP", 40, "Q"), lat}), testing::IsEmpty());
   StudyFiles::Image at_couch = at_table(ap, -150), too = at_table(lat, -150);
   at_couch.table.longitudinal_mm = too.table.longitudinal_mm = 812.0;
@@ -149,6 +149,27 @@ TEST(Sessions, ACopyOfAViewIsNoEvidence) {
   EXPECT_THAT(sessions_of(files, false).at(0).doubts, testing::IsEmpty());
   files.other_xrays = {image("d", "", 61)};
   EXPECT_THAT(sessions_of(files, false).at(0).doubts, testing::SizeIs(1));
+}
+
+TEST(Sessions, TimesOfTwoKindsAreNotCompared) {
+  StudyFiles files;
+  files.images = {image("a", "AP", 0), image("b", "LAT", 60)};
+  files.other_xrays = {image("c", "AP", -7150)};  // two hours east of Greenwich: between the views
+  files.other_xrays[0].has_utc_offset = true;
+  EXPECT_THAT(sessions_of(files, false).at(0).doubts,
+              testing::ElementsAre(testing::HasSubstr("whether it was taken before or after is not known")));
+  files.other_xrays[0].at_s = -24 * 3600.0;
+  EXPECT_THAT(sessions_of(files, false).at(0).doubts, testing::IsEmpty());
+}
+
+// AP, the couch moves, LAT, and soon after it AP and LAT.
+TEST(Sessions, AViewThatLiesNearerToOthersThanToItsOwnIsDoubtful) {
+  StudyFiles files;
+  files.images = {image("a", "AP", 0), image("b", "LAT", 50), image("c", "AP", 60), image("d", "LAT", 65)};
+  const std::vector<SessionFiles> sessions = sessions_of(files, false);
+  ASSERT_EQ(sessions.size(), 2U);
+  EXPECT_THAT(sessions[0].doubts, testing::ElementsAre(testing::HasSubstr("/x/c, 10 s after, lies nearer to one of")));
+  EXPECT_THAT(sessions[1].doubts, testing::IsEmpty());
 }
 
 // Two setups whose X-rays all have the time of the export: which AP goes with which LAT is a guess.

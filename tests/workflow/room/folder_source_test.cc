@@ -55,6 +55,15 @@ TEST_F(FolderSourceTest, AFileThatGrowsIsNotTakenYet) {
   EXPECT_TRUE(is_coming());
 }
 
+TEST_F(FolderSourceTest, AFileThatIsStillZerosIsOnItsWay) {
+  std::ofstream(in_ / "plan2.dcm") << std::string(1000, '\0');
+  settle();
+  EXPECT_TRUE(is_coming());
+  fs::copy_file(study_.image(0), in_ / "plan2.dcm", fs::copy_options::overwrite_existing);
+  settle();
+  EXPECT_FALSE(is_coming());
+}
+
 TEST_F(FolderSourceTest, WhatIsOfSomebodyElseOrNoDicomIsNotWaitedFor) {
   std::ofstream(in_ / "export.log") << "exported";
   fs::copy(study_.plan(), in_ / "other.dcm");
