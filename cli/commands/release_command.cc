@@ -65,6 +65,10 @@ void run_release(const std::filesystem::path& file, const std::string& session, 
                                                      : fmt::format("{}", fmt::join(release.peers, ", ")));
   if (release.objects.size() == 1) console.out << "the session holds no registration object\n";
   const auto lock = tree.try_lock();
+  if (lock)
+    console.err
+        << "warning: isoshift watch is not running: whether other X-rays speak against this result is known only "
+           "up to when it last ran\n";
   ConsoleObserver observer(console);
   SystemClock clock;
   DicomSender sender;

@@ -86,10 +86,12 @@ bool Batch::register_all() {
     }
     ended_before += folder_.has_ended(one.name) ? 1 : 0;
     observer_.progress("Comparing files of cases", ++compared, cases_.size());
-    if (!folder_.has_ended(one.name) && !has_xrays_of_manifest(one))
+    if (!folder_.has_ended(one.name) && !has_xrays_of_manifest(one)) {
       folder_.fail(one.name,
                    "its X-rays are not those for which the manifest was written (xrays_sha256). Write the manifest "
                    "again with --scan; or empty that cell, if you have chosen other X-rays");
+      inputs.note_nothing(one);
+    }
     if (!folder_.has_ended(one.name))
       jobs.push_back({.name = one.name,
                       .ct_key = one.ct_key(),

@@ -71,6 +71,10 @@ ShardLock BatchFolder::work_on(const Shard& shard, const std::vector<BatchCase>&
 }
 
 void BatchFolder::set_aside(const std::string& name) const {
+  if (!fs::exists(folder_of(name) / kResultFile)) {  // an error is no result
+    fs::remove_all(folder_of(name));
+    return;
+  }
   const fs::path folder = path_ / "superseded";
   fs::create_directories(folder);
   fs::path to = folder / name;

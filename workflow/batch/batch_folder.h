@@ -36,7 +36,7 @@ class BatchFolder {
   std::filesystem::path folder_of(const std::string& name) const { return path_ / "cases" / name; }
   bool has_ended(const std::string& name) const { return std::filesystem::exists(folder_of(name)); }
 
-  // Moves the result of a case to superseded/.
+  // Moves the result of a case to superseded/; of a failed case, removes the error.
   void set_aside(const std::string& name) const;
   // Moves the results of which an X-ray is in another case now to superseded/. Returns their names.
   std::vector<std::string> set_aside_regrouped(const std::vector<BatchCase>& cases) const;

@@ -25,10 +25,8 @@ std::vector<fs::path> files_beside_ct(const BatchCase& one, const fs::path& batc
   return files;
 }
 
-// Another text for another anatomy, number of doubts, or expected X-rays.
-std::string orders_of(const BatchCase& one) {
-  return fmt::format("{} {} {}\n", one.anatomy, one.parts.doubts.size(), one.xrays_sha256);
-}
+// Another text for another anatomy or number of doubts.
+std::string orders_of(const BatchCase& one) { return fmt::format("{} {}\n", one.anatomy, one.parts.doubts.size()); }
 
 std::string contents_of_files(const std::vector<fs::path>& files) {
   std::string all;
@@ -63,6 +61,13 @@ std::optional<CaseInputs::Note> CaseInputs::note_of(const BatchCase& one) const 
   }
 }
 
+void CaseInputs::write(const BatchCase& one, const Note& note) const {
+  fs::create_directories(folder_);
+  replace_text(file_of(one), nlohmann::ordered_json{{"quick", note.quick}, {"contents", note.contents}}.dump() + "\n");
+}
+
+void CaseInputs::note_nothing(const BatchCase& one) const { write(one, {}); }
+
 bool CaseInputs::renew(const BatchCase& one, bool has_ended) {
   const std::optional<Note> before = note_of(one);
   Note now;
@@ -74,8 +79,7 @@ bool CaseInputs::renew(const BatchCase& one, bool has_ended) {
     if (has_ended) return false;
     now = {};  // the registration says which file is missing; once that is there, the case has changed
   }
-  fs::create_directories(folder_);
-  replace_text(file_of(one), nlohmann::ordered_json{{"quick", now.quick}, {"contents", now.contents}}.dump() + "\n");
+  write(one, now);
   return has_ended && before && before->contents != now.contents;
 }
 

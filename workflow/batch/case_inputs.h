@@ -20,6 +20,8 @@ class CaseInputs {
   // other contents of its files, with another number of doubts, or for another anatomy. If a file of a case that has
   // ended is gone, its note stays. Throws Error if the note cannot be written.
   bool renew(const BatchCase& one, bool has_ended);
+  // Notes that the case was not registered from its files: the next renew() finds them changed.
+  void note_nothing(const BatchCase& one) const;
 
  private:
   struct Note {
@@ -27,6 +29,7 @@ class CaseInputs {
     std::string contents;
   };
   std::optional<Note> note_of(const BatchCase& one) const;
+  void write(const BatchCase& one, const Note& note) const;
   std::filesystem::path file_of(const BatchCase& one) const { return folder_ / (one.name + ".json"); }
   std::string quick_of(const BatchCase& one) const;
   std::string contents_of(const BatchCase& one);

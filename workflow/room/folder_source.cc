@@ -95,8 +95,8 @@ void FolderSource::look_at(const fs::path& file, std::map<fs::path, Growing>& st
     return;
   }
   unopened_.erase(file);
-  const bool is_not_filled = version.size > 0 && begins_with_zeros(file);
-  if (version.size > 0 && !is_not_filled && !begins_like_dicom(file)) {
+  const bool is_not_filled = version.size == 0 || begins_with_zeros(file);
+  if (!is_not_filled && !begins_like_dicom(file)) {
     done_[file] = version;
     read_again(files_.forget(file));
     return;

@@ -347,7 +347,15 @@ ResultsTree::Pending ResultsTree::pending() {
 }
 
 fs::path ResultsTree::checked_file(const Delivery& delivery) const {
-  if (!release_of(delivery.session)) throw Error(fmt::format("session {}: is not released any more", delivery.session));
+  const auto release = release_of(delivery.session);
+  if (!release) throw Error(fmt::format("session {}: is not released any more", delivery.session));
+  const std::map<std::string, Objection> all = objections();
+  if (const auto said = all.find(delivery.session);
+      said != all.end() && !said->second.newer_have_results && release->despite.empty())
+    throw Error(fmt::format(
+        "session {}: since its release, {}. To send it all the same, remove {} and release the session again "
+        "with --despite-other-xrays",
+        delivery.session, said->second.words, release_file(delivery.session).string()));
   const SessionRecord record = checked(delivery.session);
   const auto registered = record.files.find(delivery.object.file);
   fs::path file = session(delivery.session) / delivery.object.file;

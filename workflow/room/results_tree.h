@@ -114,7 +114,8 @@ class ResultsTree {
   // the newest last. A session whose objects have all been delivered is not read again.
   Pending pending();
   std::vector<Delivery> pending_of(const Release& release) const;
-  // The file to send. Throws Error if it is no longer released, or if its session has changed since its registration.
+  // The file to send. Throws Error if it is no longer released, if its session has changed since its registration, or
+  // if other X-rays have come to speak against it since its release.
   std::filesystem::path checked_file(const Delivery& delivery) const;
   // Writes the mark, which mark_sent() then only renames: if the disk is full, the object is not sent, since it could
   // not be marked.

@@ -100,6 +100,21 @@ TEST_F(WatchReleases, AnObjectionReachesTheDiskWhateverItHoldsAndHoweverLate) {
   EXPECT_THAT(error_of_release("P"), HasSubstr("the patient has newer X-rays: Sch"));
 }
 
+TEST_F(WatchReleases, WhatIsSpokenAgainstBeforeItIsSentIsNotSent) {
+  room_.start();
+  bring("P");
+  room_.pass(60s);
+  room_.sender.down = {"record", "archive"};
+  release("P");
+  room_.pass(5s);
+  room_.source.bring(xray("P", "P3", "AP", second_of(10, 15, 5)));
+  room_.pass(5s);
+  room_.sender.down.clear();
+  room_.pass(600s);
+  EXPECT_THAT(room_.sender.stored(), testing::IsEmpty());
+  EXPECT_THAT(room_.sending.lines, testing::Contains(HasSubstr("since its release, together with X-rays that")));
+}
+
 // What speaks against a result is not forgotten for a newer result.
 TEST_F(WatchReleases, AnObjectionIsNotWeakenedByXraysThatGo) {
   room_.start();
