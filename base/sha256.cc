@@ -28,4 +28,10 @@ std::string sha256_of_file(const std::filesystem::path& path) {
   return sha256_of(content.view());
 }
 
+std::string sha256_of_files(const std::vector<std::filesystem::path>& paths) {
+  std::string all;
+  for (const std::filesystem::path& path : paths) all += sha256_of_file(path);
+  return sha256_of(all);
+}
+
 }  // namespace isoshift

@@ -50,6 +50,11 @@ class Checker {
  private:
   void error(std::string text) { result_.error(std::move(text)); }
   void note(std::string text) { result_.note(std::move(text)); }
+  // An error that leaves more than one meaning to the object.
+  void ambiguous(std::string text) {
+    error(std::move(text));
+    means_one_matrix_ = false;
+  }
 
   // The value of a UI attribute; a finding where it is missing or malformed.
   std::string uid_of(const DicomItem& item, const DcmTagKey& tag, const std::string& name) {
@@ -95,10 +100,8 @@ class Checker {
         error(
             "item 1: is not the registered frame with an exact identity. Readers that take the second item for the "
             "result, or pair items with series by their order, take the wrong one");
-      if (!is_identity && frame == result_.registered_frame_uid) {
-        error(fmt::format("{}: moves the registered frame against itself", name));
-        means_one_matrix_ = false;
-      }
+      if (!is_identity && frame == result_.registered_frame_uid)
+        ambiguous(fmt::format("{}: moves the registered frame against itself", name));
       check_places(items[n], name, frame, matrix->matrix());
       if (is_identity) continue;
       ++others;
@@ -106,16 +109,12 @@ class Checker {
       result_.source_frame_uid = frame;
       result_.source_is_that_of_images = !items[n].items(DCM_ReferencedImageSequence).empty();
     }
-    if (others > 1) {
-      error(fmt::format("{} items are not the identity. SlicerRT multiplies all matrices of a file", others));
-      means_one_matrix_ = false;
-    }
-    if (result_.registered_frame_uid == kIecFixedFrameUid) {
-      error(
+    if (others > 1)
+      ambiguous(fmt::format("{} items are not the identity. SlicerRT multiplies all matrices of a file", others));
+    if (result_.registered_frame_uid == kIecFixedFrameUid)
+      ambiguous(
           "dataset: registers the room (IEC 61217 Fixed), which is not the frame of a CT: the matrix takes the CT to "
           "the room");
-      means_one_matrix_ = false;
-    }
     if (!means_one_matrix_) result_.registered_from_source.reset();
     if (result_.source_frame_uid == kIecFixedFrameUid)
       note(
@@ -128,22 +127,18 @@ class Checker {
   // Whether the item contradicts an earlier one: no frame and no image lies in two places.
   void check_places(const DicomItem& item, const std::string& name, const std::string& frame,
                     const Eigen::Matrix4d& matrix) {
-    const auto contradiction = [&](std::string text) {
-      error(std::move(text));
-      means_one_matrix_ = false;
-    };
     const auto differs_from_earlier = [&](const std::string& uid) {
       constexpr double kRounding = 1e-6;  // of a DS
       return (matrix_of_.try_emplace(uid, matrix).first->second - matrix).cwiseAbs().maxCoeff() > kRounding;
     };
     if (frame == kIecFixedFrameUid && matrix == Eigen::Matrix4d::Identity())
-      contradiction(fmt::format("{}: says that the room (IEC 61217 Fixed) is the registered frame", name));
+      ambiguous(fmt::format("{}: says that the room (IEC 61217 Fixed) is the registered frame", name));
     if (!frame.empty() && frame != result_.registered_frame_uid && differs_from_earlier(frame))
-      contradiction(fmt::format("{}: gives the frame {} another matrix than an earlier item does", name, frame));
+      ambiguous(fmt::format("{}: gives the frame {} another matrix than an earlier item does", name, frame));
     for (const DicomItem& image : item.items(DCM_ReferencedImageSequence)) {
       const std::string uid = image.text(DCM_ReferencedSOPInstanceUID).value_or("");
       if (uid.empty() || !differs_from_earlier(uid)) continue;
-      contradiction(fmt::format("{}: gives the image {} another matrix than an earlier item does", name, uid));
+      ambiguous(fmt::format("{}: gives the image {} another matrix than an earlier item does", name, uid));
       break;
     }
   }

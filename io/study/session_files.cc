@@ -170,11 +170,11 @@ class Doubts {
   }
 
   // Whether the times tell which was taken first: not if one of them is unknown, or has an offset from UTC where the
-  // other has none, which may be 14 hours.
+  // other has none.
   static bool is_comparable(const StudyFiles::Image& a, const StudyFiles::Image& b) {
-    constexpr double kLargestOffsetS = 14 * 3600.0;
     return a.at_s && b.at_s &&
-           (a.has_utc_offset == b.has_utc_offset || std::abs(*a.at_s - *b.at_s) > kLargestOffsetS + kMaxTimeSpanS);
+           (a.has_utc_offset == b.has_utc_offset ||
+            std::abs(*a.at_s - *b.at_s) > StudyFiles::kLargestUtcOffsetS + kMaxTimeSpanS);
   }
 
   // Whether the X-ray may be a copy of one of `own` in another class: it has that time, and no label.
@@ -225,8 +225,8 @@ class Doubts {
   std::map<std::string, std::size_t> size_of_session_;                       // by SOPInstanceUID of its X-rays
 };
 
-// The lowest folder that holds all files, with a slash; empty if they lie in one folder, or have only the root in
-// common.
+// The lowest folder that holds all files, with a slash; empty unless each of several files has a folder of its own, and
+// these have more in common than the root.
 std::string folder_above(const std::vector<fs::path>& files) {
   std::set<fs::path> folders;
   for (const fs::path& file : files) folders.insert(file.parent_path());

@@ -30,6 +30,7 @@ struct StudyFiles {
     std::string frame_of_reference_uid;
     std::string structure_set_uid;  // ReferencedStructureSetSequence
   };
+  static constexpr double kLargestUtcOffsetS = 14 * 3600.0;
   struct Image {
     std::filesystem::path file;
     std::string patient;
@@ -38,7 +39,7 @@ struct StudyFiles {
     std::string label;            // RTImageLabel; empty: none
     std::string machine;          // RadiationMachineName; empty: unknown
     std::optional<double> at_s;   // when it was acquired, since an epoch
-    bool has_utc_offset = false;  // of at_s; else the time is local
+    bool has_utc_offset = false;  // of at_s; else the time is local, and up to kLargestUtcOffsetS off
     std::string acquired;         // the same for people, "2026-03-01 10:15:00"; empty: unknown
     TableReadOuts table;
     std::filesystem::path other = {};  // a file with this SOPInstanceUID and other contents; empty: none

@@ -26,6 +26,10 @@ class WatchReleases : public testing::Test {
     room_.source.bring(xray(patient, patient + "1", "AP", second_of(10, 15)));
     room_.source.bring(xray(patient, patient + "2", "LAT", second_of(10, 15, 10)));
   }
+  // An X-ray taken between the two, after which these belong together no longer.
+  void bring_one_between(const std::string& patient) {
+    room_.source.bring(xray(patient, patient + "3", "AP", second_of(10, 15, 5)));
+  }
   static std::string session(const std::string& patient) { return session_name({patient + "1", patient + "2"}); }
   void release(const std::string& patient) {
     ResultsTree(room_.file.results)

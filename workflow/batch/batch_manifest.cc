@@ -168,11 +168,7 @@ std::string joined(const std::vector<Text>& texts) {
 
 std::string BatchCase::ct_key() const { return parts.ct.empty() ? parts.study.string() : joined(parts.ct); }
 
-std::string xrays_sha256_of(const BatchCase& one) {
-  std::string all;
-  for (const fs::path& file : files_below(one.parts.images)) all += sha256_of_file(file);
-  return sha256_of(all);
-}
+std::string xrays_sha256_of(const BatchCase& one) { return sha256_of_files(files_below(one.parts.images)); }
 
 std::vector<BatchCase> read_manifest(const fs::path& path) {
   std::ifstream file(path, std::ios::binary);

@@ -28,12 +28,6 @@ std::vector<fs::path> files_beside_ct(const BatchCase& one, const fs::path& batc
 // Another text for another anatomy or number of doubts.
 std::string orders_of(const BatchCase& one) { return fmt::format("{} {}\n", one.anatomy, one.parts.doubts.size()); }
 
-std::string contents_of_files(const std::vector<fs::path>& files) {
-  std::string all;
-  for (const fs::path& file : files) all += sha256_of_file(file) + "\n";
-  return all;
-}
-
 }  // namespace
 
 std::string CaseInputs::quick_of(const BatchCase& one) const {
@@ -47,8 +41,8 @@ std::string CaseInputs::quick_of(const BatchCase& one) const {
 
 std::string CaseInputs::contents_of(const BatchCase& one) {
   std::string& ct = contents_of_ct_[one.ct_key()];
-  if (ct.empty()) ct = contents_of_files(files_below(one.parts.ct)) + "CT\n";
-  return sha256_of(orders_of(one) + contents_of_files(files_beside_ct(one, folder_.parent_path())) + ct);
+  if (ct.empty()) ct = sha256_of_files(files_below(one.parts.ct));
+  return sha256_of(orders_of(one) + sha256_of_files(files_beside_ct(one, folder_.parent_path())) + ct);
 }
 
 std::optional<CaseInputs::Note> CaseInputs::note_of(const BatchCase& one) const {

@@ -79,13 +79,12 @@ bool Objections::are_seen(const OfPatient& patient, const std::set<Xray>& own) {
   return std::ranges::all_of(own, [&](const Xray& xray) { return patient.xrays.at(xray).image.has_value(); });
 }
 
-// Times with and without an offset from UTC may be 14 hours apart at the same moment.
 bool Objections::may_be_later(const Moment& moment, const Moment& than) {
-  constexpr double kLargestOffsetS = 14 * 3600.0;
   if (!moment.has_utc_offset || !than.has_utc_offset)
     return !moment.local_s || !than.local_s || *moment.local_s > *than.local_s;
   if (!moment.at_s || !than.at_s) return true;
-  return *moment.at_s > *than.at_s - (*moment.has_utc_offset == *than.has_utc_offset ? 0.0 : kLargestOffsetS);
+  return *moment.at_s >
+         *than.at_s - (*moment.has_utc_offset == *than.has_utc_offset ? 0.0 : StudyFiles::kLargestUtcOffsetS);
 }
 
 Objection Objections::newer_xrays(const OfPatient& patient, const std::set<Xray>& own,

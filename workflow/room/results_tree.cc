@@ -113,6 +113,12 @@ void ResultsTree::keep_objections(const std::map<std::string, Objection>& object
   replace_text(path_ / kObjectionsFile, text_of(json));
 }
 
+Objection ResultsTree::objection(const std::string& session) const {
+  const std::map<std::string, Objection> all = objections();
+  const auto found = all.find(session);
+  return found == all.end() ? Objection() : found->second;
+}
+
 bool ResultsTree::is_released(const std::string& session) const { return fs::exists(release_file(session)); }
 
 std::vector<std::string> ResultsTree::sessions() const {
@@ -238,22 +244,20 @@ Release ResultsTree::release(const std::string& session, const Releaser& release
         fmt::format("session {}: was released before, as audit.jsonl says, and {} is gone: only a person can release "
                     "it again",
                     session, release_file(session).string()));
-  const std::map<std::string, Objection> all = objections();
-  const auto said = all.find(session);
-  const Objection objection = said == all.end() ? Objection() : said->second;
+  const Objection other_xrays = objection(session);
   const bool is_allowed =
-      objection.words.empty() || releaser.despite_objection || (releaser.is_person && objection.newer_have_results);
+      other_xrays.words.empty() || releaser.despite_objection || (releaser.is_person && other_xrays.newer_have_results);
   if (!is_allowed)
     throw Error(
         fmt::format("session {}: {}.\n       To release its result all the same, repeat the command with "
                     "--despite-other-xrays",
-                    session, objection.words));
+                    session, other_xrays.words));
   Release release{.session = session,
                   .releaser = releaser,
                   .on = local_time(),
                   .verdict = record.verdict,
                   .record = record.sha256,
-                  .despite = objection.words,
+                  .despite = other_xrays.words,
                   .is_again = is_again,
                   .objects = {},
                   .peers = peers};
@@ -349,13 +353,12 @@ ResultsTree::Pending ResultsTree::pending() {
 fs::path ResultsTree::checked_file(const Delivery& delivery) const {
   const auto release = release_of(delivery.session);
   if (!release) throw Error(fmt::format("session {}: is not released any more", delivery.session));
-  const std::map<std::string, Objection> all = objections();
-  if (const auto said = all.find(delivery.session);
-      said != all.end() && !said->second.newer_have_results && release->despite.empty())
+  const Objection other_xrays = objection(delivery.session);
+  if (!other_xrays.words.empty() && !other_xrays.newer_have_results && release->despite.empty())
     throw Error(fmt::format(
         "session {}: since its release, {}. To send it all the same, remove {} and release the session again "
         "with --despite-other-xrays",
-        delivery.session, said->second.words, release_file(delivery.session).string()));
+        delivery.session, other_xrays.words, release_file(delivery.session).string()));
   const SessionRecord record = checked(delivery.session);
   const auto registered = record.files.find(delivery.object.file);
   fs::path file = session(delivery.session) / delivery.object.file;

@@ -94,6 +94,7 @@ class ResultsTree {
 
   // What other X-rays say against results, by session.
   std::map<std::string, Objection> objections() const;
+  Objection objection(const std::string& session) const;  // without words: none
   // The caller must hold the lock of the tree.
   void keep_objections(const std::map<std::string, Objection>& objections);
 

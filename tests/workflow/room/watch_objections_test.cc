@@ -47,7 +47,7 @@ TEST_F(WatchReleases, OtherXraysThatSpeakAgainstAResultAreSaidInItsRelease) {
   room_.start();
   bring("P");
   room_.pass(60s);
-  room_.source.bring(xray("P", "P3", "AP", second_of(10, 15, 5)));
+  bring_one_between("P");
   room_.pass(60s);
   EXPECT_THAT(room_.index(),
               HasSubstr("held; together with X-rays that have come later, these would be grouped in another way"));
@@ -107,7 +107,7 @@ TEST_F(WatchReleases, WhatIsSpokenAgainstBeforeItIsSentIsNotSent) {
   room_.sender.down = {"record", "archive"};
   release("P");
   room_.pass(5s);
-  room_.source.bring(xray("P", "P3", "AP", second_of(10, 15, 5)));
+  bring_one_between("P");
   room_.pass(5s);
   room_.sender.down.clear();
   room_.pass(600s);
@@ -120,7 +120,7 @@ TEST_F(WatchReleases, AnObjectionIsNotWeakenedByXraysThatGo) {
   room_.start();
   bring("P");
   room_.pass(60s);
-  room_.source.bring(xray("P", "P3", "AP", second_of(10, 15, 5)));
+  bring_one_between("P");
   room_.pass(60s);
   EXPECT_THAT(error_of_release("P"), HasSubstr("grouped in another way"));
   room_.source.lose("P", {"P1", "P2", "P3"});
