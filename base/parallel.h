@@ -11,6 +11,13 @@ namespace isoshift {
 
 #ifdef __SANITIZE_THREAD__
 inline char before_loop = 0, after_loop = 0;  // their addresses are what the sanitizer is told of
+
+// Tells it when a scope ends, also by an exception.
+struct TellAtEnd {
+  void (*tell)(void*);
+  char& of;
+  ~TellAtEnd() { tell(&of); }
+};
 #endif
 
 // Calls work(n) for every n from `first` up to, but not including, `end`. Throws what a call throws.
@@ -22,12 +29,12 @@ void parallel_for(Index first, Index end, const Work& work) {
 #ifdef __SANITIZE_THREAD__
   const auto judged_work = [&](Index n) {
     __tsan_acquire(&before_loop);
+    const TellAtEnd call{__tsan_release, after_loop};
     work(n);
-    __tsan_release(&after_loop);
   };
   __tsan_release(&before_loop);
+  const TellAtEnd loop{__tsan_acquire, after_loop};
   tbb::parallel_for(first, end, judged_work);
-  __tsan_acquire(&after_loop);
 #else
   tbb::parallel_for(first, end, work);
 #endif
