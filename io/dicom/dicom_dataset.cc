@@ -284,19 +284,30 @@ void DicomFile::write(const std::filesystem::path& path) {
         where, "cannot be written");
 }
 
-bool begins_like_dicom(const std::filesystem::path& path) {
+Beginning beginning_of(const std::filesystem::path& path) {
   std::ifstream stream(path, std::ios::binary);
   std::array<char, 132> head{};
   if (!stream) throw Error(fmt::format("{}: cannot be opened: {}", path.string(), std::strerror(errno)));
   stream.read(head.data(), head.size());
-  if (stream.gcount() < 132) return false;
+  if (std::ranges::count(head, '\0') == static_cast<std::ptrdiff_t>(head.size())) return Beginning::kNothing;
+  if (stream.gcount() < 132) return Beginning::kOther;
   const std::string_view begin(head.data(), head.size());
-  if (begin.substr(128) == "DICM") return true;
+  if (begin.substr(128) == "DICM") return Beginning::kDicom;
   // Little endian: an element of group 0008 up to SOP Instance UID, with its VR or, in implicit VR, a short length.
   const auto byte = [&](std::size_t n) { return static_cast<unsigned char>(head[n]); };
-  if (byte(0) != 0x08 || byte(1) != 0 || byte(2) > 0x18 || byte(3) != 0) return false;
+  if (byte(0) != 0x08 || byte(1) != 0 || byte(2) > 0x18 || byte(3) != 0) return Beginning::kOther;
   const std::string_view vr = begin.substr(4, 2);
-  return vr == "UL" || vr == "CS" || vr == "UI" || vr == "DA" || vr == "TM" || (byte(6) == 0 && byte(7) == 0);
+  const bool is_vr =
+      vr == "UL" || vr == "CS" || vr == "UI" || vr == "DA" || vr == "TM" || (byte(6) == 0 && byte(7) == 0);
+  return is_vr ? Beginning::kDicom : Beginning::kOther;
+}
+
+bool is_named_like_dicom(const std::filesystem::path& path) {
+  std::string extension = path.extension().string();
+  std::ranges::transform(extension, extension.begin(), [](unsigned char c) { return std::tolower(c); });
+  const auto is_digit = [](unsigned char c) { return std::isdigit(c) != 0; };
+  return extension.empty() || extension == ".dcm" || extension == ".ima" ||
+         std::ranges::all_of(std::string_view(extension).substr(1), is_digit);
 }
 
 std::string ds_from(double number) {

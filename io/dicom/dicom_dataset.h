@@ -87,9 +87,18 @@ class DicomFile {
   std::string sha256_;
 };
 
-// Whether the file begins like a DICOM file: 128 bytes, then "DICM" (PS3.10), or, as old exports do, with the first
-// element of a dataset. Throws Error if it cannot be read.
-bool begins_like_dicom(const std::filesystem::path& path);
+// How a file begins.
+enum class Beginning {
+  kDicom,    // 128 bytes, then "DICM" (PS3.10), or, as old exports do, with the first element of a dataset
+  kNothing,  // empty, or zeros: programs that copy may make the file whole first, and fill it then
+  kOther,
+};
+// Throws Error if the file cannot be read.
+Beginning beginning_of(const std::filesystem::path& path);
+
+// Whether a file of this name may be meant as a DICOM file: without extension, or with .dcm, .ima or, at the end of a
+// UID, digits.
+bool is_named_like_dicom(const std::filesystem::path& path);
 
 // A DS value: at most 16 bytes, the nearest decimal that fits, 0 for what is smaller than 1e-12.
 std::string ds_from(double number);

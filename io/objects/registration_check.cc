@@ -89,7 +89,7 @@ class Checker {
   void check_items() {
     const std::vector<DicomItem> items = dataset_.items(DCM_RegistrationSequence);
     if (items.empty()) error(fmt::format("dataset: {} has no item", described(DCM_RegistrationSequence)));
-    int others = 0;
+    int others = 0, unmoved = 0;
     for (std::size_t n = 0; n < items.size(); ++n) {
       const std::string name = fmt::format("item {}", n + 1);
       const std::string frame = frame_of(items[n], name);
@@ -103,7 +103,10 @@ class Checker {
       if (!is_identity && frame == result_.registered_frame_uid)
         ambiguous(fmt::format("{}: moves the registered frame against itself", name));
       check_places(items[n], name, frame, matrix->matrix());
-      if (is_identity) continue;
+      if (is_identity) {
+        unmoved += !frame.empty() && frame != result_.registered_frame_uid ? 1 : 0;
+        continue;
+      }
       ++others;
       result_.registered_from_source = matrix;
       result_.source_frame_uid = frame;
@@ -111,6 +114,10 @@ class Checker {
     }
     if (others > 1)
       ambiguous(fmt::format("{} items are not the identity. SlicerRT multiplies all matrices of a file", others));
+    if (others > 0 && unmoved > 0 && means_one_matrix_)
+      ambiguous(
+          "it registers several frames, one of them by an identity: which of them is that of the treatment is not "
+          "known");
     if (result_.registered_frame_uid == kIecFixedFrameUid)
       ambiguous(
           "dataset: registers the room (IEC 61217 Fixed), which is not the frame of a CT: the matrix takes the CT to "

@@ -16,7 +16,7 @@ namespace {
 
 // Beyond these a matrix is of another frame or another isocenter, not of a patient's setup.
 constexpr double kMaxSetupErrorMm = 100.0, kMaxSetupErrorRad = rad_from_deg(30.0);
-constexpr double kLargeSetupErrorMm = 30.0;  // beyond it a person should look at the isocenter
+constexpr double kLargeSetupErrorMm = 10.0;  // beyond it a person should look at the isocenter
 
 bool is_from_room(const CheckedRegistration& checked) { return checked.source_frame_uid == kIecFixedFrameUid; }
 
@@ -81,6 +81,12 @@ bool plan_fits(CheckedRegistration& checked, const RtPlan& plan) {
   if (!plan.frame_of_reference_uid) {
     checked.note(fmt::format("{}: {} is missing; taken as that of the registered frame, {}", plan.path.string(),
                              described(DCM_FrameOfReferenceUID), checked.registered_frame_uid));
+  } else if (*plan.frame_of_reference_uid == checked.source_frame_uid) {
+    checked.error(
+        fmt::format("the couch shift is not known: it takes the frame of {} to another one, {}: it registers the other "
+                    "way around. Write it with the planning CT as the registered image",
+                    plan.path.string(), checked.registered_frame_uid));
+    fits = false;
   } else if (*plan.frame_of_reference_uid != checked.registered_frame_uid) {
     checked.error(fmt::format(
         "the couch shift is not known: {}: {} is {}, that of {}, the registered frame, is {}, so the plan's isocenter "
@@ -190,6 +196,7 @@ RegistrationMeaning meaning_of(CheckedRegistration& checked, const std::optional
     if (setup->couch_angle_deg) {
       // From the axes of the patient as set up, which the plan and the couch turn into those of the room.
       matrix.rotate(setup->room_from_patient().linear());
+      inverse.rotate(setup->room_from_patient().linear());
       meaning.in_room_axes = false;
     } else {
       checked.error(
@@ -199,6 +206,7 @@ RegistrationMeaning meaning_of(CheckedRegistration& checked, const std::optional
     }
   }
   meaning.registered_from_isocenter = matrix;
+  meaning.inverse_from_isocenter = inverse;
   if (!setup || !fits || meaning.in_room_axes) return meaning;
   if (!begins_near_isocenter(checked, matrix, inverse, setup->isocenter_patient_mm)) return meaning;
   note_assumed_angles(checked, *setup);
@@ -217,17 +225,16 @@ RegistrationMeaning meaning_of(CheckedRegistration& checked, const std::optional
 }
 
 RegistrationDifference difference_between(const Eigen::Isometry3d& registered_from_isocenter,
-                                          const Eigen::Isometry3d& other) {
+                                          const Eigen::Isometry3d& other, const Eigen::Isometry3d& other_inverse) {
   const auto between = [&](const Eigen::Isometry3d& pose) {
     const Eigen::Isometry3d difference = pose.inverse() * registered_from_isocenter;
     return std::pair(difference.translation().norm(), Eigen::AngleAxisd(difference.linear()).angle());
   };
   const auto [translation_mm, angle_rad] = between(other);
   constexpr double kMuchNearer = 0.1, kFarMm = 1.0;
-  return {
-      .translation_mm = translation_mm,
-      .angle_rad = angle_rad,
-      .other_is_inverted = translation_mm > kFarMm && between(other.inverse()).first < kMuchNearer * translation_mm};
+  return {.translation_mm = translation_mm,
+          .angle_rad = angle_rad,
+          .other_is_inverted = translation_mm > kFarMm && between(other_inverse).first < kMuchNearer * translation_mm};
 }
 
 RegistrationComparison compare(const CheckedRegistration& first, const RegistrationMeaning& first_meaning,
@@ -262,7 +269,8 @@ RegistrationComparison compare(const CheckedRegistration& first, const Registrat
         (is_first ? second : first).source_frame_uid));
   }
   return {.difference =
-              difference_between(*first_meaning.registered_from_isocenter, *second_meaning.registered_from_isocenter),
+              difference_between(*first_meaning.registered_from_isocenter, *second_meaning.registered_from_isocenter,
+                                 *second_meaning.inverse_from_isocenter),
           .why_not = "",
           .has_patient_ids = has_ids};
 }

@@ -39,6 +39,8 @@ struct RegistrationMeaning {
   // From a frame that begins at the machine's isocenter to the registered frame: its translation is the point of the CT
   // that lies at the machine's isocenter. Nothing where that is not known.
   std::optional<Eigen::Isometry3d> registered_from_isocenter;
+  // The same if the matrix had been written the wrong way around.
+  std::optional<Eigen::Isometry3d> inverse_from_isocenter;
   bool in_room_axes = false;  // that frame has the axes of the room, else those of the patient as set up on the couch
   std::optional<CouchShift> couch_shift;  // where `setup` was given and nothing stands in the way
 };
@@ -51,10 +53,10 @@ RegistrationMeaning meaning_of(CheckedRegistration& checked, const std::optional
 struct RegistrationDifference {
   double translation_mm = 0.0;  // between the points of the CT that the two have at the machine's isocenter
   double angle_rad = 0.0;
-  bool other_is_inverted = false;  // the inverse of the other one lies much nearer
+  bool other_is_inverted = false;  // the other one, written the wrong way around, would lie much nearer
 };
 RegistrationDifference difference_between(const Eigen::Isometry3d& registered_from_isocenter,
-                                          const Eigen::Isometry3d& other);
+                                          const Eigen::Isometry3d& other, const Eigen::Isometry3d& other_inverse);
 
 struct RegistrationComparison {
   std::optional<RegistrationDifference> difference;

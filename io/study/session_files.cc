@@ -119,15 +119,15 @@ std::vector<SessionFiles> untimed_sessions(Images images, const std::set<std::st
   return all;
 }
 
-// What the patient's other X-rays say against a session whose files do not tell where the table stood.
+// What the patient's other X-rays say against a session.
 class Doubts {
  public:
   // `sessions`: all that were found among the `images` of all patients.
-  Doubts(Images images, const std::vector<SessionFiles>& sessions) {
-    for (const StudyFiles::Image& image : images) of_patient_[patient_id_of(image.patient)].push_back(&image);
+  Doubts(std::vector<StudyFiles::Image> images, std::span<const SessionFiles> sessions) : images_(std::move(images)) {
+    std::ranges::stable_sort(images_, {}, &StudyFiles::Image::at_s);
+    for (const StudyFiles::Image& image : images_) of_patient_[patient_id_of(image.patient)].push_back(&image);
     for (const SessionFiles& session : sessions)
-      for (const StudyFiles::Image& image : session.images)
-        size_of_session_[image.sop_instance_uid] = session.images.size();
+      for (const StudyFiles::Image& image : session.images) session_of_[image.sop_instance_uid] = session.images;
   }
 
   std::vector<std::string> of(const SessionFiles& session) const {
@@ -137,11 +137,17 @@ class Doubts {
       if (!image.other.empty())
         doubts.push_back(fmt::format("{} and {} have one SOPInstanceUID and different contents", image.file.string(),
                                      image.other.string()));
-    if (own.size() < 2 || !own.front().at_s || all_tell_position(own)) return doubts;
-    const StudyFiles::Image *before = nullptr, *after = nullptr;
-    for (const StudyFiles::Image* const one : of_patient_.at(patient_id_of(session.patient))) {
+    if (own.size() < 2 || !own.front().at_s) return doubts;
+    const std::vector<const StudyFiles::Image*>& all = of_patient_.at(patient_id_of(session.patient));
+    if (all_tell_position(own)) {
+      // The couch did not move between these views, except by a top that moves on it without changing its read-outs.
+      if (auto doubt = of_neighbors(own, retakes(own, all)); !doubt.empty()) doubts.push_back(std::move(doubt));
+      return doubts;
+    }
+    Neighbors neighbors;
+    for (const StudyFiles::Image* const one : all) {
       const StudyFiles::Image& other = *one;
-      if (is_in(session, other)) continue;
+      if (is_in(own, other)) continue;
       if (!is_comparable(own.front(), other)) {
         if (has_label(own, other.label))
           doubts.push_back(fmt::format("{} shows {}, too, and whether it was taken before or after is not known",
@@ -153,28 +159,39 @@ class Doubts {
       } else if (has_time_of_own_label(own, other)) {
         doubts.push_back(
             fmt::format("{} is another {} with the time of one of these views", other.file.string(), other.label));
-      } else if (*other.at_s <= *own.front().at_s) {
-        if (before == nullptr || *other.at_s > *before->at_s) before = &other;
-      } else if (after == nullptr || *other.at_s < *after->at_s) {
-        after = &other;
+      } else {
+        neighbors.add(own, one);
       }
     }
-    if (auto doubt = of_neighbors(own, before, after); !doubt.empty()) doubts.push_back(std::move(doubt));
+    if (auto doubt = of_neighbors(own, neighbors); !doubt.empty()) doubts.push_back(std::move(doubt));
     return doubts;
   }
 
  private:
-  static bool is_in(const SessionFiles& session, const StudyFiles::Image& image) {
-    return std::ranges::find(session.images, image.sop_instance_uid, &StudyFiles::Image::sop_instance_uid) !=
-           session.images.end();
+  // Other X-rays, those nearest to the session first.
+  struct Neighbors {
+    std::vector<const StudyFiles::Image*> before, after;
+
+    // In the order of the times.
+    void add(Images own, const StudyFiles::Image* other) {
+      if (*other->at_s <= *own.front().at_s)
+        before.insert(before.begin(), other);
+      else
+        after.push_back(other);
+    }
+  };
+
+  static bool is_in(Images own, const StudyFiles::Image& image) {
+    return std::ranges::find(own, image.sop_instance_uid, &StudyFiles::Image::sop_instance_uid) != own.end();
   }
 
-  // Whether the times tell which was taken first: not if one of them is unknown, or has an offset from UTC where the
-  // other has none.
+  // Whether the times tell which was taken first: not if one of them is unknown, if one has an offset from UTC and the
+  // other none, or if clock and offset contradict each other.
   static bool is_comparable(const StudyFiles::Image& a, const StudyFiles::Image& b) {
-    return a.at_s && b.at_s &&
-           (a.has_utc_offset == b.has_utc_offset ||
-            std::abs(*a.at_s - *b.at_s) > StudyFiles::kLargestUtcOffsetS + kMaxTimeSpanS);
+    if (!a.at_s || !b.at_s) return false;
+    if (a.has_utc_offset != b.has_utc_offset)
+      return std::abs(*a.at_s - *b.at_s) > StudyFiles::kLargestUtcOffsetS + kMaxTimeSpanS;
+    return a.at_s == b.at_s || a.acquired == b.acquired || (*a.at_s < *b.at_s) == (a.acquired < b.acquired);
   }
 
   // Whether the X-ray may be a copy of one of `own` in another class: it has that time, and no label.
@@ -190,39 +207,76 @@ class Doubts {
            std::ranges::any_of(own, [&](const auto& image) { return image.at_s == other.at_s; });
   }
 
-  // Whether the X-ray is of a session that lacks a view which `own` has: its own view may be in this one.
-  bool is_incomplete(const StudyFiles::Image& image, Images own) const {
-    const auto size = size_of_session_.find(image.sop_instance_uid);
-    return size != size_of_session_.end() && size->second < own.size();
+  // X-rays before and after the session that repeat one of its labels without the table having moved.
+  static Neighbors retakes(Images own, std::span<const StudyFiles::Image* const> all) {
+    Neighbors neighbors;
+    for (const StudyFiles::Image* const other : all)
+      if (!is_in(own, *other) && is_comparable(own.front(), *other) && has_label(own, other->label) &&
+          !has_table_moved(own.front().table, other->table) &&
+          (*other->at_s < *own.front().at_s || *other->at_s > *own.back().at_s))
+        neighbors.add(own, other);
+    return neighbors;
   }
 
-  // An X-ray without its partner shortly before or after the session may be the partner of one of its views.
-  std::string of_neighbors(Images own, const StudyFiles::Image* before, const StudyFiles::Image* after) const {
-    constexpr double kMuchLonger = 5.0;
+  // The X-rays of the session that an X-ray is in; empty if it is in none: it is of another class, or has a result.
+  Images session_of(const StudyFiles::Image& image) const {
+    const auto found = session_of_.find(image.sop_instance_uid);
+    return found == session_of_.end() ? Images() : found->second;
+  }
+
+  // The longest time between X-rays that follow each other.
+  static double longest_gap_s(Images images) {
     double longest_s = 0.0;
-    for (std::size_t n = 1; n < own.size(); ++n) longest_s = std::max(longest_s, *own[n].at_s - *own[n - 1].at_s);
-    const double before_s = before != nullptr ? *own.front().at_s - *before->at_s : kMaxTimeSpanS + 1.0;
-    const double after_s = after != nullptr ? *after->at_s - *own.back().at_s : kMaxTimeSpanS + 1.0;
-    // Two X-rays that follow each other closely are of one setup rather than two that do not.
-    constexpr double kClearlyNearer = 0.5;
-    for (const auto& [other, apart_s, when] :
-         {std::tuple(before, before_s, "before"), std::tuple(after, after_s, "after")})
-      if (apart_s < kClearlyNearer * longest_s)
-        return fmt::format("{}, {:.0f} s {}, lies nearer to one of these views than they lie to each other",
-                           other->file.string(), apart_s, when);
-    const bool lacks_before = before_s <= kMaxTimeSpanS && is_incomplete(*before, own);
-    const bool lacks_after = after_s <= kMaxTimeSpanS && is_incomplete(*after, own);
-    if (lacks_before && (lacks_after || before_s <= kMuchLonger * longest_s))
-      return fmt::format("{}, {:.0f} s before, has no partner, and may belong to one of these views",
-                         before->file.string(), before_s);
-    if (lacks_after && after_s <= kMuchLonger * longest_s)
-      return fmt::format("{}, {:.0f} s after, has no partner, and may belong to one of these views",
-                         after->file.string(), after_s);
-    return "";
+    for (std::size_t n = 1; n < images.size(); ++n)
+      longest_s = std::max(longest_s, *images[n].at_s - *images[n - 1].at_s);
+    return longest_s;
   }
 
-  std::map<std::string, std::vector<const StudyFiles::Image*>> of_patient_;  // X-rays, by PatientID
-  std::map<std::string, std::size_t> size_of_session_;                       // by SOPInstanceUID of its X-rays
+  static double apart_s(Images own, const StudyFiles::Image& other) {
+    return std::max(*own.front().at_s - *other.at_s, *other.at_s - *own.back().at_s);
+  }
+
+  bool lacks_partner(const StudyFiles::Image& other, Images own) const {
+    const Images session = session_of(other);
+    return !session.empty() && session.size() < own.size();
+  }
+
+  // An X-ray without its partner among the neighbors on one side, as far as all gaps up to it are short: then the views
+  // of these sessions may belong together in another way. A gap is short if it is not clearly longer than those within
+  // the session that it follows.
+  const StudyFiles::Image* lonely(Images own, std::span<const StudyFiles::Image* const> neighbors) const {
+    constexpr double kClearlyLonger = 10.0;
+    Images session = own;
+    for (const StudyFiles::Image* const other : neighbors) {
+      if (session_of(*other).empty() || is_in(session, *other)) continue;
+      if (apart_s(session, *other) > std::min(kMaxTimeSpanS, kClearlyLonger * longest_gap_s(session))) return nullptr;
+      if (lacks_partner(*other, own)) return other;
+      session = session_of(*other);
+    }
+    return nullptr;
+  }
+
+  // An X-ray without its partner before or after the session may be the partner of one of its views.
+  std::string of_neighbors(Images own, const Neighbors& neighbors) const {
+    constexpr double kClearlyNearer = 0.5;  // two X-rays that follow each other closely are of one setup
+    for (const auto& [side, when] : {std::pair(&neighbors.before, "before"), std::pair(&neighbors.after, "after")})
+      if (!side->empty() && apart_s(own, *side->front()) < kClearlyNearer * longest_gap_s(own))
+        return fmt::format("{}, {:.0f} s {}, lies nearer to one of these views than they lie to each other",
+                           side->front()->file.string(), apart_s(own, *side->front()), when);
+    const auto lacks_partner_near = [&](const std::vector<const StudyFiles::Image*>& side) {
+      return !side.empty() && apart_s(own, *side.front()) <= kMaxTimeSpanS && lacks_partner(*side.front(), own);
+    };
+    const StudyFiles::Image *before = lonely(own, neighbors.before), *after = lonely(own, neighbors.after);
+    if (lacks_partner_near(neighbors.before) && lacks_partner_near(neighbors.after)) before = neighbors.before.front();
+    if (before == nullptr && after == nullptr) return "";
+    const StudyFiles::Image& other = before != nullptr ? *before : *after;
+    return fmt::format("{}, {:.0f} s {}, has no partner, and may belong to one of these views", other.file.string(),
+                       apart_s(own, other), before != nullptr ? "before" : "after");
+  }
+
+  std::vector<StudyFiles::Image> images_;                                    // in the order of their times
+  std::map<std::string, std::vector<const StudyFiles::Image*>> of_patient_;  // by PatientID
+  std::map<std::string, Images> session_of_;                                 // by SOPInstanceUID
 };
 
 // The lowest folder that holds all files, with a slash; empty unless each of several files has a folder of its own, and
@@ -299,7 +353,7 @@ std::vector<SessionFiles> sessions_of(const StudyFiles& files, bool other_xrays,
   }
   // Evidence are all X-rays, those that are not to be registered, too.
   if (!other_xrays) take_new(files.other_xrays);
-  const Doubts doubts(images, sessions);
+  const Doubts doubts(std::move(images), sessions);
   for (SessionFiles& session : sessions) {
     session.name = name_of(session.images);
     session.doubts = doubts.of(session);

@@ -269,8 +269,13 @@ std::string patient_id_of(const std::string& patient) { return patient.substr(0,
 std::vector<fs::path> files_below(const std::vector<fs::path>& paths, const std::unordered_set<std::string>& but,
                                   std::set<fs::path>* unsearchable) {
   std::vector<fs::path> files;
+  std::set<fs::path> searched;  // links may lead to a folder more than once
   const auto add = [&](const fs::path& file) {
     if (!but.contains(file.native())) files.push_back(file);
+  };
+  const auto cannot_search = [&](const fs::path& folder, const char* why) {
+    if (unsearchable == nullptr) throw Error(fmt::format("{}: cannot be searched: {}", folder.string(), why));
+    unsearchable->insert(folder);
   };
   for (const fs::path& path : paths) {
     std::error_code error;
@@ -280,16 +285,21 @@ std::vector<fs::path> files_below(const std::vector<fs::path>& paths, const std:
       add(path);
       continue;
     }
-    for (auto entry = fs::recursive_directory_iterator(path, error); !error && entry != fs::end(entry);
+    searched.insert(fs::canonical(path));
+    constexpr auto kFollow = fs::directory_options::follow_directory_symlink;
+    for (auto entry = fs::recursive_directory_iterator(path, kFollow, error); !error && entry != fs::end(entry);
          entry.increment(error)) {
-      if (entry->is_directory() && ::access(entry->path().c_str(), R_OK | X_OK) != 0) {
-        if (unsearchable == nullptr)
-          throw Error(fmt::format("{}: cannot be searched: {}", entry->path().string(), std::strerror(errno)));
-        unsearchable->insert(entry->path());
-        entry.disable_recursion_pending();
-        continue;
+      const bool is_hidden = entry->path().filename().native().starts_with('.');
+      if (entry->is_directory()) {
+        const bool can_be_searched = ::access(entry->path().c_str(), R_OK | X_OK) == 0;
+        if (!can_be_searched) cannot_search(entry->path(), std::strerror(errno));
+        if (!can_be_searched || !searched.insert(fs::canonical(entry->path())).second)
+          entry.disable_recursion_pending();
+      } else if (entry->is_symlink() && !entry->exists() && !is_hidden) {
+        cannot_search(entry->path(), "a link to a file or folder that is not there");
+      } else if (!is_hidden && entry->is_regular_file()) {
+        add(entry->path());
       }
-      if (!entry->path().filename().native().starts_with('.') && entry->is_regular_file()) add(entry->path());
     }
     if (error) throw Error(fmt::format("{}: cannot be searched: {}", path.string(), error.message()));
   }
@@ -300,7 +310,13 @@ std::vector<fs::path> files_below(const std::vector<fs::path>& paths, const std:
 
 StudyFiles scan_file(const fs::path& path) {
   StudyFiles files;
-  if (!begins_like_dicom(path)) {
+  const Beginning beginning = beginning_of(path);
+  if (beginning == Beginning::kNothing && is_named_like_dicom(path))
+    throw Error(
+        fmt::format("{}: is empty or begins with zeros: it has lost its contents, or was never filled", path.string()));
+  if (beginning != Beginning::kDicom && path.extension() == ".dcm")
+    throw Error(fmt::format("{}: is not a DICOM file, as its name says: it may be cut off", path.string()));
+  if (beginning != Beginning::kDicom) {
     files.left_aside.push_back(fmt::format("{}: not a DICOM file", path.string()));
     return files;
   }

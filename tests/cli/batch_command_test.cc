@@ -12,6 +12,7 @@
 #include "base/process.h"
 #include "tests/support/small_study.h"
 #include "tests/support/testdata.h"
+#include "workflow/batch/batch.h"
 #include "workflow/batch/batch_folder.h"
 #include "workflow/batch/batch_manifest.h"
 
@@ -239,6 +240,25 @@ TEST_F(BatchCommandTest, AManifestIsOfTheXraysThatWereScanned) {
   ASSERT_EQ(run_command({"batch", "--scan", exported().string(), "-o", manifest.string()}).exit_status, 0);
   run_command({"batch", manifest.string(), "-o", results().string(), "--preset", "fast"});
   EXPECT_EQ(summary()["cases"][0].value("error", ""), "");
+}
+
+// An X-ray is replaced by its retake while its case waits.
+TEST_F(BatchCommandTest, ACaseIsOfTheXraysThatWereGrouped) {
+  fs::remove_all(exported() / "2");
+  fs::remove_all(exported() / "1" / "RTIMAGE" / "F02");
+  struct Replaces : Observer {
+    fs::path image;
+    void progress(std::string_view step, double share) override {
+      if (step.starts_with("Comparing") && share == 1.0)
+        edit(image, [](DicomItem d) { d.put(DCM_SOPInstanceUID, "2.25.7"); });
+    }
+  } replaces;
+  replaces.image = exported() / "1" / "RTIMAGE" / "KV_G090.dcm";
+  const BatchOptions options{.cases = exported(), .output = results(), .kept = {"--preset=fast"}};
+  Batch batch(options, replaces);
+  EXPECT_TRUE(batch.run());
+  ASSERT_EQ(batch.summary().cases.size(), 1U);
+  EXPECT_THAT(batch.summary().cases[0].error, HasSubstr("its X-rays were changed while the batch ran"));
 }
 
 TEST_F(BatchCommandTest, ANameThatAManifestCannotHoldIsRefused) {

@@ -85,7 +85,6 @@ bool Batch::register_all() {
       folder_.set_aside(one.name);
     }
     ended_before += folder_.has_ended(one.name) ? 1 : 0;
-    observer_.progress("Comparing files of cases", ++compared, cases_.size());
     if (!folder_.has_ended(one.name) && !has_xrays_of_manifest(one)) {
       folder_.fail(one.name,
                    "its X-rays are not those for which the manifest was written (xrays_sha256). Write the manifest "
@@ -100,6 +99,7 @@ bool Batch::register_all() {
                                 .anatomy = one.anatomy,
                                 .output = std::filesystem::absolute(folder_.folder_of(one.name)),
                                 .at_a_time = options_.jobs}});
+    observer_.progress("Comparing files of cases", ++compared, cases_.size());
   }
   if (ended_before > 0)
     observer_.say(fmt::format("{} of {} cases have been registered before", ended_before, cases_.size()));
@@ -112,6 +112,12 @@ bool Batch::register_all() {
       [&](const std::string& name, const std::optional<std::string>& failure) {
         if (failure) folder_.fail(name, *failure);
         if (!folder_.has_ended(name)) folder_.fail(name, "the worker reported the end of the case, but left no result");
+        // It may have waited for long, and read other files than were grouped.
+        if (const BatchCase& one = *std::ranges::find(cases_, name, &BatchCase::name); !has_xrays_of_manifest(one)) {
+          folder_.set_aside(name);
+          folder_.fail(name, "its X-rays were changed while the batch ran. Start the batch again");
+          inputs.note_nothing(one);
+        }
         observer_.progress(step, ++ended, total);
       },
       [&] { return end.is_asked_for(); });

@@ -224,8 +224,8 @@ std::vector<BatchCase> scan_cases(const fs::path& folder, bool other_xrays, Note
       parts.doubts = session.doubts;
       for (const std::string& doubt : session.doubts)
         notes.warnings.push_back(fmt::format("case {}: {}", session.name, doubt));
-      BatchCase& found = cases.emplace_back(
-          BatchCase{.name = session.name, .parts = std::move(parts), .anatomy = "", .xrays_sha256 = ""});
+      BatchCase& found = cases.emplace_back(BatchCase{.name = session.name, .parts = std::move(parts), .anatomy = ""});
+      found.xrays_sha256 = xrays_sha256_of(found);
       for (const StudyFiles::Image& image : session.images) found.xray_uids.insert(image.sop_instance_uid);
     } catch (const Error& error) {
       notes.warnings.push_back(

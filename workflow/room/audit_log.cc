@@ -114,6 +114,7 @@ void AuditLog::Proofs::add(const std::string& text) {
   const std::string event = text_of(line, "event"), session = text_of(line, "session");
   if (event == "registered") registrations[session] = text_of(line, "record");
   if (event == "sent") sendings.insert({session, text_of(line, "peer"), text_of(line, "object")});
+  if (event == "objection") objections[session] = text_of(line, "objection");
   if (event == "not released") releases.erase(session);
   if (event != "released") return;
   releases[session] = text_of(line, "release");
@@ -168,6 +169,11 @@ std::size_t AuditLog::release_number(const std::string& session) const {
   const std::map<std::string, std::size_t>& numbers = proofs().release_numbers;
   const auto found = numbers.find(session);
   return found == numbers.end() ? 0 : found->second;
+}
+
+std::string AuditLog::newest_objection(const std::string& session) const {
+  const auto found = proofs().objections.find(session);
+  return found == proofs().objections.end() ? "" : found->second;
 }
 
 bool AuditLog::has_sending(const std::string& session, const std::string& peer,

@@ -40,6 +40,8 @@ class AuditLog {
   std::size_t release_number(const std::string& session) const;
   // True if the peer has confirmed the object. Lines that were kept count, too.
   bool has_sending(const std::string& session, const std::string& peer, const std::string& object_sha256) const;
+  // The SHA-256 of the newest objection to the session's result; empty if there is none.
+  std::string newest_objection(const std::string& session) const;
   // The session with which an object was released; nothing if the object was not released.
   std::optional<std::string> session_releasing(const std::string& object_sha256) const;
 
@@ -51,6 +53,7 @@ class AuditLog {
   };
   struct Proofs {
     std::map<std::string, std::string> registrations;    // SHA-256 of the newest record, by session
+    std::map<std::string, std::string> objections;       // SHA-256 of the newest one, by session
     std::map<std::string, std::string> releases;         // SHA-256 of the newest release file, by session
     std::map<std::string, std::size_t> release_numbers;  // by session
     std::size_t releases_so_far = 0;

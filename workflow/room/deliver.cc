@@ -23,7 +23,8 @@ void Deliverer::refuse(const std::string& session, const std::string& why, Obser
     observer.say(fmt::format("warning: session {}: not sent: {}", session, why));
 }
 
-void Deliverer::deliver(const std::stop_token& stop, Observer& observer) {
+void Deliverer::deliver(const std::stop_token& stop, const std::function<bool(const std::string& session)>& may_be_sent,
+                        Observer& observer) {
   const ResultsTree::Pending pending = tree_.pending();
   for (const auto& [session, why] : pending.refused) refuse(session, why, observer);
   // A peer that is not due now may be due later in this loop: then it would receive the older releases last.
@@ -31,7 +32,7 @@ void Deliverer::deliver(const std::stop_token& stop, Observer& observer) {
   for (const Delivery& delivery : pending.deliveries) {
     if (stop.stop_requested()) return;
     if (!is_due(delivery.peer)) not_due.insert(delivery.peer);
-    if (not_due.contains(delivery.peer)) continue;
+    if (not_due.contains(delivery.peer) || !may_be_sent(delivery.session)) continue;
     deliver(delivery, observer);
     if (!is_due(delivery.peer)) not_due.insert(delivery.peer);
   }

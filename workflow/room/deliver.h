@@ -2,6 +2,7 @@
 // Sends released objects to the peers of a watch file.
 
 #include <chrono>
+#include <functional>
 #include <map>
 #include <stop_token>
 #include <string>
@@ -22,7 +23,9 @@ class Deliverer {
       : tree_(watch.results), watch_(watch), sender_(sender), clock_(clock) {}
 
   // Tries all deliveries that are due, until `stop` is requested. The caller must hold the lock of the tree.
-  void deliver(const std::stop_token& stop, Observer& observer);
+  // `may_be_sent`: asked for each session, just before.
+  void deliver(const std::stop_token& stop, const std::function<bool(const std::string& session)>& may_be_sent,
+               Observer& observer);
 
  private:
   bool is_due(const std::string& what) const;

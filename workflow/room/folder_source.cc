@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <fstream>
 #include <vector>
 
@@ -16,14 +15,7 @@ namespace fs = std::filesystem;
 
 namespace {
 
-// Programs that copy may make the file whole first, and fill it then.
-bool begins_with_zeros(const fs::path& file) {
-  constexpr std::size_t kBeforeData = 132;  // PS3.10 7.1
-  std::array<char, kBeforeData> begin;
-  std::ifstream stream(file, std::ios::binary);
-  stream.read(begin.data(), begin.size());
-  return std::all_of(begin.begin(), begin.begin() + stream.gcount(), [](char c) { return c == 0; });
-}
+constexpr std::chrono::seconds kLongestWait(60);
 
 std::string cannot_be_opened(const fs::path& path) { return fmt::format("{}: cannot be opened", path.string()); }
 
@@ -41,7 +33,6 @@ FolderSource::Growing FolderSource::growing(const fs::path& file, const Version&
 }
 
 bool FolderSource::is_coming(const std::string& patient_id) const {
-  constexpr std::chrono::seconds kLongestWait(60);
   return std::ranges::any_of(growing_, [&](const auto& entry) {
     const Growing& file = entry.second;
     return file.patient_id.empty() ? clock_.now() - file.since < kLongestWait : file.patient_id == patient_id;
@@ -56,6 +47,9 @@ std::vector<std::string> FolderSource::unreadable() const {
   std::vector<std::string> messages;
   for (const auto& [file, message] : files_.unreadable()) messages.push_back(message);
   for (const fs::path& file : unopened_) messages.push_back(cannot_be_opened(file));
+  for (const auto& [file, growing] : growing_)
+    if (clock_.now() - growing.since >= kLongestWait)
+      messages.push_back(fmt::format("{}: has not arrived whole within {} s", file.string(), kLongestWait.count()));
   return messages;
 }
 
@@ -95,8 +89,9 @@ void FolderSource::look_at(const fs::path& file, std::map<fs::path, Growing>& st
     return;
   }
   unopened_.erase(file);
-  const bool is_not_filled = version.size == 0 || begins_with_zeros(file);
-  if (!is_not_filled && !begins_like_dicom(file)) {
+  const Beginning beginning = beginning_of(file);
+  const bool is_not_filled = beginning == Beginning::kNothing;
+  if (beginning != Beginning::kDicom && !is_named_like_dicom(file)) {
     done_[file] = version;
     read_again(files_.forget(file));
     return;

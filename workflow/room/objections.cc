@@ -55,6 +55,13 @@ void Objections::see(const std::string& patient_id, const StudyFiles& files) {
     }
 }
 
+std::map<std::string, std::set<std::string>> Objections::sessions() const {
+  std::map<std::string, std::set<std::string>> sessions;
+  for (const auto& [patient_id, patient] : patients_)
+    for (const auto& [session, own] : patient.results) sessions[patient_id].insert(session);
+  return sessions;
+}
+
 void Objections::update(const std::map<std::string, Patient>& patients, const std::set<std::string>& registered) {
   for (const auto& [patient_id, arrived] : patients) {
     OfPatient& patient = patients_[patient_id];
@@ -69,7 +76,7 @@ void Objections::update(const std::map<std::string, Patient>& patients, const st
       Objection found = objection(patient, own, registered);
       const auto earlier = by_session_.find(session);
       const bool is_final =  // of an earlier run, which has seen more
-          earlier != by_session_.end() && !earlier->second.newer_have_results && !are_seen(patient, own);
+          earlier != by_session_.end() && earlier->second.newest_session.empty() && !are_seen(patient, own);
       if (!found.words.empty() && !is_final) by_session_[session] = std::move(found);
     }
   }
@@ -79,12 +86,13 @@ bool Objections::are_seen(const OfPatient& patient, const std::set<Xray>& own) {
   return std::ranges::all_of(own, [&](const Xray& xray) { return patient.xrays.at(xray).image.has_value(); });
 }
 
+// True as well if it is not known, or if clock and offset from UTC contradict each other.
 bool Objections::may_be_later(const Moment& moment, const Moment& than) {
-  if (!moment.has_utc_offset || !than.has_utc_offset)
-    return !moment.local_s || !than.local_s || *moment.local_s > *than.local_s;
+  const bool is_later_by_clock = !moment.local_s || !than.local_s || *moment.local_s > *than.local_s;
+  if (!moment.has_utc_offset || !than.has_utc_offset) return is_later_by_clock;
   if (!moment.at_s || !than.at_s) return true;
-  return *moment.at_s >
-         *than.at_s - (*moment.has_utc_offset == *than.has_utc_offset ? 0.0 : StudyFiles::kLargestUtcOffsetS);
+  if (*moment.has_utc_offset != *than.has_utc_offset) return *moment.at_s > *than.at_s - StudyFiles::kLargestUtcOffsetS;
+  return *moment.at_s > *than.at_s || is_later_by_clock;
 }
 
 Objection Objections::newer_xrays(const OfPatient& patient, const std::set<Xray>& own,
@@ -100,12 +108,15 @@ Objection Objections::newer_xrays(const OfPatient& patient, const std::set<Xray>
     have_results = have_results && registered.contains(one.first.first);
   }
   if (newest == nullptr) return {};
+  const auto of_newest =
+      std::ranges::find_if(patient.results, [&](const auto& result) { return result.second.contains(newest->first); });
   const std::string& acquired = newest->first.second;
   const std::string label = newest->second.label.empty() ? "an X-ray" : newest->second.label;
   return {.words = acquired.empty()
                        ? fmt::format("the patient has other X-rays, which may be newer: {} of an unknown time", label)
                        : fmt::format("the patient has newer X-rays: {} {}", label, acquired),
-          .newer_have_results = have_results && !acquired.empty()};
+          .newest_session =
+              have_results && !acquired.empty() && of_newest != patient.results.end() ? of_newest->first : ""};
 }
 
 Objection Objections::objection(const OfPatient& patient, const std::set<Xray>& own,

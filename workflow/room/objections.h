@@ -25,6 +25,9 @@ class Objections {
   // Looks at the X-rays that have arrived, by PatientID. `registered`: the SOPInstanceUIDs of those that have a result.
   void update(const std::map<std::string, Patient>& patients, const std::set<std::string>& registered);
 
+  // The sessions that have a result, by PatientID.
+  std::map<std::string, std::set<std::string>> sessions() const;
+
   // An objection is never withdrawn, and X-rays that are moved away count on: they have been taken all the same.
   const std::map<std::string, Objection>& by_session() const { return by_session_; }
 

@@ -40,7 +40,8 @@ std::string to_string(const Releaser& releaser);
 // What other X-rays of the patient say against a result.
 struct Objection {
   std::string words;
-  bool newer_have_results = false;  // there are newer X-rays, and nothing else: all of them have results of their own
+  // The session of the newest X-rays, if all newer X-rays have results, and nothing else speaks against this one.
+  std::string newest_session;
 
   bool operator==(const Objection&) const = default;
 };
@@ -94,7 +95,9 @@ class ResultsTree {
 
   // What other X-rays say against results, by session.
   std::map<std::string, Objection> objections() const;
-  Objection objection(const std::string& session) const;  // without words: none
+  // That against one result; without words: none. If the audit log says that there is another one than objections.json
+  // says, the words say so.
+  Objection objection(const std::string& session) const;
   // The caller must hold the lock of the tree.
   void keep_objections(const std::map<std::string, Objection>& objections);
 
@@ -142,6 +145,7 @@ class ResultsTree {
   void put_release(const Release& release);
   std::filesystem::path sent_file(const Delivery& delivery) const;
   std::filesystem::path prepared_file(const Delivery& delivery) const;
+  bool is_followed_by(const std::string& session, const std::string& peer) const;
   bool is_marked(const Delivery& delivery) const;
   bool is_sent(const Delivery& delivery) const;
 

@@ -52,9 +52,15 @@ void Watch::round() {
         fmt::format("{}: its .watch.lock was removed or replaced, so another isoshift watch may be working here: "
                     "this watch ends",
                     tree_.path().string()));
+  set_sendable({});
+  const bool was_source_read = is_source_read_;
   troubles_.attempt("receiving", [&] { receive(); });
   troubles_.attempt("registering", [&] { register_complete(); });
-  troubles_.attempt("comparing X-rays with results", [&] { look_for_objections(); });
+  troubles_.attempt("comparing X-rays with results", [&] {
+    look_for_objections();
+    // In its first round a source may only have seen that there are files.
+    set_sendable({.is_known = was_source_read && is_source_read_, .waiting = sessions_whose_files_come()});
+  });
   troubles_.attempt("releasing", [&] { release_automatically(); });
   troubles_.attempt("writing the audit log", [&] { tree_.write_kept_audit(); });
   troubles_.attempt("writing the index", [&] { index_.update(waiting_, troubles(), objections_.by_session()); });
@@ -67,7 +73,11 @@ std::vector<std::string> Watch::troubles() const {
 }
 
 void Watch::deliver(const std::stop_token& stop) {
-  sending_troubles_.attempt("sending", [&] { deliverer_.deliver(stop, parts_.sending); });
+  const auto may_be_sent = [&](const std::string& session) {
+    const std::lock_guard lock(sendable_mutex_);
+    return sendable_.is_known && !sendable_.waiting.contains(session);
+  };
+  sending_troubles_.attempt("sending", [&] { deliverer_.deliver(stop, may_be_sent, parts_.sending); });
 }
 
 void Watch::run(const std::function<bool()>& is_end_asked_for) {
@@ -134,7 +144,7 @@ void Watch::take_result(const std::string& session, const std::optional<Running>
   if (made) parts_.observer.say(fmt::format("session {}: {}", session, to_string(report.verdict)));
   if (made && watch_.site.automatic_release && report.verdict == Verdict::kAccepted && obstacle.empty() &&
       reason.empty())
-    accepted_[session] = {.patient_id = made->patient_id, .parts = made->parts};
+    accepted_[session] = made->patient_id;
 }
 
 // Why the site's rule does not release an accepted result. Empty: it may, or there is no such rule.
@@ -226,7 +236,6 @@ void Watch::begin_registration(const Complete& complete) {
     running_ = Running{.session = session,
                        .news = complete.last,
                        .patient_id = patient_id_of(complete.session.patient),
-                       .parts = std::move(parts),
                        .names_plan = std::ranges::all_of(complete.session.images, names_plan)};
   } catch (const std::exception& error) {
     fail(session, complete.last, {.why = error.what()});
@@ -273,6 +282,19 @@ void Watch::look_for_objections() {
   kept_objections_ = objections_.by_session();
 }
 
+// A file that is coming may be an X-ray that speaks against them.
+std::set<std::string> Watch::sessions_whose_files_come() const {
+  std::set<std::string> waiting;
+  for (const auto& [patient_id, sessions] : objections_.sessions())
+    if (parts_.source.is_coming(patient_id)) waiting.insert(sessions.begin(), sessions.end());
+  return waiting;
+}
+
+void Watch::set_sendable(Sendable sendable) {
+  const std::lock_guard lock(sendable_mutex_);
+  sendable_ = std::move(sendable);
+}
+
 void Watch::release_by_rule(const std::string& session) {
   if (tree_.is_released(session)) return;
   tree_.release(session,
@@ -285,16 +307,15 @@ void Watch::release_by_rule(const std::string& session) {
 }
 
 // A release that fails must not block the others. A result against which other X-rays speak is released by a person or
-// not at all; while the source does not answer, or a file is on its way, it is not known whether any do.
+// not at all; while the source does not answer, a file is on its way, or a file of the source, of whatever patient,
+// cannot be read, it is not known whether any do.
 void Watch::release_automatically() {
-  if (!is_source_read_) return;
+  if (!is_source_read_ || !parts_.source.unreadable().empty()) return;
   std::erase_if(accepted_, [&](const auto& one) { return objections_.by_session().contains(one.first); });
   std::string trouble;
   std::erase_if(accepted_, [&](const auto& one) {
-    const auto& [session, accepted] = one;
-    if (parts_.source.is_coming(accepted.patient_id) ||
-        !unreadable_beside(accepted.parts, parts_.source.unreadable()).empty())
-      return false;
+    const auto& [session, patient_id] = one;
+    if (parts_.source.is_coming(patient_id)) return false;
     try {
       release_by_rule(session);
       return true;

@@ -5,6 +5,7 @@
 #include <chrono>
 #include <functional>
 #include <map>
+#include <mutex>
 #include <optional>
 #include <set>
 #include <stop_token>
@@ -64,15 +65,14 @@ class Watch {
  private:
   struct Running {
     std::string session;
-    Clock::Time news;        // when the patient's last file had arrived, as the registration began
-    std::string patient_id;  // in the source
-    StudyParts parts;
+    Clock::Time news;         // when the patient's last file had arrived, as the registration began
+    std::string patient_id;   // in the source
     bool names_plan = false;  // all X-rays do
   };
-  // A result that will be released without a person.
-  struct Accepted {
-    std::string patient_id;
-    StudyParts parts;
+  // What may be sent. Not known: the source does not answer, or its X-rays were not compared with the results yet.
+  struct Sendable {
+    bool is_known = false;
+    std::set<std::string> waiting;  // sessions that may not
   };
   struct Failure {
     std::string why;
@@ -100,6 +100,8 @@ class Watch {
   void end_registration();
   void fail(const std::string& session, Clock::Time news, const Runner::Failure& failure);
   void look_for_objections();
+  std::set<std::string> sessions_whose_files_come() const;
+  void set_sendable(Sendable sendable);
   void release_automatically();
   void release_by_rule(const std::string& session);
 
@@ -111,9 +113,11 @@ class Watch {
   std::map<std::string, Objection> kept_objections_;  // those on the disk
   SessionIndex index_;
   Deliverer deliverer_;
-  std::set<std::string> registered_;          // SOPInstanceUIDs of X-rays that have a result
-  std::map<std::string, Accepted> accepted_;  // by session
-  bool is_source_read_ = false;               // in this round
+  std::mutex sendable_mutex_;  // deliver() reads, round() writes
+  Sendable sendable_;
+  std::set<std::string> registered_;             // SOPInstanceUIDs of X-rays that have a result
+  std::map<std::string, std::string> accepted_;  // released without a person: PatientID in the source, by session
+  bool is_source_read_ = false;                  // in this round
   std::vector<WaitingSession> waiting_;
   std::optional<Running> running_;
   std::map<std::string, Failure> failures_;  // by session

@@ -142,6 +142,9 @@ TEST_F(RegistrationCheckTest, ItemsThatContradictEachOtherAreFound) {
   expect_error("item 3: says that the room (IEC 61217 Fixed) is the registered frame",
                [&](DicomItem d) { third_item(d, kIecFixedFrameUid); });
   start_again();
+  expect_error("it registers several frames, one of them by an identity", [&](DicomItem d) { third_item(d, "1.2.3"); });
+  EXPECT_FALSE(check_registration(path_).registered_from_source);
+  start_again();
   expect_error("item 2: gives the image", [&](DicomItem d) {
     const DicomItem image = item(d, 0).items(DCM_ReferencedImageSequence)[0];
     item(d, 1).append_reference(DCM_ReferencedImageSequence, image.required_text(DCM_ReferencedSOPClassUID),
@@ -197,16 +200,43 @@ TEST_F(RegistrationCheckTest, NoIsocenterIsPlacedWhereNoFrameIsNamed) {
   EXPECT_THAT(checked.findings.back().text, HasSubstr("names no FrameOfReferenceUID (0020,0052)"));
 }
 
+TEST_F(RegistrationCheckTest, AnInverseIsFoundWhereverTheSourceFrameBegins) {
+  edit(path_, [](DicomItem d) { d.put(DCM_Manufacturer, "Somebody"); });
+  const auto inverse = folder_ / "inverse.dcm";
+  std::filesystem::copy_file(path_, inverse);
+  edit(inverse, [&](DicomItem d) { put_matrix(d, 1, result().inverse()); });
+  CheckedRegistration checked = check_registration(path_), inverted = check_registration(inverse);
+  const Eigen::Vector3d isocenter(20.0, -50.0, 60.0);
+  const RegistrationMeaning meaning = meaning_of(checked, std::nullopt, isocenter),
+                            inverted_meaning = meaning_of(inverted, std::nullopt, isocenter);
+  EXPECT_TRUE(compare(checked, meaning, inverted, inverted_meaning).difference.value().other_is_inverted);
+  EXPECT_FALSE(compare(checked, meaning, checked, meaning).difference.value().other_is_inverted);
+}
+
+TEST_F(RegistrationCheckTest, AnObjectThatMovesTheCtIsSaid) {
+  edit(path_, [&](DicomItem d) {
+    d.put(DCM_FrameOfReferenceUID, "1.2.3.9");
+    item(d, 0).put(DCM_FrameOfReferenceUID, "1.2.3.9");
+    item(d, 1).put(DCM_FrameOfReferenceUID, study_->ct->frame_of_reference_uid);
+  });
+  CheckedRegistration checked = check_registration(path_);
+  const PlannedSetup setup{.plan = study_->plan};
+  EXPECT_FALSE(meaning_of(checked, setup, Eigen::Vector3d::Zero()).couch_shift);
+  ASSERT_TRUE(checked.has_errors());
+  EXPECT_THAT(std::ranges::find_if(checked.findings, &RegistrationFinding::is_error)->text,
+              HasSubstr("it registers the other way around"));
+}
+
 TEST(RegistrationDifference, IsWhereTheIsocentersLieAndHowTheyAreTurned) {
   Eigen::Isometry3d a = Eigen::Isometry3d::Identity(), b = a;
   a.translate(Eigen::Vector3d(100.0, -50.0, 300.0));
   b.translate(Eigen::Vector3d(101.0, -52.0, 302.0));
   b.rotate(Eigen::AngleAxisd(rad_from_deg(2.0), Eigen::Vector3d::UnitZ()));
-  const RegistrationDifference difference = difference_between(a, b);
+  const RegistrationDifference difference = difference_between(a, b, b.inverse());
   EXPECT_NEAR(difference.translation_mm, 3.0, 1e-9);
   EXPECT_NEAR(difference.angle_rad, rad_from_deg(2.0), 1e-9);
   EXPECT_FALSE(difference.other_is_inverted);
-  EXPECT_TRUE(difference_between(a, b.inverse()).other_is_inverted);
+  EXPECT_TRUE(difference_between(a, b.inverse(), b).other_is_inverted);
 }
 
 }  // namespace

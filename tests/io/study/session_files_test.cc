@@ -227,6 +227,51 @@ TEST(Sessions, AFileThatCannotBeReadCountsBelowTheFolderOfAllXrays) {
   EXPECT_EQ(unreadable_beside(together, {"/a/b/x.dcm: is cut off"}), "/a/b/x.dcm: is cut off");
 }
 
+// AP and LAT, the couch moves, ...; the last LAT was not taken, or the first AP was not exported: what lies near each
+// other is not one setup, and every session of such a chain has whole neighbors but for those at its ends.
+TEST(Sessions, AChainOfSessionsThatMayBeShiftedIsDoubtful) {
+  const auto doubtful = [](const std::vector<double>& seconds, const std::string& first,
+                           const std::vector<StudyFiles::Image>& other_xrays = {}) {
+    StudyFiles files;
+    files.other_xrays = other_xrays;
+    std::string label = first;
+    for (const double second : seconds) {
+      files.images.push_back(image(fmt::format("{}", second), label, second));
+      label = label == "AP" ? "LAT" : "AP";
+    }
+    std::string pairs;  // "!": with a doubt
+    for (const SessionFiles& session : sessions_of(files, false))
+      if (session.images.size() == 2)
+        pairs += fmt::format("{}+{}{} ", session.images[0].sop_instance_uid, session.images[1].sop_instance_uid,
+                             session.doubts.empty() ? "" : "!");
+    return pairs;
+  };
+  EXPECT_EQ(doubtful({0, 60, 80, 140, 160}, "AP"), "60+80! 140+160! ");
+  EXPECT_EQ(doubtful({0, 20, 80, 100, 160}, "LAT"), "0+20! 80+100! ");
+  EXPECT_EQ(doubtful({0, 80, 95}, "AP"), "80+95! ");
+  EXPECT_EQ(doubtful({0, 100, 118}, "AP"), "100+118! ");
+  EXPECT_EQ(doubtful({0, 200, 220}, "AP"), "200+220! ");
+  // X-rays of other classes hide nothing.
+  EXPECT_EQ(doubtful({0, 60, 75}, "AP", {image("clip", "", 30)}), "60+75! ");
+  EXPECT_EQ(doubtful({0, 60, 75}, "AP", {image("copy", "", 2)}), "60+75! ");
+  // Whole sessions, near each other, and a single X-ray far from them.
+  EXPECT_EQ(doubtful({0, 10, 40, 50, 100, 110}, "AP"), "0+10 40+50 100+110 ");
+  EXPECT_EQ(doubtful({0, 10, 300}, "AP"), "0+10 ");
+}
+
+// A top that moves on the table need not change its read-outs.
+TEST(Sessions, UnmovedReadOutsDoNotSettleWhatARetakeLeavesOpen) {
+  const auto at = [](StudyFiles::Image one, double vertical_mm) {
+    one = at_table(std::move(one), vertical_mm);
+    one.table.longitudinal_mm = 812.0;
+    return one;
+  };
+  const StudyFiles::Image lat = at(image("b", "LAT", 60), -150), ap = at(image("c", "AP", 75), -150);
+  EXPECT_THAT(doubts_of({at(image("a", "AP", 0), -150), lat, ap}),
+              testing::ElementsAre(testing::HasSubstr("/x/a, 60 s before, has no partner")));
+  EXPECT_THAT(doubts_of({at(image("a", "AP", 0), -140), lat, ap}), testing::IsEmpty());
+}
+
 TEST(Sessions, AnXrayWithoutItsPartnerMakesItsNeighborsDoubtful) {
   using testing::ElementsAre;
   using testing::HasSubstr;

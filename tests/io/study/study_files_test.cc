@@ -9,6 +9,7 @@
 namespace isoshift {
 namespace {
 
+namespace fs = std::filesystem;
 using testing::Contains;
 using testing::ElementsAre;
 using testing::HasSubstr;
@@ -176,6 +177,35 @@ TEST_F(StudyFilesTest, LocalizersAndOtherObjectsAreLeftAside) {
   EXPECT_EQ(parts.ct.size(), 34U);
   EXPECT_THAT(notes_.left_aside, Contains(HasSubstr("CT0000.dcm: a CT localizer")));
   EXPECT_THAT(notes_.left_aside, Contains(HasSubstr("CT0035.dcm: MRImageStorage")));
+}
+
+TEST_F(StudyFilesTest, FilesThatLostTheirContentsAreSaid) {
+  const TemporaryFolder folder;
+  std::ofstream(folder / "empty.dcm");
+  std::ofstream(folder / "zeros") << std::string(200, '\0');
+  std::ofstream(folder / "cut.dcm") << std::string(100, 'x');
+  for (const char* name : {"export.done", "README", "notes.txt"}) std::ofstream(folder / name) << "text";
+  std::ofstream(folder / "transfer.ok");
+  const StudyFiles files = scan_study({folder.path()});
+  EXPECT_THAT(files.unreadable,
+              testing::UnorderedElementsAre(HasSubstr("empty.dcm: is empty or begins with zeros"),
+                                            HasSubstr("zeros: is empty or begins with zeros"),
+                                            HasSubstr("cut.dcm: is not a DICOM file, as its name says")));
+  EXPECT_EQ(files.left_aside.size(), 4U);
+}
+
+TEST_F(StudyFilesTest, FoldersAreFoundThroughLinksOnce) {
+  const TemporaryFolder folder, elsewhere;
+  fs::create_directory(elsewhere / "retakes");
+  std::ofstream(elsewhere / "retakes" / "a") << "text";
+  fs::create_directory_symlink(elsewhere.path(), folder / "link");
+  fs::create_directory_symlink(folder.path(), elsewhere / "back");  // round and round
+  EXPECT_EQ(files_below({folder.path()}), std::vector{folder / "link" / "retakes" / "a"});
+  fs::create_directory_symlink("/not/there", folder / "lost");
+  std::set<fs::path> unsearchable;
+  EXPECT_EQ(files_below({folder.path()}, {}, &unsearchable).size(), 1U);
+  EXPECT_EQ(unsearchable, std::set{folder / "lost"});
+  EXPECT_THROW(files_below({folder.path()}), Error);
 }
 
 TEST_F(StudyFilesTest, WhatWasNamedIsWhatTheMessageNames) {

@@ -6,6 +6,7 @@
 #include <fstream>
 
 #include "tests/support/small_study.h"
+#include "tests/support/treatment_room.h"
 
 namespace isoshift {
 namespace {
@@ -62,6 +63,25 @@ TEST_F(FolderSourceTest, AFileThatIsStillZerosIsOnItsWay) {
   fs::copy_file(study_.image(0), in_ / "plan2.dcm", fs::copy_options::overwrite_existing);
   settle();
   EXPECT_FALSE(is_coming());
+}
+
+TEST_F(FolderSourceTest, WhatDoesNotArriveWholeIsSaid) {
+  ManualClock clock;
+  FolderSource source(in_, clock);
+  std::ofstream(in_ / "empty.dcm");
+  std::ofstream(in_ / "2.25.17") << std::string(1000, '\0');
+  std::ofstream(in_ / "cut.dcm") << std::string(100, 'x');
+  std::ofstream(in_ / "export.done");
+  std::ofstream(in_ / "export.zeros") << std::string(1000, '\0');
+  for (int n = 0; n < 3; ++n) source.update(notes_);
+  EXPECT_TRUE(source.is_coming("P"));
+  EXPECT_THAT(source.unreadable(), testing::ElementsAre(HasSubstr("cut.dcm: is not a DICOM file")));
+  clock.pass(std::chrono::seconds(61));
+  source.update(notes_);
+  EXPECT_FALSE(source.is_coming("P"));
+  EXPECT_THAT(source.unreadable(), testing::UnorderedElementsAre(HasSubstr("cut.dcm: is not a DICOM file"),
+                                                                 HasSubstr("empty.dcm: has not arrived whole"),
+                                                                 HasSubstr("2.25.17: has not arrived whole")));
 }
 
 TEST_F(FolderSourceTest, WhatIsOfSomebodyElseOrNoDicomIsNotWaitedFor) {

@@ -195,7 +195,7 @@ TEST_F(WatchReleases, NothingIsReleasedByTheRuleWhileAnXrayMayBeOnItsWay) {
   room_.pass(60s);
   EXPECT_FALSE(is_released("P"));
   room_.source.set_coming(false);
-  room_.source.broken = {"/in/P3: cannot be read"};
+  room_.source.broken = {"/elsewhere/P3: cannot be read"};
   room_.pass(60s);
   EXPECT_FALSE(is_released("P"));
   room_.source.broken.clear();
