@@ -72,8 +72,9 @@ void run_release(const std::filesystem::path& file, const std::string& session, 
   ConsoleObserver observer(console);
   SystemClock clock;
   DicomSender sender;
-  const auto may_be_sent = [](const std::string&) { return true; };                             // nobody compares
-  if (lock) Deliverer(watch, sender, clock).deliver(std::stop_token(), may_be_sent, observer);  // nobody else does
+  // Without a watch nobody compares what else was released with the source.
+  const auto may_be_sent = [&](const std::string& other) { return other == session; };
+  if (lock) Deliverer(watch, sender, clock).deliver(std::stop_token(), may_be_sent, observer);
   if (release.peers.empty()) return;
   if (tree.pending_of(release).empty())
     console.out << "sent\n";

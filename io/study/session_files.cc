@@ -124,7 +124,7 @@ class Doubts {
  public:
   // `sessions`: all that were found among the `images` of all patients.
   Doubts(std::vector<StudyFiles::Image> images, std::span<const SessionFiles> sessions) : images_(std::move(images)) {
-    std::ranges::stable_sort(images_, {}, &StudyFiles::Image::at_s);
+    std::ranges::sort(images_, {}, [](const auto& image) { return std::tuple(image.at_s, image.file); });
     for (const StudyFiles::Image& image : images_) of_patient_[patient_id_of(image.patient)].push_back(&image);
     for (const SessionFiles& session : sessions)
       for (const StudyFiles::Image& image : session.images) session_of_[image.sop_instance_uid] = session.images;

@@ -76,7 +76,7 @@ void Objections::update(const std::map<std::string, Patient>& patients, const st
       Objection found = objection(patient, own, registered);
       const auto earlier = by_session_.find(session);
       const bool is_final =  // of an earlier run, which has seen more
-          earlier != by_session_.end() && earlier->second.newest_session.empty() && !are_seen(patient, own);
+          earlier != by_session_.end() && !earlier->second.newer_have_results && !are_seen(patient, own);
       if (!found.words.empty() && !is_final) by_session_[session] = std::move(found);
     }
   }
@@ -108,15 +108,12 @@ Objection Objections::newer_xrays(const OfPatient& patient, const std::set<Xray>
     have_results = have_results && registered.contains(one.first.first);
   }
   if (newest == nullptr) return {};
-  const auto of_newest =
-      std::ranges::find_if(patient.results, [&](const auto& result) { return result.second.contains(newest->first); });
   const std::string& acquired = newest->first.second;
   const std::string label = newest->second.label.empty() ? "an X-ray" : newest->second.label;
   return {.words = acquired.empty()
                        ? fmt::format("the patient has other X-rays, which may be newer: {} of an unknown time", label)
                        : fmt::format("the patient has newer X-rays: {} {}", label, acquired),
-          .newest_session =
-              have_results && !acquired.empty() && of_newest != patient.results.end() ? of_newest->first : ""};
+          .newer_have_results = have_results && !acquired.empty()};
 }
 
 Objection Objections::objection(const OfPatient& patient, const std::set<Xray>& own,

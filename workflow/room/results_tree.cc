@@ -63,7 +63,7 @@ Release release_from(const nlohmann::json& json) {
 constexpr const char* kObjectionsFile = "objections.json";
 
 std::string sha256_of(const Objection& objection) {
-  return isoshift::sha256_of(objection.words + "\n" + objection.newest_session);
+  return isoshift::sha256_of(objection.words + (objection.newer_have_results ? "\n1" : "\n0"));
 }
 
 // A label or a file's name need not be UTF-8.
@@ -103,7 +103,7 @@ std::map<std::string, Objection> ResultsTree::objections() const {
   if (!fs::exists(file)) return all;
   try {
     for (const auto& [session, objection] : read_json_file(file).json.get<std::map<std::string, nlohmann::json>>())
-      all[session] = {.words = objection.at("words"), .newest_session = objection.at("newest_session")};
+      all[session] = {.words = objection.at("words"), .newer_have_results = objection.at("newer_have_results")};
   } catch (const nlohmann::json::exception&) {
     throw Error(fmt::format("{}: is not a list of objections as isoshift watch writes it", file.string()));
   }
@@ -113,11 +113,11 @@ std::map<std::string, Objection> ResultsTree::objections() const {
 void ResultsTree::keep_objections(const std::map<std::string, Objection>& objections) {
   Json json = Json::object();
   for (const auto& [session, objection] : objections)
-    json[session] = {{"words", objection.words}, {"newest_session", objection.newest_session}};
-  replace_text(path_ / kObjectionsFile, text_of(json));
+    json[session] = {{"words", objection.words}, {"newer_have_results", objection.newer_have_results}};
   for (const auto& [session, objection] : objections)
     if (const std::string sha256 = sha256_of(objection); audit_.newest_objection(session) != sha256)
       audit_.append("objection", {{"session", session}, {"objection", sha256}});
+  replace_text(path_ / kObjectionsFile, text_of(json));
 }
 
 Objection ResultsTree::objection(const std::string& session) const {
@@ -127,8 +127,7 @@ Objection ResultsTree::objection(const std::string& session) const {
   const std::string proven = audit_.newest_objection(session);
   if (proven.empty() || proven == sha256_of(objection)) return objection;
   return {.words = fmt::format("audit.jsonl tells of an objection to it that {} does not hold{}{}", kObjectionsFile,
-                               objection.words.empty() ? "" : "; ", objection.words),
-          .newest_session = ""};
+                               objection.words.empty() ? "" : "; ", objection.words)};
 }
 
 bool ResultsTree::is_released(const std::string& session) const { return fs::exists(release_file(session)); }
@@ -257,8 +256,8 @@ Release ResultsTree::release(const std::string& session, const Releaser& release
                     "it again",
                     session, release_file(session).string()));
   const Objection other_xrays = objection(session);
-  const bool is_allowed = other_xrays.words.empty() || releaser.despite_objection ||
-                          (releaser.is_person && !other_xrays.newest_session.empty());
+  const bool is_allowed =
+      other_xrays.words.empty() || releaser.despite_objection || (releaser.is_person && other_xrays.newer_have_results);
   if (!is_allowed)
     throw Error(
         fmt::format("session {}: {}.\n       To release its result all the same, repeat the command with "
@@ -362,21 +361,11 @@ ResultsTree::Pending ResultsTree::pending() {
   return pending;
 }
 
-// Whether the peer will receive the result of a session, and has received nothing of it yet.
-bool ResultsTree::is_followed_by(const std::string& session, const std::string& peer) const {
-  const std::optional<Release> release = session.empty() ? std::nullopt : release_of(session);
-  return release && std::ranges::find(release->peers, peer) != release->peers.end() &&
-         std::ranges::none_of(release->objects, [&](const Release::Object& object) {
-           return is_sent({.session = session, .peer = peer, .object = object});
-         });
-}
-
 fs::path ResultsTree::checked_file(const Delivery& delivery) const {
   const auto release = release_of(delivery.session);
   if (!release) throw Error(fmt::format("session {}: is not released any more", delivery.session));
   const Objection other_xrays = objection(delivery.session);
-  const bool is_known_to_releaser = other_xrays.words == release->despite;
-  if (!other_xrays.words.empty() && !is_known_to_releaser && !is_followed_by(other_xrays.newest_session, delivery.peer))
+  if (!other_xrays.words.empty() && other_xrays.words != release->despite)
     throw Error(fmt::format(
         "session {}: since its release, {}. To send it all the same, remove {} and release the session again "
         "with --despite-other-xrays",

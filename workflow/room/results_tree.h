@@ -40,8 +40,7 @@ std::string to_string(const Releaser& releaser);
 // What other X-rays of the patient say against a result.
 struct Objection {
   std::string words;
-  // The session of the newest X-rays, if all newer X-rays have results, and nothing else speaks against this one.
-  std::string newest_session;
+  bool newer_have_results = false;  // there are newer X-rays, and nothing else: all of them have results of their own
 
   bool operator==(const Objection&) const = default;
 };
@@ -145,7 +144,6 @@ class ResultsTree {
   void put_release(const Release& release);
   std::filesystem::path sent_file(const Delivery& delivery) const;
   std::filesystem::path prepared_file(const Delivery& delivery) const;
-  bool is_followed_by(const std::string& session, const std::string& peer) const;
   bool is_marked(const Delivery& delivery) const;
   bool is_sent(const Delivery& delivery) const;
 
