@@ -35,6 +35,14 @@ class WatchReleases : public testing::Test {
     ResultsTree(room_.file.results)
         .release(session(patient), {.by = "J. Doe", .user = "isoshift", .sudo_user = ""}, room_.file.names_of_peers());
   }
+  // P's result is released, and no peer answers.
+  void release_while_peers_are_down() {
+    room_.start();
+    bring("P");
+    room_.pass(std::chrono::seconds(60));
+    room_.sender.down = {"record", "archive"};
+    release("P");
+  }
   std::string error_of_release(const std::string& patient) {
     try {
       release(patient);

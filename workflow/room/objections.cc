@@ -55,10 +55,12 @@ void Objections::see(const std::string& patient_id, const StudyFiles& files) {
     }
 }
 
-std::map<std::string, std::set<std::string>> Objections::sessions() const {
-  std::map<std::string, std::set<std::string>> sessions;
+std::set<std::string> Objections::sessions_of(
+    const std::function<bool(const std::string& patient_id)>& is_asked_for) const {
+  std::set<std::string> sessions;
   for (const auto& [patient_id, patient] : patients_)
-    for (const auto& [session, own] : patient.results) sessions[patient_id].insert(session);
+    if (is_asked_for(patient_id))
+      for (const auto& [session, own] : patient.results) sessions.insert(session);
   return sessions;
 }
 

@@ -2,6 +2,7 @@
 // What the other X-rays of a patient say against a result: the couch may have moved since the result's X-rays were
 // taken, or between them.
 
+#include <functional>
 #include <map>
 #include <optional>
 #include <set>
@@ -25,8 +26,8 @@ class Objections {
   // Looks at the X-rays that have arrived, by PatientID. `registered`: the SOPInstanceUIDs of those that have a result.
   void update(const std::map<std::string, Patient>& patients, const std::set<std::string>& registered);
 
-  // The sessions that have a result, by PatientID.
-  std::map<std::string, std::set<std::string>> sessions() const;
+  // The sessions that have a result, of patients of whom `is_asked_for` is true.
+  std::set<std::string> sessions_of(const std::function<bool(const std::string& patient_id)>& is_asked_for) const;
 
   // An objection is never withdrawn, and X-rays that are moved away count on: they have been taken all the same.
   const std::map<std::string, Objection>& by_session() const { return by_session_; }

@@ -62,12 +62,15 @@ Release release_from(const nlohmann::json& json) {
 
 constexpr const char* kObjectionsFile = "objections.json";
 
-std::string sha256_of(const Objection& objection) {
-  return isoshift::sha256_of(objection.words + (objection.newer_have_results ? "\n1" : "\n0"));
-}
-
 // A label or a file's name need not be UTF-8.
 std::string text_of(const Json& json) { return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n"; }
+
+Json json_of(const Objection& objection) {
+  return {{"words", objection.words}, {"newer_have_results", objection.newer_have_results}};
+}
+
+// Of its text in the file.
+std::string sha256_of(const Objection& objection) { return isoshift::sha256_of(text_of(json_of(objection))); }
 
 // Folders of registrations under way: ".NAME.registering-PROCESS", and what isoshift register writes beside them.
 constexpr const char* kRegistering = ".registering-";
@@ -112,11 +115,11 @@ std::map<std::string, Objection> ResultsTree::objections() const {
 
 void ResultsTree::keep_objections(const std::map<std::string, Objection>& objections) {
   Json json = Json::object();
-  for (const auto& [session, objection] : objections)
-    json[session] = {{"words", objection.words}, {"newer_have_results", objection.newer_have_results}};
-  for (const auto& [session, objection] : objections)
+  for (const auto& [session, objection] : objections) {
+    json[session] = json_of(objection);
     if (const std::string sha256 = sha256_of(objection); audit_.newest_objection(session) != sha256)
       audit_.append("objection", {{"session", session}, {"objection", sha256}});
+  }
   replace_text(path_ / kObjectionsFile, text_of(json));
 }
 

@@ -284,10 +284,7 @@ void Watch::look_for_objections() {
 
 // A file that is coming may be an X-ray that speaks against them.
 std::set<std::string> Watch::sessions_whose_files_come() const {
-  std::set<std::string> waiting;
-  for (const auto& [patient_id, sessions] : objections_.sessions())
-    if (parts_.source.is_coming(patient_id)) waiting.insert(sessions.begin(), sessions.end());
-  return waiting;
+  return objections_.sessions_of([&](const std::string& patient_id) { return parts_.source.is_coming(patient_id); });
 }
 
 void Watch::set_sendable(Sendable sendable) {

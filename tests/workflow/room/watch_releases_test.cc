@@ -182,11 +182,7 @@ TEST_F(WatchReleases, ForgedAndExchangedResultsAreNotSentAndSaidOnce) {
 }
 
 TEST_F(WatchReleases, ASessionThatIsRegisteredAgainNeedsAReleaseOfItsOwn) {
-  room_.start();
-  bring("P");
-  room_.pass(60s);
-  room_.sender.down = {"record", "archive"};
-  release("P");
+  release_while_peers_are_down();
   fs::rename(room_.file.results / "sessions" / session("P"), room_.folder / "aside");
   room_.sender.down.clear();
   room_.runner.verdict = [](const auto&) { return Verdict::kReview; };

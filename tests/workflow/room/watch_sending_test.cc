@@ -18,15 +18,6 @@ using testing::SizeIs;
 
 class WatchSending : public WatchReleases {
  protected:
-  // P's result is released, and no peer has answered yet.
-  void release_while_peers_are_down() {
-    room_.start();
-    bring("P");
-    room_.pass(60s);
-    room_.sender.down = {"record", "archive"};
-    release("P");
-    room_.pass(5s);
-  }
   void bring_verification() {
     room_.source.bring(xray("P", "P4", "AP", second_of(10, 20)));
     room_.source.bring(xray("P", "P5", "LAT", second_of(10, 20, 10)));
