@@ -29,7 +29,7 @@ void compare(benchmark::State& state, SimilarityKind kind) {
   const std::vector<float> drr = pixels_of(count, 2);
   std::vector<Neighbors> neighbors;
   for (std::uint32_t n = 256; n + 256 < drr.size(); ++n) neighbors.push_back({n - 1, n + 1, n - 256, n + 256});
-  const Comparison comparison(kind, pixels_of(count, 1), neighbors);
+  const Comparison comparison(kind, pixels_of(count, 1), neighbors, range_of(drr));
   for (auto _ : state) benchmark::DoNotOptimize(comparison.of(drr));
   state.counters["pixels/s"] =
       benchmark::Counter(static_cast<double>(count), benchmark::Counter::kIsIterationInvariantRate);

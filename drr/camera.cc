@@ -15,8 +15,12 @@ Camera make_camera(const XrayView& view, const Eigen::Isometry3d& room_from_pati
                    const Eigen::Affine3d& voxel_from_patient) {
   const Eigen::Isometry3d patient_from_room = room_from_patient.inverse();
   const Eigen::Matrix3d voxel_from_room_axes = voxel_from_patient.linear() * patient_from_room.linear();
+  const Eigen::Matrix3d way_room_from_pixel = view.pixel_from_room.leftCols<3>().inverse();
   return {.source_voxel = voxel_from_patient * (patient_from_room * view.source_room_mm),
-          .way_voxel_from_pixel = voxel_from_room_axes * view.pixel_from_room.leftCols<3>().inverse()};
+          .way_voxel_from_pixel = voxel_from_room_axes * way_room_from_pixel,
+          .source_room_mm = view.source_room_mm,
+          .way_room_from_pixel = way_room_from_pixel,
+          .voxel_from_room_axes = voxel_from_room_axes};
 }
 
 std::vector<std::size_t> checked_view_begins(std::span<const XrayView> views,

@@ -14,6 +14,11 @@ struct Camera {
   Eigen::Vector3d source_voxel;          // in continuous voxel indices
   Eigen::Matrix3d way_voxel_from_pixel;  // (column, row, 1) to the way from the source to that pixel's center
 
+  // The same in the room, and directions of the room in voxels.
+  Eigen::Vector3d source_room_mm;
+  Eigen::Matrix3d way_room_from_pixel;
+  Eigen::Matrix3d voxel_from_room_axes;
+
   // As shaders take it: (column, row, 1, 0) to the way, (0, 0, 0, 1) to the source.
   Eigen::Matrix4d matrix() const;
 };

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numeric>
 #include <random>
+#include <stdexcept>
 
 #include "base/error.h"
 #include "drr/cpu/raycast.h"
@@ -44,6 +45,11 @@ bool is_oracle(RendererKind kind) { return kind == RendererKind::kSiddon || kind
 
 bool is_splatting(RendererKind kind) {
   return kind == RendererKind::kSplat || kind == RendererKind::kSplatTexture || kind == RendererKind::kSplatBuffers;
+}
+
+RenderResult Renderer::render_with_derivatives(std::span<const XrayView>, std::span<const Eigen::Isometry3d>,
+                                               const PixelSet&) {
+  throw std::logic_error(fmt::format("the renderer {} has no derivatives", to_string(kind())));
 }
 
 double default_sigma_mm(SplatOptions::Wobble wobble, double largest_spacing_mm, const XrayView& view) {
@@ -102,6 +108,14 @@ std::unique_ptr<Renderer> make_renderer(RendererKind kind, const Volume<float>& 
     case RendererKind::kSplatBuffers: return std::make_unique<SplatRenderer>(kind, ct_hu, model, beams, options);
   }
   return nullptr;
+}
+
+std::unique_ptr<Renderer> make_renderer(RendererKind kind, AttenuationByBeam attenuation_per_mm,
+                                        const RendererOptions& options) {
+  options.check(kind);
+  if (kind == RendererKind::kTrilinear) return std::make_unique<TrilinearRenderer>(std::move(attenuation_per_mm));
+  if (kind == RendererKind::kCpu) return std::make_unique<RaycastCpuRenderer>(attenuation_per_mm, options);
+  throw std::logic_error(fmt::format("the renderer {} takes HU, not attenuation", to_string(kind)));
 }
 
 Image<float> image_of(const XrayView& view, std::span<const float> line_integrals) {

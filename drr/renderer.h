@@ -91,22 +91,39 @@ struct PixelSet {
   std::size_t count(std::span<const XrayView> views, std::size_t view) const;
 };
 
+// How a line integral changes if the patient, at the pose rendered, moves in the room: per mm of translation along x, y
+// and z, and per rad of rotation about x, y and z through the isocenter. The motion is exp(theta) in front of the pose.
+using MotionDerivatives = Eigen::Matrix<float, 6, 1>;
+
 // The pixels of one render() call.
 class RenderResult {
  public:
-  RenderResult(std::vector<float> values, std::vector<std::size_t> view_begins)
-      : values_(std::move(values)), view_begins_(std::move(view_begins)) {}
+  RenderResult(std::vector<float> values, std::vector<std::size_t> view_begins,
+               std::vector<MotionDerivatives> derivatives = {})
+      : values_(std::move(values)), derivatives_(std::move(derivatives)), view_begins_(std::move(view_begins)) {}
 
   // Line integrals of one pose and view, in the order of the pixel set (row-major for all pixels).
   std::span<const float> line_integrals(std::size_t pose, std::size_t view) const& {
-    const std::size_t begin = pose * view_begins_.back() + view_begins_[view];
-    return std::span(values_).subspan(begin, view_begins_[view + 1] - view_begins_[view]);
+    return part_of(std::span(values_), pose, view);
   }
   std::span<const float> line_integrals(std::size_t pose,
                                         std::size_t view) const&& = delete;  // they would not outlive it
 
+  // The same pixels' derivatives; only render_with_derivatives() makes them.
+  std::span<const MotionDerivatives> derivatives(std::size_t pose, std::size_t view) const& {
+    return part_of(std::span(derivatives_), pose, view);
+  }
+  std::span<const MotionDerivatives> derivatives(std::size_t pose, std::size_t view) const&& = delete;
+
  private:
+  template <class T>
+  std::span<const T> part_of(std::span<const T> all, std::size_t pose, std::size_t view) const {
+    const std::size_t begin = pose * view_begins_.back() + view_begins_[view];
+    return all.subspan(begin, view_begins_[view + 1] - view_begins_[view]);
+  }
+
   std::vector<float> values_;
+  std::vector<MotionDerivatives> derivatives_;
   std::vector<std::size_t> view_begins_;  // within one pose; the last entry is the pose's total
 };
 
@@ -121,6 +138,13 @@ class Renderer {
   // on the CPU may be called from several threads at once; those on OpenGL from one.
   virtual RenderResult render(std::span<const XrayView> views, std::span<const Eigen::Isometry3d> room_from_patient,
                               const PixelSet& pixels) = 0;
+
+  // The same, and every line integral's derivatives, from the same walk along the ray (docs/algorithms.md,
+  // "Derivatives"). Throws std::logic_error if this renderer has none.
+  virtual RenderResult render_with_derivatives(std::span<const XrayView> views,
+                                               std::span<const Eigen::Isometry3d> room_from_patient,
+                                               const PixelSet& pixels);
+  virtual bool has_derivatives() const { return false; }
 
   virtual RendererKind kind() const = 0;
 
@@ -141,6 +165,11 @@ class Renderer {
 // used instead.
 std::unique_ptr<Renderer> make_renderer(RendererKind kind, const Volume<float>& ct_hu, const AttenuationModel& model,
                                         std::span<const Beam> beams, const RendererOptions& options = {});
+
+// The same of attenuation that is known already; for the kinds that know no model: trilinear and cpu. Another kind is a
+// logic error.
+std::unique_ptr<Renderer> make_renderer(RendererKind kind, AttenuationByBeam attenuation_per_mm,
+                                        const RendererOptions& options = {});
 
 // All pixels of a view as an image.
 Image<float> image_of(const XrayView& view, std::span<const float> line_integrals);

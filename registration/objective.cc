@@ -9,6 +9,7 @@
 #include <random>
 
 #include "base/error.h"
+#include "base/parallel.h"
 #include "drr/raycast/raycast.h"
 #include "registration/similarity/gl_similarity.h"
 
@@ -90,11 +91,11 @@ Objective::Objective(Renderer& renderer, std::span<const FixedImage> images, con
                       "saturated nor excluded, too few to compare",
                       views_.size() + 1, field.size(), image.field.pixels.size()));
     if (similarity_ != SimilarityKind::kGradientCorrelation) {
-      add_view(image, drawn_pixels(field, options, random));
+      add_view(image, drawn_pixels(field, options, random), about);
       continue;
     }
     const RenderResult drr = renderer.render(std::span(&image.view, 1), std::span(&about, 1), PixelSet::all());
-    add_view(image, strongest_pixels(field, image_of(image.view, drr.line_integrals(0, 0)), options));
+    add_view(image, strongest_pixels(field, image_of(image.view, drr.line_integrals(0, 0)), options), about);
   }
   if (RaycastGlRenderer* gl = renderer_.on_gpu(); gl != nullptr && !comparisons_.empty())
     gl_similarity_ = std::make_unique<GlSimilarity>(gl->context(), comparisons_);
@@ -102,7 +103,7 @@ Objective::Objective(Renderer& renderer, std::span<const FixedImage> images, con
 
 Objective::~Objective() = default;
 
-void Objective::add_view(const FixedImage& image, std::vector<std::uint32_t> compared) {
+void Objective::add_view(const FixedImage& image, std::vector<std::uint32_t> compared, const Eigen::Isometry3d& about) {
   const auto columns = static_cast<std::uint32_t>(image.field.columns);
   std::vector<std::uint32_t> rendered = compared;
   std::vector<Neighbors> neighbors;
@@ -119,10 +120,16 @@ void Objective::add_view(const FixedImage& image, std::vector<std::uint32_t> com
   }
   std::vector<float> xray;
   for (const std::uint32_t pixel : rendered) xray.push_back(image.line_integral.pixels[pixel]);
+  Range drr_range;
+  if (has_histogram(similarity_)) {
+    const PixelSet pixels{.of_view = {rendered}};
+    const RenderResult drr = renderer_.render(std::span(&image.view, 1), std::span(&about, 1), pixels);
+    drr_range = wide_range_of(drr.line_integrals(0, 0));
+  }
   views_.push_back(image.view);
   pixels_.of_view.push_back(std::move(rendered));
   compared_.push_back(std::move(compared));
-  comparisons_.emplace_back(similarity_, std::move(xray), std::move(neighbors));
+  comparisons_.emplace_back(similarity_, std::move(xray), std::move(neighbors), drr_range);
 }
 
 std::vector<std::vector<double>> Objective::per_view(std::span<const Eigen::Isometry3d> room_from_patient) {
@@ -159,6 +166,31 @@ std::vector<std::vector<double>> Objective::per_view_on_gpu(std::span<const Eige
     seconds_.similarity += all - rendering;
   }
   return similarity;
+}
+
+std::vector<QuadraticModel> Objective::models(std::span<const Eigen::Isometry3d> room_from_patient) {
+  const auto begin = Clock::now();
+  const RenderResult drrs = renderer_.render_with_derivatives(views_, room_from_patient, pixels_);
+  const double rendering = seconds_since(begin);
+  const std::size_t views = views_.size();
+  std::vector<QuadraticModel> of_views(room_from_patient.size() * views);
+  parallel_for(std::size_t{0}, of_views.size(), [&](std::size_t n) {
+    const std::size_t pose = n / views, view = n % views;
+    const std::span<const MotionDerivatives> derivatives = drrs.derivatives(pose, view);
+    const Eigen::Map<const PixelJacobian> jacobian(derivatives.front().data(),
+                                                   static_cast<Eigen::Index>(derivatives.size()), 6);
+    of_views[n] = comparisons_[view].model(drrs.line_integrals(pose, view), jacobian);
+  });
+  std::vector<QuadraticModel> means;
+  const double share = 1.0 / static_cast<double>(views);
+  for (std::size_t first = 0; first < of_views.size(); first += views) {
+    means.push_back(weighted_sum(share, of_views[first], 0.0, of_views[first]));
+    for (std::size_t view = 1; view < views; ++view)
+      means.back() = weighted_sum(1.0, means.back(), share, of_views[first + view]);
+  }
+  seconds_.rendering += rendering;
+  seconds_.similarity += seconds_since(begin) - rendering;
+  return means;
 }
 
 std::vector<double> Objective::values(std::span<const Eigen::Isometry3d> room_from_patient) {

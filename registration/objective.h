@@ -25,7 +25,8 @@ class GlSimilarity;
 class Objective {
  public:
   // Compares inside each image's field. Borrows the renderer. Throws Error for a field of fewer than 100 pixels.
-  // `about` is near the poses to come: gradients are compared where they are strong there.
+  // `about` is near the poses to come: gradients are compared where they are strong there, and histograms have the
+  // range of the DRR there.
   Objective(Renderer& renderer, std::span<const FixedImage> images, const Eigen::Isometry3d& about,
             const ObjectiveOptions& options);
   ~Objective();
@@ -34,13 +35,19 @@ class Objective {
   // is computed there.
   std::vector<std::vector<double>> per_view(std::span<const Eigen::Isometry3d> room_from_patient);
 
+  // The same with models: their parameters are the motion of the patient on top of each pose, in the units of
+  // MotionDerivatives. Needs a renderer with derivatives.
+  std::vector<QuadraticModel> models(std::span<const Eigen::Isometry3d> room_from_patient);
+
   // What the similarities are computed from.
   RenderResult render(std::span<const Eigen::Isometry3d> room_from_patient) {
     return renderer_.render(views_, room_from_patient, pixels_);
   }
   std::span<const XrayView> views() const { return views_; }
   const Comparison& comparison(std::size_t view) const { return comparisons_[view]; }
-  // Indices (row * columns + column) of the pixels compared in a view.
+  // Indices (row * columns + column) of the pixels rendered in a view, to which neighbors refer.
+  std::span<const std::uint32_t> rendered_pixels(std::size_t view) const { return pixels_.of_view[view]; }
+  // The same of the pixels compared.
   std::span<const std::uint32_t> compared_pixels(std::size_t view) const { return compared_[view]; }
 
   // Where the time went so far. A GPU measures its rendering by its own clock; all other time counts as similarity.
@@ -53,7 +60,7 @@ class Objective {
   std::vector<double> values(std::span<const Eigen::Isometry3d> room_from_patient);
 
  private:
-  void add_view(const FixedImage& image, std::vector<std::uint32_t> compared);
+  void add_view(const FixedImage& image, std::vector<std::uint32_t> compared, const Eigen::Isometry3d& about);
   std::vector<std::vector<double>> per_view_on_gpu(std::span<const Eigen::Isometry3d> room_from_patient);
 
   Renderer& renderer_;

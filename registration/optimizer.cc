@@ -3,9 +3,12 @@
 #include <algorithm>
 #include <condition_variable>
 #include <exception>
+#include <iterator>
 #include <mutex>
 #include <nlopt.hpp>
 #include <thread>
+
+#include "registration/levenberg_marquardt.h"
 
 namespace isoshift {
 namespace {
@@ -25,6 +28,7 @@ nlopt::algorithm algorithm_of(OptimizerKind kind) {
     case OptimizerKind::kBobyqa: return nlopt::LN_BOBYQA;
     case OptimizerKind::kNelderMead: return nlopt::LN_NELDERMEAD;
     case OptimizerKind::kLbfgs: return nlopt::LD_LBFGS;
+    case OptimizerKind::kLevenbergMarquardt: break;  // climb()
   }
   return nlopt::LN_BOBYQA;
 }
@@ -57,9 +61,11 @@ class Differences {
   Points points_;
 };
 
-// One search. `values_at` gives the values at a batch of points; what it throws passes through.
-OptimizerResult maximize_one(const std::function<std::vector<double>(const Points&)>& values_at,
-                             const OptimizerOptions& options) {
+// The value at a point; with its gradient, if that is asked for (not empty).
+using Evaluate = std::function<double(const std::vector<double>& x, std::vector<double>& gradient, int& evaluations)>;
+
+// One search. What `evaluate` throws passes through.
+OptimizerResult maximize_one(const Evaluate& evaluate, const OptimizerOptions& options, int evaluations_per_call) {
   OptimizerResult result;
   nlopt::opt search(algorithm_of(options.kind), static_cast<unsigned>(options.start.size()));
   search.set_lower_bounds(options.lower);
@@ -68,24 +74,17 @@ OptimizerResult maximize_one(const std::function<std::vector<double>(const Point
   std::vector<double> tolerance = options.initial_step;
   for (double& step : tolerance) step *= options.relative_tolerance;
   search.set_xtol_abs(tolerance);
-  const auto per_call =
-      static_cast<int>(Differences(options, options.start, options.kind == OptimizerKind::kLbfgs).points().size());
-  search.set_maxeval(std::max(1, options.max_evaluations / per_call));
+  search.set_maxeval(std::max(1, options.max_evaluations / evaluations_per_call));
   struct Call {
-    const std::function<std::vector<double>(const Points&)>& values_at;
-    const OptimizerOptions& options;
+    const Evaluate& evaluate;
     int& evaluations;
     std::exception_ptr failure;  // nlopt would replace it by one of its own
-  } call{values_at, options, result.evaluations, nullptr};
+  } call{evaluate, result.evaluations, nullptr};
   search.set_max_objective(
       [](const std::vector<double>& x, std::vector<double>& gradient, void* data) {
         Call& c = *static_cast<Call*>(data);
         try {
-          const Differences differences(c.options, x, !gradient.empty());
-          const std::vector<double> values = c.values_at(differences.points());
-          c.evaluations += static_cast<int>(values.size());
-          if (!gradient.empty()) gradient = differences.gradient(values);
-          return values.front();
+          return c.evaluate(x, gradient, c.evaluations);
         } catch (...) {
           c.failure = std::current_exception();
           throw nlopt::forced_stop();
@@ -111,13 +110,40 @@ OptimizerResult maximize_one(const std::function<std::vector<double>(const Point
   return result;
 }
 
+// How a search evaluates its objective, given the answers to a batch of points.
+template <class Answer>
+using Ask = std::function<std::vector<Answer>(const Points&)>;
+
+OptimizerResult maximize_one(const Ask<double>& values_at, const OptimizerOptions& options) {
+  const auto with_differences = [&](const std::vector<double>& x, std::vector<double>& gradient, int& evaluations) {
+    const Differences differences(options, x, !gradient.empty());
+    const std::vector<double> values = values_at(differences.points());
+    evaluations += static_cast<int>(values.size());
+    if (!gradient.empty()) gradient = differences.gradient(values);
+    return values.front();
+  };
+  const auto per_call = Differences(options, options.start, options.kind == OptimizerKind::kLbfgs).points().size();
+  return maximize_one(with_differences, options, static_cast<int>(per_call));
+}
+
+OptimizerResult maximize_one(const Ask<QuadraticModel>& models_at, const OptimizerOptions& options) {
+  const auto with_gradient = [&](const std::vector<double>& x, std::vector<double>& gradient, int& evaluations) {
+    const QuadraticModel model = models_at({x}).front();
+    ++evaluations;
+    if (!gradient.empty()) std::ranges::copy(model.gradient, gradient.begin());
+    return model.value;
+  };
+  return maximize_one(with_gradient, options, 1);
+}
+
 // What several searches, each on a thread of its own, ask for: gathered until all that still run are waiting.
+template <class Answer>
 class LockStep {
  public:
   explicit LockStep(std::size_t searches) : asked_(searches), answers_(searches), running_(searches) {}
 
   // Called by a search: waits for the next call of the objective.
-  std::vector<double> ask(std::size_t search, const Points& points) {
+  std::vector<Answer> ask(std::size_t search, const Points& points) {
     std::unique_lock lock(mutex_);
     asked_[search] = &points;
     ++waiting_;
@@ -135,7 +161,8 @@ class LockStep {
   }
 
   // Answers until no search runs. If the objective throws, all searches are told to stop.
-  void serve(const BatchObjective& objective) {
+  template <class Batch>
+  void serve(const Batch& objective) {
     std::unique_lock lock(mutex_);
     for (;;) {
       changed_.wait(lock, [&] { return waiting_ == running_; });
@@ -143,7 +170,7 @@ class LockStep {
       Points points;
       for (const Points* of_search : asked_)
         if (of_search != nullptr) points.insert(points.end(), of_search->begin(), of_search->end());
-      std::vector<double> values;
+      std::vector<Answer> values;
       try {
         values = objective(points);
       } catch (...) {
@@ -155,7 +182,7 @@ class LockStep {
       for (std::size_t search = 0; search < asked_.size(); ++search) {
         if (asked_[search] == nullptr) continue;
         const auto end = next + static_cast<std::ptrdiff_t>(asked_[search]->size());
-        answers_[search].assign(next, end);
+        answers_[search].assign(std::make_move_iterator(next), std::make_move_iterator(end));
         next = end;
         asked_[search] = nullptr;
       }
@@ -168,10 +195,35 @@ class LockStep {
   std::mutex mutex_;
   std::condition_variable changed_;
   std::vector<const Points*> asked_;
-  std::vector<std::vector<double>> answers_;
+  std::vector<std::vector<Answer>> answers_;
   std::size_t running_, waiting_ = 0;
   bool abandoned_ = false;
 };
+
+// All searches, each on a thread of its own, in step.
+template <class Answer, class Batch>
+std::vector<OptimizerResult> maximize_all(const Batch& objective, std::span<const OptimizerOptions> searches) {
+  if (searches.size() == 1) return {maximize_one(Ask<Answer>(objective), searches.front())};
+  std::vector<OptimizerResult> results(searches.size());
+  std::vector<std::exception_ptr> failures(searches.size());
+  LockStep<Answer> lock_step(searches.size());
+  std::vector<std::jthread> threads;  // joined before what they refer to ends
+  for (std::size_t n = 0; n < searches.size(); ++n)
+    threads.emplace_back([&, n] {
+      try {
+        const auto ask = [&](const Points& points) { return lock_step.ask(n, points); };
+        results[n] = maximize_one(Ask<Answer>(ask), searches[n]);
+      } catch (...) {
+        failures[n] = std::current_exception();
+      }
+      lock_step.leave();
+    });
+  lock_step.serve(objective);  // throws what the objective throws
+  threads.clear();
+  for (const std::exception_ptr& failure : failures)
+    if (failure) std::rethrow_exception(failure);
+  return results;
+}
 
 }  // namespace
 
@@ -180,6 +232,7 @@ std::string_view to_string(OptimizerKind kind) {
     case OptimizerKind::kBobyqa: return "bobyqa";
     case OptimizerKind::kNelderMead: return "nelder-mead";
     case OptimizerKind::kLbfgs: return "l-bfgs";
+    case OptimizerKind::kLevenbergMarquardt: return "levenberg-marquardt";
   }
   return "";
 }
@@ -191,25 +244,12 @@ std::optional<OptimizerKind> optimizer_kind_from(std::string_view name) {
 }
 
 std::vector<OptimizerResult> maximize(const BatchObjective& objective, std::span<const OptimizerOptions> searches) {
-  if (searches.size() == 1) return {maximize_one(objective, searches.front())};
-  std::vector<OptimizerResult> results(searches.size());
-  std::vector<std::exception_ptr> failures(searches.size());
-  LockStep lock_step(searches.size());
-  std::vector<std::jthread> threads;  // joined before what they refer to ends
-  for (std::size_t n = 0; n < searches.size(); ++n)
-    threads.emplace_back([&, n] {
-      try {
-        results[n] = maximize_one([&](const Points& points) { return lock_step.ask(n, points); }, searches[n]);
-      } catch (...) {
-        failures[n] = std::current_exception();
-      }
-      lock_step.leave();
-    });
-  lock_step.serve(objective);  // throws what the objective throws
-  threads.clear();
-  for (const std::exception_ptr& failure : failures)
-    if (failure) std::rethrow_exception(failure);
-  return results;
+  return maximize_all<double>(objective, searches);
+}
+
+std::vector<OptimizerResult> maximize(const BatchModel& models, std::span<const OptimizerOptions> searches) {
+  if (searches.front().kind == OptimizerKind::kLevenbergMarquardt) return climb(models, searches);
+  return maximize_all<QuadraticModel>(models, searches);
 }
 
 }  // namespace isoshift

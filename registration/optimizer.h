@@ -10,13 +10,17 @@
 #include <string_view>
 #include <vector>
 
+#include "registration/quadratic_model.h"
+
 namespace isoshift {
 
 enum class OptimizerKind {
   kBobyqa,      // quadratic models, no derivatives (Powell 2009)
   kNelderMead,  // simplex, no derivatives
-  kLbfgs,       // quasi-Newton on central differences, which cost 13 evaluations per step but come in one batch
+  kLbfgs,  // quasi-Newton (Nocedal 1980); without models on central differences, 13 evaluations per step in one batch
+  kLevenbergMarquardt,  // Gauss-Newton with damping, on models that have a curvature (levenberg_marquardt.h)
 };
+// Those that need nothing but values.
 inline constexpr std::array kOptimizerKinds = {OptimizerKind::kBobyqa, OptimizerKind::kNelderMead,
                                                OptimizerKind::kLbfgs};
 std::string_view to_string(OptimizerKind kind);
@@ -43,9 +47,14 @@ struct OptimizerResult {
 // One value per point.
 using BatchObjective = std::function<std::vector<double>(std::span<const std::vector<double>>)>;
 
+// One model per point: for objectives that know their derivatives.
+using BatchModel = std::function<std::vector<QuadraticModel>(std::span<const std::vector<double>>)>;
+
 // Runs several searches at the same time and returns the largest value of `objective` that each of them found. Every
 // call of the objective holds the next points of all searches. The result of a search does not depend on the others.
 // Exceptions of the objective pass through.
+// The same with models, for searches that all are kLbfgs or all kLevenbergMarquardt.
 std::vector<OptimizerResult> maximize(const BatchObjective& objective, std::span<const OptimizerOptions> searches);
+std::vector<OptimizerResult> maximize(const BatchModel& models, std::span<const OptimizerOptions> searches);
 
 }  // namespace isoshift

@@ -13,6 +13,11 @@ inline constexpr double kLeverMm = 100.0;
 
 Eigen::Isometry3d setup_error_from_parameters(std::span<const double> parameters);
 
+// How parameters move the patient: a 6 x n matrix from small changes of n parameters to the motion on top of the setup
+// error, in the room and about the isocenter, in the units of MotionDerivatives (drr/renderer.h): mm and rad. Rotations
+// by the left Jacobian of SO(3) (Sola, Deray, Atchuthan, arXiv 1812.01537, eq. 145).
+Eigen::Matrix<double, 6, Eigen::Dynamic> motions_per_parameter(std::span<const double> parameters);
+
 // How far two setup errors lie apart: translation at the isocenter, and rotation.
 struct PoseDistance {
   double translation_mm = 0.0;

@@ -37,6 +37,7 @@ std::vector<Stage> setup_stages() {
           // From three starts: do they agree?
           {.name = "restarts",
            .similarity = SimilarityKind::kGradientCorrelation,
+           .optimizer = OptimizerKind::kLevenbergMarquardt,
            .pixel_mm = 2.5,
            .voxel_mm = 2.0,
            .pixel_fraction = 0.3,
@@ -50,6 +51,7 @@ std::vector<Stage> setup_stages() {
            .relative_tolerance = 0.05},
           {.name = "fine",
            .similarity = SimilarityKind::kGradientCorrelation,
+           .optimizer = OptimizerKind::kLevenbergMarquardt,
            .pixel_mm = 1.2,
            .voxel_mm = 1.0,
            .pixel_fraction = 0.3,

@@ -47,8 +47,9 @@ double bound_of(std::size_t axis, const SearchOptions& options) {
   return axis < 3 ? options.bound_mm : options.bound_rad * kLeverMm;
 }
 
-OptimizerOptions optimizer_options(const Stage& stage, const SearchOptions& options, const Parameters& start) {
-  OptimizerOptions from_start{.kind = stage.optimizer,
+OptimizerOptions optimizer_options(const Stage& stage, OptimizerKind kind, const SearchOptions& options,
+                                   const Parameters& start) {
+  OptimizerOptions from_start{.kind = kind,
                               .start = start,
                               .relative_tolerance = stage.relative_tolerance,
                               .max_evaluations = stage.max_evaluations};
@@ -77,25 +78,10 @@ std::vector<Parameters> candidates_about(const Parameters& pose, const Stage& st
   return candidates;
 }
 
-// The best of some poses.
-std::vector<Parameters> best_of(std::vector<Parameters> poses, std::size_t count, const BatchObjective& objective,
-                                int& evaluations) {
-  if (poses.size() <= count) return poses;
-  if (count == 0) return {};
-  const std::vector<double> values = objective(poses);
-  evaluations += static_cast<int>(values.size());
-  std::vector<std::size_t> order(poses.size());
-  std::iota(order.begin(), order.end(), 0);
-  std::ranges::stable_sort(order, std::greater(), [&](std::size_t n) { return values[n]; });
-  std::vector<Parameters> best;
-  for (std::size_t n = 0; n < count; ++n) best.push_back(poses[order[n]]);
-  return best;
-}
-
-StageReport report_of(const Stage& stage) {
+StageReport report_of(const Stage& stage, OptimizerKind optimizer) {
   return {.name = stage.name,
           .similarity = std::string(to_string(stage.similarity)),
-          .optimizer = std::string(to_string(stage.optimizer)),
+          .optimizer = std::string(to_string(optimizer)),
           .parameters = {{"pixel_mm", stage.pixel_mm},
                          {"voxel_mm", stage.voxel_mm},
                          {"pixel_fraction", stage.pixel_fraction},
@@ -109,6 +95,75 @@ StageReport report_of(const Stage& stage) {
                          {"initial_step_rad", stage.initial_step_rad},
                          {"relative_tolerance", stage.relative_tolerance},
                          {"max_evaluations", stage.max_evaluations}}};
+}
+
+// Derivatives need a renderer that has them, and Levenberg-Marquardt a similarity with a curvature: without them the
+// stage is climbed by BOBYQA.
+OptimizerKind optimizer_of(const Stage& stage, const Renderer& renderer) {
+  const bool can_climb = renderer.has_derivatives() && has_curvature(stage.similarity);
+  return stage.optimizer == OptimizerKind::kLevenbergMarquardt && !can_climb ? OptimizerKind::kBobyqa : stage.optimizer;
+}
+
+// A stage's similarity as a function of parameters, on top of a start pose; notes its best values.
+class StageObjective {
+ public:
+  StageObjective(Objective& objective, const Eigen::Isometry3d& start_room_from_patient, StageReport& report)
+      : objective_(objective), start_(start_room_from_patient), report_(report) {}
+
+  std::vector<double> values(std::span<const Parameters> points) {
+    std::vector<double> values = objective_.values(poses_of(points));
+    for (const double value : values) note(value);
+    return values;
+  }
+
+  std::vector<QuadraticModel> models(std::span<const Parameters> points) {
+    std::vector<QuadraticModel> models = objective_.models(poses_of(points));
+    for (std::size_t n = 0; n < models.size(); ++n) {
+      note(models[n].value);
+      models[n] = models[n].by(motions_per_parameter(points[n]));
+    }
+    return models;
+  }
+
+ private:
+  std::vector<Eigen::Isometry3d> poses_of(std::span<const Parameters> points) const {
+    std::vector<Eigen::Isometry3d> poses;
+    for (const Parameters& point : points) poses.push_back(setup_error_from_parameters(point) * start_);
+    return poses;
+  }
+  void note(double value) {
+    report_.best.push_back(report_.best.empty() ? value : std::max(value, report_.best.back()));
+  }
+
+  Objective& objective_;
+  const Eigen::Isometry3d& start_;
+  StageReport& report_;
+};
+
+// The best of some poses.
+std::vector<Parameters> best_of(std::vector<Parameters> poses, std::size_t count, StageObjective& objective,
+                                int& evaluations) {
+  if (poses.size() <= count) return poses;
+  if (count == 0) return {};
+  const std::vector<double> values = objective.values(poses);
+  evaluations += static_cast<int>(values.size());
+  std::vector<std::size_t> order(poses.size());
+  std::iota(order.begin(), order.end(), 0);
+  std::ranges::stable_sort(order, std::greater(), [&](std::size_t n) { return values[n]; });
+  std::vector<Parameters> best;
+  for (std::size_t n = 0; n < count; ++n) best.push_back(poses[order[n]]);
+  return best;
+}
+
+// All searches of a stage, which have one optimizer.
+std::vector<OptimizerResult> maximize_stage(StageObjective& objective, const Renderer& renderer,
+                                            std::span<const OptimizerOptions> searches) {
+  const OptimizerKind kind = searches.front().kind;
+  const bool on_models =
+      kind == OptimizerKind::kLevenbergMarquardt || (kind == OptimizerKind::kLbfgs && renderer.has_derivatives());
+  if (!on_models)
+    return maximize([&](std::span<const Parameters> points) { return objective.values(points); }, searches);
+  return maximize([&](std::span<const Parameters> points) { return objective.models(points); }, searches);
 }
 
 // `found` is sorted, best first.
@@ -146,30 +201,24 @@ SearchResult search(const RendererPyramid& renderers, const FixedViews& views,
     const auto begin = std::chrono::steady_clock::now();
     const Eigen::Isometry3d about = setup_error_from_parameters(kept.front()) * start_room_from_patient;
     const std::vector<FixedImage> level = views.reduced_to(stage.pixel_mm, about, stage.initial_step_mm);
-    Objective objective(renderers.with_voxels_up_to(stage.voxel_mm), level, about,
+    Renderer& renderer = renderers.with_voxels_up_to(stage.voxel_mm);
+    Objective objective(renderer, level, about,
                         {.similarity = stage.similarity,
                          .pixel_fraction = stage.pixel_fraction,
                          .min_pixels = static_cast<std::size_t>(stage.min_pixels),
                          .seed = options.seed});
-    StageReport report = report_of(stage);
-    const BatchObjective similarity_at = [&](std::span<const Parameters> points) {
-      std::vector<Eigen::Isometry3d> poses;
-      for (const Parameters& point : points)
-        poses.push_back(setup_error_from_parameters(point) * start_room_from_patient);
-      std::vector<double> values = objective.values(poses);
-      for (const double value : values)
-        report.best.push_back(report.best.empty() ? value : std::max(value, report.best.back()));
-      return values;
-    };
+    const OptimizerKind optimizer = optimizer_of(stage, renderer);
+    StageReport report = report_of(stage, optimizer);
+    StageObjective similarity(objective, start_room_from_patient, report);
 
     const std::size_t more = static_cast<std::size_t>(stage.starts) - std::min<std::size_t>(stage.starts, kept.size());
     std::ranges::copy(
-        best_of(candidates_about(kept.front(), stage, options, random), more, similarity_at, report.evaluations),
+        best_of(candidates_about(kept.front(), stage, options, random), more, similarity, report.evaluations),
         std::back_inserter(kept));
     std::vector<OptimizerOptions> searches;
     searches.reserve(kept.size());
-    for (const Parameters& start : kept) searches.push_back(optimizer_options(stage, options, start));
-    std::vector<OptimizerResult> found = maximize(similarity_at, searches);
+    for (const Parameters& start : kept) searches.push_back(optimizer_options(stage, optimizer, options, start));
+    std::vector<OptimizerResult> found = maximize_stage(similarity, renderer, searches);
     std::ranges::stable_sort(found, std::greater(), &OptimizerResult::value);
     kept.clear();
     for (const OptimizerResult& end : found) {

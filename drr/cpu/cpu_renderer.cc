@@ -6,7 +6,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <numeric>
+#include <stdexcept>
 
 #include "base/parallel.h"
 #include "drr/camera.h"
@@ -63,16 +65,48 @@ std::span<const std::uint32_t> group_of(std::span<const std::uint32_t> places, i
   return from_group.first(std::min(kListGroup, from_group.size()));
 }
 
+constexpr std::size_t kNowhere = std::numeric_limits<std::size_t>::max();  // the place of a pixel that is not rendered
+
+// The chain rule. If the patient moves by theta = (t, w), a point x of the room meets the voxel that was at
+// x - t - w x x: the source and the way, S and W in the room, move by -A (t + w x S) and -A (w x W) in voxels.
+MotionDerivatives motion_derivatives(const RayGradient& gradient, int column, int row, const Camera& camera) {
+  const Eigen::Vector3d by_source = camera.voxel_from_room_axes.transpose() * gradient.by_source;
+  const Eigen::Vector3d by_way = camera.voxel_from_room_axes.transpose() * gradient.by_way;
+  const Eigen::Vector3d way = camera.way_room_from_pixel * Eigen::Vector3d(column, row, 1.0);
+  MotionDerivatives derivatives;
+  derivatives.head<3>() = -by_source.cast<float>();
+  derivatives.tail<3>() = -(camera.source_room_mm.cross(by_source) + way.cross(by_way)).cast<float>();
+  return derivatives;
+}
+
 }  // namespace
 
 std::string CpuRenderer::device() const {
   return fmt::format("CPU, {} threads", tbb::this_task_arena::max_concurrency());
 }
 
+void CpuRenderer::integrate_with_gradients(std::span<const VoxelRay>, Beam, std::span<float>,
+                                           std::span<RayGradient>) const {
+  throw std::logic_error(fmt::format("the renderer {} has no derivatives", to_string(kind())));
+}
+
 RenderResult CpuRenderer::render(std::span<const XrayView> views, std::span<const Eigen::Isometry3d> room_from_patient,
                                  const PixelSet& pixels) {
+  return render_all(views, room_from_patient, pixels, false);
+}
+
+RenderResult CpuRenderer::render_with_derivatives(std::span<const XrayView> views,
+                                                  std::span<const Eigen::Isometry3d> room_from_patient,
+                                                  const PixelSet& pixels) {
+  return render_all(views, room_from_patient, pixels, true);
+}
+
+RenderResult CpuRenderer::render_all(std::span<const XrayView> views,
+                                     std::span<const Eigen::Isometry3d> room_from_patient, const PixelSet& pixels,
+                                     bool with_derivatives) const {
   std::vector<std::size_t> begins = checked_view_begins(views, room_from_patient, pixels);
   std::vector<float> line_integrals(begins.back() * room_from_patient.size());
+  std::vector<MotionDerivatives> derivatives(with_derivatives ? line_integrals.size() : 0);
   const bool all = pixels.of_view.empty();
 
   // The work of one pose: tiles or groups of every view, one after the other.
@@ -93,43 +127,62 @@ RenderResult CpuRenderer::render(std::span<const XrayView> views, std::span<cons
     const int in_pose = work % group_begins.back();
     const std::size_t v = std::ranges::upper_bound(group_begins, in_pose) - group_begins.begin() - 1;
     const int group = in_pose - group_begins[v];
-    const Camera& camera = cameras[p * views.size() + v];
-    const auto drr = std::span(line_integrals).subspan(p * begins.back() + begins[v], begins[v + 1] - begins[v]);
-    if (all)
-      render_tile(views[v], camera, group, drr);
-    else
-      render_group(views[v], camera, pixels.of_view[v], group_of(orders[v], group), drr);
+    const std::size_t begin = p * begins.back() + begins[v], count = begins[v + 1] - begins[v];
+    render_group(
+        views[v], cameras[p * views.size() + v],
+        all ? pixels_of_tile(views[v], group) : pixels_of_list(views[v], pixels.of_view[v], group_of(orders[v], group)),
+        std::span(line_integrals).subspan(begin, count),
+        with_derivatives ? std::span(derivatives).subspan(begin, count) : std::span<MotionDerivatives>());
   });
-  return RenderResult(std::move(line_integrals), std::move(begins));
+  return RenderResult(std::move(line_integrals), std::move(begins), std::move(derivatives));
 }
 
-void CpuRenderer::render_tile(const XrayView& view, const Camera& camera, int tile, std::span<float> drr) const {
+std::vector<CpuRenderer::GroupPixel> CpuRenderer::pixels_of_tile(const XrayView& view, int tile) {
   const int tiles_per_row = tiles_along(view.columns);
   const int first_column = tile % tiles_per_row * kTileEdge, first_row = tile / tiles_per_row * kTileEdge;
-  std::array<VoxelRay, kGroup> rays;
-  std::array<float, kGroup> values;
+  std::vector<GroupPixel> group;
+  group.reserve(kGroup);
   for (int n = 0; n < kGroup; ++n) {
-    const PixelInTile pixel = pixel_in_tile(n);
-    rays[n] = ray_to(first_column + pixel.column, first_row + pixel.row, camera, mm_from_voxel_axes_);
+    const PixelInTile in_tile = pixel_in_tile(n);
+    const int column = first_column + in_tile.column, row = first_row + in_tile.row;
+    // The last tiles reach beyond the image.
+    const bool inside = column < view.columns && row < view.rows;
+    group.push_back({column, row, inside ? static_cast<std::size_t>(row) * view.columns + column : kNowhere});
   }
-  integrate(rays, view.beam, values);
-  for (int n = 0; n < kGroup; ++n) {
-    const auto [column, row] = pixel_in_tile(n);  // the last tiles reach beyond the image
-    if (first_column + column < view.columns && first_row + row < view.rows)
-      drr[static_cast<std::size_t>(first_row + row) * view.columns + first_column + column] = values[n];
-  }
+  return group;
 }
 
-void CpuRenderer::render_group(const XrayView& view, const Camera& camera, std::span<const std::uint32_t> pixels,
-                               std::span<const std::uint32_t> places, std::span<float> drr) const {
-  std::array<VoxelRay, kListGroup> rays;
-  std::array<float, kListGroup> values;
-  for (std::size_t n = 0; n < places.size(); ++n) {
-    const int pixel = static_cast<int>(pixels[places[n]]);
-    rays[n] = ray_to(pixel % view.columns, pixel / view.columns, camera, mm_from_voxel_axes_);
+std::vector<CpuRenderer::GroupPixel> CpuRenderer::pixels_of_list(const XrayView& view,
+                                                                 std::span<const std::uint32_t> pixels,
+                                                                 std::span<const std::uint32_t> places) {
+  std::vector<GroupPixel> group;
+  group.reserve(places.size());
+  for (const std::uint32_t place : places) {
+    const int pixel = static_cast<int>(pixels[place]);
+    group.push_back({pixel % view.columns, pixel / view.columns, place});
   }
-  integrate(std::span(rays).first(places.size()), view.beam, std::span(values).first(places.size()));
-  for (std::size_t n = 0; n < places.size(); ++n) drr[places[n]] = values[n];
+  return group;
+}
+
+void CpuRenderer::render_group(const XrayView& view, const Camera& camera, std::span<const GroupPixel> group,
+                               std::span<float> drr, std::span<MotionDerivatives> derivatives) const {
+  std::array<VoxelRay, kGroup> ray_places;
+  std::array<float, kGroup> value_places;
+  const auto rays = std::span(ray_places).first(group.size());
+  const auto values = std::span(value_places).first(group.size());
+  for (std::size_t n = 0; n < group.size(); ++n)
+    rays[n] = ray_to(group[n].column, group[n].row, camera, mm_from_voxel_axes_);
+  if (derivatives.empty()) {
+    integrate(rays, view.beam, values);
+  } else {
+    std::vector<RayGradient> gradients(group.size());
+    integrate_with_gradients(rays, view.beam, values, gradients);
+    for (std::size_t n = 0; n < group.size(); ++n)
+      if (group[n].place != kNowhere)
+        derivatives[group[n].place] = motion_derivatives(gradients[n], group[n].column, group[n].row, camera);
+  }
+  for (std::size_t n = 0; n < group.size(); ++n)
+    if (group[n].place != kNowhere) drr[group[n].place] = values[n];
 }
 
 std::optional<RaySegment> clip_to_box(const VoxelRay& ray, const Eigen::Vector3d& low, const Eigen::Vector3d& high) {

@@ -16,25 +16,47 @@ struct VoxelRay {
   double length_mm = 0.0;
 };
 
+// How a line integral changes with the source and with the way of its ray, in voxels, if the length in mm stays.
+struct RayGradient {
+  Eigen::Vector3d by_source = Eigen::Vector3d::Zero();
+  Eigen::Vector3d by_way = Eigen::Vector3d::Zero();
+};
+
 class CpuRenderer : public Renderer {
  public:
   RenderResult render(std::span<const XrayView> views, std::span<const Eigen::Isometry3d> room_from_patient,
                       const PixelSet& pixels) final;
+  RenderResult render_with_derivatives(std::span<const XrayView> views,
+                                       std::span<const Eigen::Isometry3d> room_from_patient,
+                                       const PixelSet& pixels) final;
   std::string device() const override;
 
  protected:
-  explicit CpuRenderer(const Volume<float>& ct_hu)
-      : voxel_from_patient_(ct_hu.patient_from_voxel.inverse()),
-        mm_from_voxel_axes_(ct_hu.patient_from_voxel.linear()) {}
+  explicit CpuRenderer(const Eigen::Affine3d& patient_from_voxel)
+      : voxel_from_patient_(patient_from_voxel.inverse()), mm_from_voxel_axes_(patient_from_voxel.linear()) {}
 
   // Line integral of attenuation along each ray; called from many threads. Rays come in groups that lie close together.
   virtual void integrate(std::span<const VoxelRay> rays, Beam beam, std::span<float> line_integrals) const = 0;
 
+  // The same with gradients, by the renderers that have derivatives.
+  virtual void integrate_with_gradients(std::span<const VoxelRay> rays, Beam beam, std::span<float> line_integrals,
+                                        std::span<RayGradient> gradients) const;
+
  private:
-  void render_tile(const XrayView& view, const Camera& camera, int tile, std::span<float> drr) const;
+  // A pixel of a view, and where its value goes among the view's.
+  struct GroupPixel {
+    int column, row;
+    std::size_t place;
+  };
+  RenderResult render_all(std::span<const XrayView> views, std::span<const Eigen::Isometry3d> room_from_patient,
+                          const PixelSet& pixels, bool with_derivatives) const;
+  static std::vector<GroupPixel> pixels_of_tile(const XrayView& view, int tile);
   // `places`: those of the list that go together.
-  void render_group(const XrayView& view, const Camera& camera, std::span<const std::uint32_t> pixels,
-                    std::span<const std::uint32_t> places, std::span<float> drr) const;
+  static std::vector<GroupPixel> pixels_of_list(const XrayView& view, std::span<const std::uint32_t> pixels,
+                                                std::span<const std::uint32_t> places);
+  // `derivatives` is empty if none are wanted.
+  void render_group(const XrayView& view, const Camera& camera, std::span<const GroupPixel> group, std::span<float> drr,
+                    std::span<MotionDerivatives> derivatives) const;
 
   Eigen::Affine3d voxel_from_patient_;
   Eigen::Matrix3d mm_from_voxel_axes_;

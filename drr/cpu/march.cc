@@ -47,10 +47,19 @@ HWY_INLINE Pair gather_pair(const float* base, IntVec index) {
   return {hn::GatherIndex(Floats(), base, index), hn::GatherIndex(Floats(), base + 1, index)};
 }
 
-HWY_INLINE FloatVec bilinear(const Pair& near, const Pair& far, FloatVec column_fraction, FloatVec row_fraction) {
-  const FloatVec near_value = hn::MulAdd(column_fraction, hn::Sub(near.right, near.left), near.left);
-  const FloatVec far_value = hn::MulAdd(column_fraction, hn::Sub(far.right, far.left), far.left);
-  return hn::MulAdd(row_fraction, hn::Sub(far_value, near_value), near_value);
+// An interpolated value and its derivatives; what is not used of it is not computed.
+struct Sample {
+  FloatVec value, by_column, by_row;
+};
+
+HWY_INLINE Sample bilinear(const Pair& near, const Pair& far, FloatVec column_fraction, FloatVec row_fraction) {
+  const FloatVec near_slope = hn::Sub(near.right, near.left), far_slope = hn::Sub(far.right, far.left);
+  const FloatVec near_value = hn::MulAdd(column_fraction, near_slope, near.left);
+  const FloatVec far_value = hn::MulAdd(column_fraction, far_slope, far.left);
+  const FloatVec by_row = hn::Sub(far_value, near_value);
+  return {.value = hn::MulAdd(row_fraction, by_row, near_value),
+          .by_column = hn::MulAdd(row_fraction, hn::Sub(far_slope, near_slope), near_slope),
+          .by_row = by_row};
 }
 
 // What a packet covers of a plane: from the lowest to the highest column and row of its rays.
@@ -123,7 +132,7 @@ class GatherPlane {
     base_ = lattice.voxels + plane * lattice.plane_stride + row_origin_ * lattice.row_stride;
   }
 
-  HWY_INLINE FloatVec operator()(FloatVec column, FloatVec row) const {
+  HWY_INLINE Sample operator()(FloatVec column, FloatVec row) const {
     // Rays that do not count here may be anywhere: into the lattice with them.
     const FloatVec zero = hn::Zero(Floats());
     column = hn::Min(hn::Max(column, zero), hn::Set(Floats(), static_cast<float>(lattice_.columns - 2)));
@@ -170,7 +179,7 @@ class WindowPlane {
     for (int n = 0; n < kTables; ++n) tables_[n] = load(base, lattice.row_stride, n);
   }
 
-  HWY_INLINE FloatVec operator()(FloatVec column, FloatVec row) const {
+  HWY_INLINE Sample operator()(FloatVec column, FloatVec row) const {
     column = hn::Sub(column, hn::Set(Floats(), static_cast<float>(column_origin_)));
     row = hn::Sub(row, hn::Set(Floats(), static_cast<float>(row_origin_)));
     const IntVec whole_column = hn::ConvertTo(Ints(), column);
@@ -226,10 +235,34 @@ class WindowPlane {
 };
 #endif
 
-// Adds up all planes; `Plane` says how a plane's voxels are fetched.
-template <class Plane, class T>
+HWY_INLINE void add(FloatVec value, float* sum) { hn::Store(hn::Add(value, hn::Load(Floats(), sum)), Floats(), sum); }
+
+// A sample of the rays from number n, `steps` planes from the packet's, added to what is asked for. `keep` makes 0 of
+// rays that do not count here.
+template <class Keep>
+HWY_INLINE void add(const Sample& sample, FloatVec, std::size_t n, const Keep& keep, PacketSums& sums) {
+  add(keep(sample.value), &sums[n]);
+}
+template <class Keep>
+HWY_INLINE void add(const Sample& sample, FloatVec steps, std::size_t n, const Keep& keep, PacketGradients& sums) {
+  const FloatVec by_column = keep(sample.by_column), by_row = keep(sample.by_row);
+  add(keep(sample.value), &sums.value[n]);
+  add(by_column, &sums.by_column[n]);
+  add(by_row, &sums.by_row[n]);
+  add(hn::Mul(steps, by_column), &sums.by_column_slope[n]);
+  add(hn::Mul(steps, by_row), &sums.by_row_slope[n]);
+}
+
+void clear(PacketSums& sums) { sums.fill(0.0F); }
+void clear(PacketGradients& sums) {
+  for (PacketSums* part : {&sums.value, &sums.by_column, &sums.by_row, &sums.by_column_slope, &sums.by_row_slope})
+    part->fill(0.0F);
+}
+
+// Adds up all planes; `Plane` says how a plane's voxels are fetched, `Sums` what is summed.
+template <class Plane, class T, class Sums>
 HWY_NOINLINE void march_through(const RayPacket& packet, const Pyramid& pyramid, const PlaneLattice<T>& lattice,
-                                PacketSums& sums) {
+                                Sums& sums) {
   constexpr std::size_t kLanes = HWY_MIN(HWY_LANES(float), kPacketRays);
   constexpr std::size_t kParts = kPacketRays / kLanes;
   const int first = *std::min_element(packet.first_plane.begin(), packet.first_plane.end());
@@ -237,7 +270,7 @@ HWY_NOINLINE void march_through(const RayPacket& packet, const Pyramid& pyramid,
   const int all_from = *std::max_element(packet.first_plane.begin(), packet.first_plane.end());
   const int all_to = *std::min_element(packet.last_plane.begin(), packet.last_plane.end());
 
-  for (std::size_t part = 0; part < kParts; ++part) hn::Store(hn::Zero(Floats()), Floats(), &sums[part * kLanes]);
+  clear(sums);
   for (int begin = first; begin <= last; begin = begin / kSkipEdge * kSkipEdge + kSkipEdge) {
     const int end = std::min(last, begin / kSkipEdge * kSkipEdge + kSkipEdge - 1);
     if (is_empty(pyramid.in(begin), pyramid.in(end), begin, lattice)) continue;
@@ -252,21 +285,22 @@ HWY_NOINLINE void march_through(const RayPacket& packet, const Pyramid& pyramid,
             hn::MulAdd(steps, hn::Load(Floats(), &packet.column_slope[n]), hn::Load(Floats(), &packet.column[n]));
         const FloatVec row =
             hn::MulAdd(steps, hn::Load(Floats(), &packet.row_slope[n]), hn::Load(Floats(), &packet.row[n]));
-        FloatVec value = values(column, row);
+        const Sample sample = values(column, row);
         if (plane < all_from || plane > all_to) {
           const IntVec here = hn::Set(Ints(), plane);
-          const auto outside = hn::Or(hn::Gt(hn::Load(Ints(), &packet.first_plane[n]), here),
-                                      hn::Gt(here, hn::Load(Ints(), &packet.last_plane[n])));
-          value = hn::IfThenZeroElse(hn::RebindMask(Floats(), outside), value);
+          const auto outside = hn::RebindMask(Floats(), hn::Or(hn::Gt(hn::Load(Ints(), &packet.first_plane[n]), here),
+                                                               hn::Gt(here, hn::Load(Ints(), &packet.last_plane[n]))));
+          add(sample, steps, n, [&](FloatVec value) { return hn::IfThenZeroElse(outside, value); }, sums);
+        } else {
+          add(sample, steps, n, [](FloatVec value) { return value; }, sums);
         }
-        hn::Store(hn::Add(value, hn::Load(Floats(), &sums[n])), Floats(), &sums[n]);
       }
     }
   }
 }
 
-template <class T>
-void march_all(const RayPacket& packet, const PlaneLattice<T>& lattice, PacketSums& sums) {
+template <class T, class Sums>
+void march_all(const RayPacket& packet, const PlaneLattice<T>& lattice, Sums& sums) {
   const Pyramid pyramid(packet);
 #if HWY_TARGET <= HWY_AVX3
   if constexpr (sizeof(T) <= 2) {
@@ -284,10 +318,19 @@ void march_all(const RayPacket& packet, const PlaneLattice<T>& lattice, PacketSu
 void march_u8(const RayPacket& packet, const PlaneLattice<std::uint8_t>& lattice, PacketSums& sums) {
   march_all(packet, lattice, sums);
 }
+void gradients_u8(const RayPacket& packet, const PlaneLattice<std::uint8_t>& lattice, PacketGradients& sums) {
+  march_all(packet, lattice, sums);
+}
 void march_u16(const RayPacket& packet, const PlaneLattice<std::uint16_t>& lattice, PacketSums& sums) {
   march_all(packet, lattice, sums);
 }
+void gradients_u16(const RayPacket& packet, const PlaneLattice<std::uint16_t>& lattice, PacketGradients& sums) {
+  march_all(packet, lattice, sums);
+}
 void march_f32(const RayPacket& packet, const PlaneLattice<float>& lattice, PacketSums& sums) {
+  march_all(packet, lattice, sums);
+}
+void gradients_f32(const RayPacket& packet, const PlaneLattice<float>& lattice, PacketGradients& sums) {
   march_all(packet, lattice, sums);
 }
 
@@ -303,6 +346,9 @@ namespace isoshift {
 HWY_EXPORT(march_u8);
 HWY_EXPORT(march_u16);
 HWY_EXPORT(march_f32);
+HWY_EXPORT(gradients_u8);
+HWY_EXPORT(gradients_u16);
+HWY_EXPORT(gradients_f32);
 HWY_EXPORT(instruction_set);
 
 PacketSums march(const RayPacket& packet, const PlaneLattice<std::uint8_t>& lattice) {
@@ -310,14 +356,29 @@ PacketSums march(const RayPacket& packet, const PlaneLattice<std::uint8_t>& latt
   HWY_DYNAMIC_DISPATCH(march_u8)(packet, lattice, sums);
   return sums;
 }
+PacketGradients march_with_gradients(const RayPacket& packet, const PlaneLattice<std::uint8_t>& lattice) {
+  PacketGradients sums;
+  HWY_DYNAMIC_DISPATCH(gradients_u8)(packet, lattice, sums);
+  return sums;
+}
 PacketSums march(const RayPacket& packet, const PlaneLattice<std::uint16_t>& lattice) {
   alignas(64) PacketSums sums;
   HWY_DYNAMIC_DISPATCH(march_u16)(packet, lattice, sums);
   return sums;
 }
+PacketGradients march_with_gradients(const RayPacket& packet, const PlaneLattice<std::uint16_t>& lattice) {
+  PacketGradients sums;
+  HWY_DYNAMIC_DISPATCH(gradients_u16)(packet, lattice, sums);
+  return sums;
+}
 PacketSums march(const RayPacket& packet, const PlaneLattice<float>& lattice) {
   alignas(64) PacketSums sums;
   HWY_DYNAMIC_DISPATCH(march_f32)(packet, lattice, sums);
+  return sums;
+}
+PacketGradients march_with_gradients(const RayPacket& packet, const PlaneLattice<float>& lattice) {
+  PacketGradients sums;
+  HWY_DYNAMIC_DISPATCH(gradients_f32)(packet, lattice, sums);
   return sums;
 }
 

@@ -41,6 +41,15 @@ PacketSums march(const RayPacket& packet, const PlaneLattice<std::uint8_t>& latt
 PacketSums march(const RayPacket& packet, const PlaneLattice<std::uint16_t>& lattice);
 PacketSums march(const RayPacket& packet, const PlaneLattice<float>& lattice);
 
+// The same sums, and those of the interpolation's derivatives by column and by row: plain, and times the number of
+// planes from RayPacket::plane.
+struct PacketGradients {
+  alignas(64) PacketSums value, by_column, by_row, by_column_slope, by_row_slope;
+};
+PacketGradients march_with_gradients(const RayPacket& packet, const PlaneLattice<std::uint8_t>& lattice);
+PacketGradients march_with_gradients(const RayPacket& packet, const PlaneLattice<std::uint16_t>& lattice);
+PacketGradients march_with_gradients(const RayPacket& packet, const PlaneLattice<float>& lattice);
+
 // The instruction set chosen at run time, for the log.
 const char* march_instruction_set();
 

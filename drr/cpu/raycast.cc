@@ -65,15 +65,17 @@ std::array<std::ptrdiff_t, 3> strides_of(const Vector3i& size, bool y_fastest) {
 template <class T>
 class PacketMarcher {
  public:
-  // `size` of the padded lattice; line integrals are its sums times `unit_per_mm` and the length per plane.
+  // `size` of the padded lattice; line integrals are its sums times `unit_per_mm` and the length per plane. `gradients`
+  // is empty if none are wanted.
   PacketMarcher(const PlaneLattice<T>& lattice, const Vector3i& size, int main_axis, double unit_per_mm,
-                std::span<float> line_integrals)
+                std::span<float> line_integrals, std::span<RayGradient> gradients)
       : lattice_(lattice),
         size_(size),
         main_axis_(main_axis),
         axes_(kPlaneAxes[main_axis]),
         unit_per_mm_(unit_per_mm),
-        line_integrals_(line_integrals) {}
+        line_integrals_(line_integrals),
+        gradients_(gradients) {}
 
   // A ray in voxels of the padded lattice, for the line integral of this index.
   void add(const VoxelRay& ray, std::size_t index) {
@@ -103,6 +105,7 @@ class PacketMarcher {
     packet_.first_plane[count_] = first;
     packet_.last_plane[count_] = last;
     scale_[count_] = static_cast<float>(unit_per_mm_ * ray.length_mm / std::abs(way));
+    way_[count_] = way;
     index_[count_] = index;
     if (++count_ == kPacketRays) finish();
   }
@@ -115,12 +118,40 @@ class PacketMarcher {
       std::fill(values->begin() + count_, values->end(), values->front());
     std::fill(packet_.first_plane.begin() + count_, packet_.first_plane.end(), packet_.first_plane.front());
     std::fill(packet_.last_plane.begin() + count_, packet_.last_plane.end(), packet_.last_plane.front());
-    const PacketSums sums = march(packet_, lattice_);
-    for (int n = 0; n < count_; ++n) line_integrals_[index_[n]] = scale_[n] * sums[n];
+    if (gradients_.empty()) {
+      const PacketSums sums = march(packet_, lattice_);
+      for (int n = 0; n < count_; ++n) line_integrals_[index_[n]] = scale_[n] * sums[n];
+    } else {
+      const PacketGradients sums = march_with_gradients(packet_, lattice_);
+      for (int n = 0; n < count_; ++n) {
+        line_integrals_[index_[n]] = scale_[n] * sums.value[n];
+        gradients_[index_[n]] = gradient_of(sums, n);
+      }
+    }
     count_ = 0;
   }
 
  private:
+  // In plane p a ray meets column s + (p - m) w / v: s and m are the source's column and plane, w and v the way's. The
+  // number of planes on the way, and so the line integral, is as 1 / v.
+  RayGradient gradient_of(const PacketGradients& sums, int n) const {
+    const double scale = scale_[n], way = way_[n];
+    const double from_source = packet_.plane - packet_.source_plane;
+    const double by_column = scale * sums.by_column[n], by_row = scale * sums.by_row[n];
+    const double by_column_slope = scale * sums.by_column_slope[n] + from_source * by_column;
+    const double by_row_slope = scale * sums.by_row_slope[n] + from_source * by_row;
+    const double column_slope = packet_.column_slope[n], row_slope = packet_.row_slope[n];
+    RayGradient gradient;
+    gradient.by_source[axes_.column] = by_column;
+    gradient.by_source[axes_.row] = by_row;
+    gradient.by_source[main_axis_] = -column_slope * by_column - row_slope * by_row;
+    gradient.by_way[axes_.column] = by_column_slope / way;
+    gradient.by_way[axes_.row] = by_row_slope / way;
+    gradient.by_way[main_axis_] =
+        -(column_slope * by_column_slope + row_slope * by_row_slope + scale * sums.value[n]) / way;
+    return gradient;
+  }
+
   RayPacket packet_;
   PlaneLattice<T> lattice_;
   Vector3i size_;
@@ -128,7 +159,9 @@ class PacketMarcher {
   PlaneAxes axes_;
   double unit_per_mm_;
   std::span<float> line_integrals_;
+  std::span<RayGradient> gradients_;
   std::array<float, kPacketRays> scale_;
+  std::array<double, kPacketRays> way_;  // along the main axis
   std::array<std::size_t, kPacketRays> index_;
   int count_ = 0;
 };
@@ -137,9 +170,15 @@ class PacketMarcher {
 
 RaycastCpuRenderer::RaycastCpuRenderer(const Volume<float>& ct_hu, const AttenuationModel& model,
                                        std::span<const Beam> beams, const RendererOptions& options)
-    : CpuRenderer(ct_hu) {
+    : CpuRenderer(ct_hu.patient_from_voxel) {
   const VolumePrecision precision = options.precision.value_or(kDefaultPrecision);
   for (const Beam beam : beams) volumes_.emplace(beam, pack(quantized_attenuation(ct_hu, model, beam, precision)));
+}
+
+RaycastCpuRenderer::RaycastCpuRenderer(const AttenuationByBeam& attenuation_per_mm, const RendererOptions& options)
+    : CpuRenderer(lattice_of(attenuation_per_mm)) {
+  const VolumePrecision precision = options.precision.value_or(kDefaultPrecision);
+  for (const auto& [beam, volume] : attenuation_per_mm) volumes_.emplace(beam, pack(quantized(volume, precision)));
 }
 
 std::string RaycastCpuRenderer::device() const {
@@ -186,13 +225,26 @@ PlaneLattice<T> RaycastCpuRenderer::PackedVolume::lattice(int main_axis) const {
 }
 
 void RaycastCpuRenderer::integrate(std::span<const VoxelRay> rays, Beam beam, std::span<float> line_integrals) const {
+  integrate_all(rays, beam, line_integrals, {});
+}
+
+void RaycastCpuRenderer::integrate_with_gradients(std::span<const VoxelRay> rays, Beam beam,
+                                                  std::span<float> line_integrals,
+                                                  std::span<RayGradient> gradients) const {
+  integrate_all(rays, beam, line_integrals, gradients);
+}
+
+void RaycastCpuRenderer::integrate_all(std::span<const VoxelRay> rays, Beam beam, std::span<float> line_integrals,
+                                       std::span<RayGradient> gradients) const {
   const PackedVolume& volume = volumes_.at(beam);
   std::ranges::fill(line_integrals, 0.0F);
+  std::ranges::fill(gradients, RayGradient());
   if (volume.size.isZero()) return;
   std::visit(
       [&]<class T>(const std::vector<T>&) {
         const auto marcher = [&](int axis) {
-          return PacketMarcher<T>(volume.lattice<T>(axis), volume.size, axis, volume.unit_per_mm, line_integrals);
+          return PacketMarcher<T>(volume.lattice<T>(axis), volume.size, axis, volume.unit_per_mm, line_integrals,
+                                  gradients);
         };
         // Of each main axis one for rays with it and one for those against it.
         std::array marchers = {marcher(0), marcher(0), marcher(1), marcher(1), marcher(2), marcher(2)};

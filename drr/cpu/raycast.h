@@ -15,7 +15,9 @@ class RaycastCpuRenderer final : public CpuRenderer {
  public:
   RaycastCpuRenderer(const Volume<float>& ct_hu, const AttenuationModel& model, std::span<const Beam> beams,
                      const RendererOptions& options);
+  RaycastCpuRenderer(const AttenuationByBeam& attenuation_per_mm, const RendererOptions& options);
   RendererKind kind() const override { return RendererKind::kCpu; }
+  bool has_derivatives() const override { return true; }
   std::string device() const override;
 
  private:
@@ -36,6 +38,11 @@ class RaycastCpuRenderer final : public CpuRenderer {
   static PackedVolume pack(QuantizedVolume attenuation);
 
   void integrate(std::span<const VoxelRay> rays, Beam beam, std::span<float> line_integrals) const override;
+  void integrate_with_gradients(std::span<const VoxelRay> rays, Beam beam, std::span<float> line_integrals,
+                                std::span<RayGradient> gradients) const override;
+  // `gradients` is empty if none are wanted.
+  void integrate_all(std::span<const VoxelRay> rays, Beam beam, std::span<float> line_integrals,
+                     std::span<RayGradient> gradients) const;
 
   std::map<Beam, PackedVolume> volumes_;
 };

@@ -21,7 +21,7 @@ double line_integral(const VoxelRay& ray, const Volume<float>& volume) {
 }  // namespace
 
 SiddonRenderer::SiddonRenderer(const Volume<float>& ct_hu, const AttenuationModel& model, std::span<const Beam> beams)
-    : CpuRenderer(ct_hu) {
+    : CpuRenderer(ct_hu.patient_from_voxel) {
   for (const Beam beam : beams) attenuation_per_mm_.emplace(beam, attenuation_volume(ct_hu, model, beam));
 }
 

@@ -24,38 +24,84 @@ double interpolate(const Volume<float>& volume, const Eigen::Vector3i& corner, c
   return value;
 }
 
-double line_integral(const VoxelRay& ray, const Volume<float>& volume) {
+// The gradient there, per voxel.
+Eigen::Vector3d interpolated_gradient(const Volume<float>& volume, const Eigen::Vector3i& corner,
+                                      const Eigen::Vector3d& fraction) {
+  Eigen::Vector3d gradient = Eigen::Vector3d::Zero();
+  for (int n = 0; n < 8; ++n) {
+    const Eigen::Vector3i offset(n & 1, (n >> 1) & 1, n >> 2);
+    const Eigen::Vector3d weight = 1.0 - (fraction - offset.cast<double>()).cwiseAbs().array();
+    const Eigen::Vector3d sign = 2.0 * offset.cast<double>().array() - 1.0;
+    const Eigen::Vector3i voxel = corner + offset;
+    gradient += voxel_or_zero(volume, voxel.x(), voxel.y(), voxel.z()) *
+                Eigen::Vector3d(sign.x() * weight.y() * weight.z(), sign.y() * weight.x() * weight.z(),
+                                sign.z() * weight.x() * weight.y());
+  }
+  return gradient;
+}
+
+// Calls visit(corner, fraction, t, weight) at the Gauss points of all cells that the ray passes: an integral over t is
+// the sum of the values there, times their weights.
+template <class Visit>
+void visit_points(const VoxelRay& ray, const Volume<float>& volume, Visit&& visit) {
   constexpr double kGaussOffset = 0.28867513459481287;  // 1 / (2 sqrt 3)
   // Cells lie between voxel centers, one more on each side for the way down to zero: cell c spans voxels c-1 and c.
   VoxelRay cell_ray = ray;
   cell_ray.source.array() += 1.0;
   const Eigen::Vector3i cells = volume.size.array() + 1;
-  double sum = 0.0;
   walk_cells(cell_ray, cells, [&](const Eigen::Vector3i& cell, double begin, double end) {
     const double middle = 0.5 * (begin + end);
     const double offset = kGaussOffset * (end - begin);
-    double values = 0.0;
     for (const double t : {middle - offset, middle + offset}) {
       const Eigen::Vector3d fraction = cell_ray.source + t * cell_ray.way - cell.cast<double>();
-      values += interpolate(volume, cell.array() - 1, fraction);
+      visit(Eigen::Vector3i(cell.array() - 1), fraction, t, 0.5 * (end - begin));
     }
-    sum += 0.5 * values * (end - begin);
+  });
+}
+
+double line_integral(const VoxelRay& ray, const Volume<float>& volume) {
+  double sum = 0.0;
+  visit_points(ray, volume, [&](const Eigen::Vector3i& corner, const Eigen::Vector3d& fraction, double, double weight) {
+    sum += weight * interpolate(volume, corner, fraction);
   });
   return sum * ray.length_mm;
+}
+
+// Along a line the gradient is a quadratic polynomial in every cell, and t times it a cubic one: exact, too.
+RayGradient gradient_of(const VoxelRay& ray, const Volume<float>& volume) {
+  RayGradient sum;
+  visit_points(ray, volume,
+               [&](const Eigen::Vector3i& corner, const Eigen::Vector3d& fraction, double t, double weight) {
+                 const Eigen::Vector3d part = ray.length_mm * weight * interpolated_gradient(volume, corner, fraction);
+                 sum.by_source += part;
+                 sum.by_way += t * part;
+               });
+  return sum;
 }
 
 }  // namespace
 
 TrilinearRenderer::TrilinearRenderer(const Volume<float>& ct_hu, const AttenuationModel& model,
                                      std::span<const Beam> beams)
-    : CpuRenderer(ct_hu) {
+    : CpuRenderer(ct_hu.patient_from_voxel) {
   for (const Beam beam : beams) attenuation_per_mm_.emplace(beam, attenuation_volume(ct_hu, model, beam));
 }
+
+TrilinearRenderer::TrilinearRenderer(AttenuationByBeam attenuation_per_mm)
+    : CpuRenderer(lattice_of(attenuation_per_mm)), attenuation_per_mm_(std::move(attenuation_per_mm)) {}
 
 void TrilinearRenderer::integrate(std::span<const VoxelRay> rays, Beam beam, std::span<float> line_integrals) const {
   const Volume<float>& volume = attenuation_per_mm_.at(beam);
   std::ranges::transform(rays, line_integrals.begin(),
                          [&](const VoxelRay& ray) { return static_cast<float>(line_integral(ray, volume)); });
+}
+
+void TrilinearRenderer::integrate_with_gradients(std::span<const VoxelRay> rays, Beam beam,
+                                                 std::span<float> line_integrals,
+                                                 std::span<RayGradient> gradients) const {
+  const Volume<float>& volume = attenuation_per_mm_.at(beam);
+  integrate(rays, beam, line_integrals);
+  std::ranges::transform(rays, gradients.begin(), [&](const VoxelRay& ray) { return gradient_of(ray, volume); });
 }
 
 }  // namespace isoshift

@@ -13,12 +13,16 @@ namespace isoshift {
 class TrilinearRenderer final : public CpuRenderer {
  public:
   TrilinearRenderer(const Volume<float>& ct_hu, const AttenuationModel& model, std::span<const Beam> beams);
+  explicit TrilinearRenderer(AttenuationByBeam attenuation_per_mm);
   RendererKind kind() const override { return RendererKind::kTrilinear; }
+  bool has_derivatives() const override { return true; }
 
  private:
   void integrate(std::span<const VoxelRay> rays, Beam beam, std::span<float> line_integrals) const override;
+  void integrate_with_gradients(std::span<const VoxelRay> rays, Beam beam, std::span<float> line_integrals,
+                                std::span<RayGradient> gradients) const override;
 
-  std::map<Beam, Volume<float>> attenuation_per_mm_;
+  AttenuationByBeam attenuation_per_mm_;
 };
 
 }  // namespace isoshift

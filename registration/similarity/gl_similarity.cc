@@ -25,6 +25,7 @@ constexpr std::size_t kMaxGroups = 65535;  // what every OpenGL 4.5 allows along
 
 struct GlView {
   std::uint32_t first_pixel, first_compared, compared;
+  float low, per_unit;
 };
 
 ShaderSource shader(SimilarityKind kind) {
@@ -99,7 +100,9 @@ GlSimilarity::GlSimilarity(const GlContext& context, std::span<const Comparison>
   for (const Comparison& comparison : comparisons) {
     views.push_back({.first_pixel = static_cast<std::uint32_t>(pixels_per_pose_),
                      .first_compared = static_cast<std::uint32_t>(xray.size()),
-                     .compared = static_cast<std::uint32_t>(comparison.pixels_compared())});
+                     .compared = static_cast<std::uint32_t>(comparison.pixels_compared()),
+                     .low = comparison.drr_range().low,
+                     .per_unit = comparison.drr_range().per_unit});
     xray.add(comparison);
     pixels_per_pose_ += comparison.pixels();
   }

@@ -54,6 +54,15 @@ std::optional<SimilarityKind> similarity_kind_from(std::string_view name) {
   return std::nullopt;
 }
 
+bool has_curvature(SimilarityKind kind) {
+  return kind == SimilarityKind::kNcc || kind == SimilarityKind::kGradientCorrelation ||
+         kind == SimilarityKind::kStochasticRankCorrelation;
+}
+
+bool has_histogram(SimilarityKind kind) {
+  return kind != SimilarityKind::kNcc && kind != SimilarityKind::kGradientCorrelation;
+}
+
 double normalized_cross_correlation(std::span<const float> a, std::span<const float> b) {
   assert(a.size() == b.size());
   const auto n = static_cast<double>(a.size());
@@ -91,30 +100,21 @@ double gradient_correlation(const Gradients& a, const Gradients& b) {
                 normalized_cross_correlation(a.along_column, b.along_column));
 }
 
-Range range_of(std::span<const float> values) {
-  if (values.empty()) return {0.0F, 0.0F};
-  const auto [low, high] = std::ranges::minmax(values);
-  return {.low = low, .per_unit = high > low ? 1.0F / (high - low) : 0.0F};
-}
-
-std::vector<float> histogram_ranks(std::span<const float> values) {
-  const Range range = range_of(values);
-  std::array<std::uint32_t, kRankBins> counts = {};
-  std::vector<int> bins;
-  bins.reserve(values.size());
+std::vector<float> histogram_ranks(std::span<const float> values, const Range& range) {
+  std::vector<Place> places;
+  places.reserve(values.size());
+  RankHistogram counts = {};
   for (const float value : values) {
-    bins.push_back(bin_of(range(value), kRankBins));
-    ++counts[static_cast<std::size_t>(bins.back())];
+    const Place& place = places.emplace_back(place_of(value, range, kRankBins));
+    counts[place.lower] += kSharesPerPixel - place.shares;
+    counts[place.lower + 1] += place.shares;
   }
-  std::array<float, kRankBins> rank_of_bin = {};
-  std::uint32_t below = 0;
-  for (std::size_t bin = 0; bin < counts.size(); ++bin) {
-    rank_of_bin[bin] = static_cast<float>(below) + 0.5F * (static_cast<float>(counts[bin]) - 1.0F);
-    below += counts[bin];
-  }
+  const std::array<float, kRankBins> rank_of_bin = middle_ranks(counts);
   std::vector<float> ranks;
   ranks.reserve(values.size());
-  for (const int bin : bins) ranks.push_back(rank_of_bin[static_cast<std::size_t>(bin)]);
+  for (const Place& place : places)
+    ranks.push_back(rank_of_bin[place.lower] +
+                    place.beyond * (rank_of_bin[place.lower + 1] - rank_of_bin[place.lower]));
   return ranks;
 }
 
@@ -142,21 +142,20 @@ std::vector<std::uint32_t> information_bins(std::span<const float> xray) {
   return bins;
 }
 
-JointHistogram joint_histogram(std::span<const std::uint32_t> xray_bins, std::span<const float> drr) {
+JointHistogram joint_histogram(std::span<const std::uint32_t> xray_bins, std::span<const float> drr,
+                               const Range& range) {
   assert(xray_bins.size() == drr.size());
-  const Range range = range_of(drr);
   JointHistogram histogram = {};
   for (std::size_t n = 0; n < drr.size(); ++n) {
-    const float place = range(drr[n]) * static_cast<float>(kInformationBins - 1);
-    const int lower = std::min(kInformationBins - 2, static_cast<int>(place));
-    const float beyond = place - static_cast<float>(lower);
-    const auto to_upper = static_cast<std::uint32_t>(beyond * static_cast<float>(kSharesPerPixel) + 0.5F);
-    const std::size_t at = static_cast<std::size_t>(xray_bins[n]) * kInformationBins + static_cast<std::size_t>(lower);
-    histogram[at] += kSharesPerPixel - to_upper;
-    histogram[at + 1] += to_upper;
+    const Place place = place_of(drr[n], range, kInformationBins);
+    const std::size_t at = static_cast<std::size_t>(xray_bins[n]) * kInformationBins + place.lower;
+    histogram[at] += kSharesPerPixel - place.shares;
+    histogram[at + 1] += place.shares;
   }
   return histogram;
 }
+
+double joint_entropy(const JointHistogram& histogram) { return entropies_of(histogram).joint; }
 
 double mutual_information(const JointHistogram& histogram) {
   const Entropies entropies = entropies_of(histogram);
@@ -168,8 +167,9 @@ double normalized_mutual_information(const JointHistogram& histogram) {
   return entropies.joint > 0.0 ? (entropies.xray + entropies.drr) / entropies.joint : 1.0;
 }
 
-Comparison::Comparison(SimilarityKind kind, std::vector<float> xray, std::vector<Neighbors> neighbors)
-    : kind_(kind), pixels_(xray.size()), neighbors_(std::move(neighbors)) {
+Comparison::Comparison(SimilarityKind kind, std::vector<float> xray, std::vector<Neighbors> neighbors,
+                       const Range& drr_range)
+    : kind_(kind), pixels_(xray.size()), neighbors_(std::move(neighbors)), drr_range_(drr_range) {
   switch (kind) {
     case SimilarityKind::kNcc: values_ = std::move(xray); break;
     case SimilarityKind::kGradientCorrelation: gradients_ = gradients(xray, neighbors_); break;
@@ -193,10 +193,10 @@ double Comparison::of(std::span<const float> drr) const {
   switch (kind_) {
     case SimilarityKind::kNcc: return normalized_cross_correlation(values_, drr);
     case SimilarityKind::kGradientCorrelation: return gradient_correlation(gradients_, gradients(drr, neighbors_));
-    case SimilarityKind::kStochasticRankCorrelation: return rank_correlation(values_, histogram_ranks(drr));
-    case SimilarityKind::kMutualInformation: return mutual_information(joint_histogram(bins_, drr));
+    case SimilarityKind::kStochasticRankCorrelation: return rank_correlation(values_, histogram_ranks(drr, drr_range_));
+    case SimilarityKind::kMutualInformation: return mutual_information(joint_histogram(bins_, drr, drr_range_));
     case SimilarityKind::kNormalizedMutualInformation:
-      return normalized_mutual_information(joint_histogram(bins_, drr));
+      return normalized_mutual_information(joint_histogram(bins_, drr, drr_range_));
   }
   return 0.0;
 }

@@ -11,6 +11,7 @@ struct View {
   uint first_pixel;     // where its line integrals begin among those of one pose
   uint first_compared;  // where what they are compared with begins
   uint compared;        // pixels
+  float low, per_unit;  // the range of histograms: Range of histogram.h
 };
 
 layout(std430, binding = 0) readonly buffer LineIntegrals { float line_integrals[]; };  // [pose][view][pixel]
@@ -32,7 +33,7 @@ void wait_for_group() {
   barrier();
 }
 
-// Sums and maxima over the group, in a tree, given to all of it.
+// Sums over the group, in a tree, given to all of it.
 shared vec2 of_invocation[kGroupSize];
 
 vec2 sum_over_group(vec2 own) {
@@ -47,43 +48,30 @@ vec2 sum_over_group(vec2 own) {
   return of_invocation[0];
 }
 
-vec2 max_over_group(vec2 own) {
-  uint me = gl_LocalInvocationIndex;
-  wait_for_group();
-  of_invocation[me] = own;
-  wait_for_group();
-  for (uint others = kGroupSize / 2u; others > 0u; others /= 2u) {
-    if (me < others) of_invocation[me] = max(of_invocation[me], of_invocation[me + others]);
-    wait_for_group();
-  }
-  return of_invocation[0];
-}
+// Where a value lies among bins: at `lower` plus a share of the way to the next. The CPU rounds as this does
+// (place_of() in histogram.cc), else pixels fall to either side of a bin's middle.
+struct Place {
+  uint lower;
+  float beyond;
+  uint shares;  // of the next bin
+};
 
-// Where values lie in the DRR, 0 to 1. The CPU rounds as this does, else pixels on the border of two bins fall to either
-// side: float division is not exact on every GPU, that of doubles is more than exact enough.
-precise float low, per_unit;
+const uint kSharesPerPixel = 256u;  // as in histogram.h
 
-void find_range() {
-  vec2 extremes = vec2(-drr(0u), drr(0u));
-  for (uint n = gl_LocalInvocationIndex; n < view.compared; n += kGroupSize)
-    extremes = max(extremes, vec2(-drr(n), drr(n)));
-  extremes = max_over_group(extremes);
-  low = -extremes.x;
-  precise float width = extremes.y - low;
-  per_unit = width > 0.0 ? float(1.0LF / double(width)) : 0.0;
-}
-
-float share_of_range(float value) {
-  precise float share = (value - low) * per_unit;
-  return share;
+Place place_of(float value, int bins) {
+  precise float per_unit = view.per_unit * float(bins - 1);
+  precise float place = clamp((value - view.low) * per_unit, 0.0, float(bins - 1));
+  int lower = min(bins - 2, int(place));
+  precise float beyond = place - float(lower);
+  precise float shares = beyond * float(kSharesPerPixel) + 0.5;
+  return Place(uint(lower), beyond, uint(shares));
 }
 
 #if defined(MUTUAL_INFORMATION) || defined(NORMALIZED_MUTUAL_INFORMATION)
 
 layout(std430, binding = 2) readonly buffer Xray { uint xray_bins[]; };
 
-const int kBins = 32;              // as in similarity.h
-const uint kSharesPerPixel = 256u;
+const int kBins = 32;  // as in similarity.h
 
 shared uint joint[kBins * kBins];  // [X-ray][DRR]
 
@@ -96,15 +84,12 @@ float of_cell(uint count) {
 
 float similarity() {
   for (uint n = gl_LocalInvocationIndex; n < uint(kBins * kBins); n += kGroupSize) joint[n] = 0u;
-  find_range();  // which waits for the group
+  wait_for_group();
   for (uint n = gl_LocalInvocationIndex; n < view.compared; n += kGroupSize) {
-    precise float place = share_of_range(drr(n)) * float(kBins - 1);
-    int lower = min(kBins - 2, int(place));
-    precise float beyond = place - float(lower);
-    precise float shares = beyond * float(kSharesPerPixel) + 0.5;
-    uint at = xray_bins[view.first_compared + n] * uint(kBins) + uint(lower);
-    atomicAdd(joint[at], kSharesPerPixel - uint(shares));
-    atomicAdd(joint[at + 1u], uint(shares));
+    Place place = place_of(drr(n), kBins);
+    uint at = xray_bins[view.first_compared + n] * uint(kBins) + place.lower;
+    atomicAdd(joint[at], kSharesPerPixel - place.shares);
+    atomicAdd(joint[at + 1u], place.shares);
   }
   wait_for_group();
 
@@ -146,26 +131,31 @@ float value(uint list, uint n) {
 #elif defined(RANK_CORRELATION)
 
 const uint kLists = 1u;
-const uint kBins = kGroupSize;  // 256, as in similarity.h: one for each invocation
+const int kBins = int(kGroupSize);  // 256, as in histogram.h: one for each invocation
 shared uint counts[kBins];
 shared float rank_of_bin[kBins];
 
-uint bin_of(float value) { return uint(min(int(kBins) - 1, int(share_of_range(value) * float(kBins)))); }
-
-// Every value of a bin gets the mean of the bin's ranks.
+// The rank at the middle of every bin: that of half its pixels.
 void prepare() {
   uint me = gl_LocalInvocationIndex;
   counts[me] = 0u;
-  find_range();  // which waits for the group
-  for (uint n = me; n < view.compared; n += kGroupSize) atomicAdd(counts[bin_of(drr(n))], 1u);
+  wait_for_group();
+  for (uint n = me; n < view.compared; n += kGroupSize) {
+    Place place = place_of(drr(n), kBins);
+    atomicAdd(counts[place.lower], kSharesPerPixel - place.shares);
+    atomicAdd(counts[place.lower + 1u], place.shares);
+  }
   wait_for_group();
   uint below = 0u;
   for (uint bin = 0u; bin < me; ++bin) below += counts[bin];
-  rank_of_bin[me] = float(below) + 0.5 * (float(counts[me]) - 1.0);
+  rank_of_bin[me] = (float(below) + 0.5 * float(counts[me])) / float(kSharesPerPixel) - 0.5;
   wait_for_group();
 }
 
-float value(uint list, uint n) { return rank_of_bin[bin_of(drr(n))]; }
+float value(uint list, uint n) {
+  Place place = place_of(drr(n), kBins);
+  return mix(rank_of_bin[place.lower], rank_of_bin[place.lower + 1u], place.beyond);
+}
 
 #else  // NCC
 

@@ -35,6 +35,25 @@ Volume<float> textured_volume() {
   return ct;
 }
 
+Volume<float> smooth_volume() {
+  constexpr double kSpacingMm = 2.0, kWaveMm = 35.0;
+  const Eigen::Vector3i size(56, 62, 48);
+  Volume<float> ct = centered_volume(size, Eigen::Vector3d::Constant(kSpacingMm), 0.0F);
+  ct.patient_from_voxel = Eigen::Affine3d(Eigen::AngleAxisd(0.3, Eigen::Vector3d(1, 2, -1).normalized()) *
+                                          Eigen::Translation3d(3.0, -5.0, 2.0)) *
+                          ct.patient_from_voxel;
+  for (int k = 0; k < size.z(); ++k)
+    for (int j = 0; j < size.y(); ++j)
+      for (int i = 0; i < size.x(); ++i) {
+        const Eigen::Vector3d share = Eigen::Vector3d(i, j, k).array() / (size.cast<double>().array() - 1.0);
+        const double fade = (4.0 * share.array() * (1.0 - share.array())).prod();
+        const Eigen::Vector3d phase = 2.0 * M_PI * kSpacingMm / kWaveMm * Eigen::Vector3d(i, j, k);
+        const double wave = std::sin(phase.x()) * std::cos(phase.y()) + std::sin(phase.z() + phase.x());
+        ct.at(i, j, k) = static_cast<float>(-1000.0 + fade * (1000.0 + 300.0 * wave));
+      }
+  return ct;
+}
+
 Volume<float> phantom_ct_of(const std::vector<Shape>& shapes) {
   const Volume<float> lattice = centered_volume({127, 154, 108}, {1.5, 1.5, 2.0}, 0.0F);
   return ct_of_shapes(shapes, lattice.size, lattice.patient_from_voxel);

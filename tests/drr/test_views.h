@@ -19,6 +19,11 @@ Volume<float> centered_volume(const Eigen::Vector3i& size, const Eigen::Vector3d
 // Random HU between -700 and 1300 in 16 x 20 x 12 voxels with oblique axes.
 Volume<float> textured_volume();
 
+// Smooth everywhere, with slopes along all axes, and oblique; fades to air at its faces. With kAll everything of it
+// attenuates: a threshold would make edges.
+Volume<float> smooth_volume();
+inline constexpr AttenuationModel kAll{.threshold_hu = -1001.0};
+
 // The CT of shapes, and of the head phantom, with voxels of 1.5 x 1.5 x 2 mm about the origin.
 Volume<float> phantom_ct_of(const std::vector<Shape>& shapes);
 Volume<float> phantom_ct();

@@ -119,20 +119,21 @@ class GlSimilarityTest : public testing::TestWithParam<Tested> {
 
   // Images of kColumns pixels per row; gradients are compared in their interior.
   static constexpr std::uint32_t kColumns = 23;
-  Comparison comparison(const std::vector<float>& xray) const {
+  Comparison comparison(const std::vector<float>& xray, const Range& drr_range) const {
     std::vector<Neighbors> neighbors;
     const auto size = static_cast<std::uint32_t>(xray.size());
     if (GetParam().kind == SimilarityKind::kGradientCorrelation)
       for (std::uint32_t n = kColumns; n + kColumns < size; ++n)
         if (n % kColumns > 0 && n % kColumns + 1 < kColumns)
           neighbors.push_back({n - 1, n + 1, n - kColumns, n + kColumns});
-    return {GetParam().kind, xray, neighbors};
+    return {GetParam().kind, xray, neighbors, drr_range};
   }
 
   // One view, one pose per DRR.
   void expect_as_on_cpu(const std::vector<float>& xray, const std::vector<std::vector<float>>& drrs, double tolerance) {
     const GlContext context(GetParam().gl);
-    const std::vector<Comparison> comparisons = {comparison(xray)};
+    const Range of_first = drrs.front().empty() ? Range() : range_of(drrs.front());  // others reach beyond it
+    const std::vector<Comparison> comparisons = {comparison(xray, of_first)};
     GlSimilarity similarity(context, comparisons);
     std::vector<float> pixels;
     for (const std::vector<float>& drr : drrs) pixels.insert(pixels.end(), drr.begin(), drr.end());

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 
 #include "geometry/rotation.h"
 #include "registration/pose_parameters.h"
@@ -150,6 +151,56 @@ TEST(Search, SameSeedSameResult) {
   EXPECT_EQ(again.stages[0].value, first.stages[0].value);
   EXPECT_EQ(again.stages[0].evaluations, first.stages[0].evaluations);
   EXPECT_NE(other.parameters, first.parameters);
+}
+
+// From the same near start with every similarity: where BOBYQA ends, or nearer, in fewer evaluations.
+struct OnDerivatives {
+  OptimizerKind optimizer;
+  SimilarityKind similarity;
+};
+class SearchOnDerivatives : public testing::TestWithParam<OnDerivatives> {};
+INSTANTIATE_TEST_SUITE_P(
+    All, SearchOnDerivatives,
+    testing::Values(OnDerivatives{OptimizerKind::kLevenbergMarquardt, SimilarityKind::kNcc},
+                    OnDerivatives{OptimizerKind::kLevenbergMarquardt, SimilarityKind::kGradientCorrelation},
+                    OnDerivatives{OptimizerKind::kLevenbergMarquardt, SimilarityKind::kStochasticRankCorrelation},
+                    OnDerivatives{OptimizerKind::kLbfgs, SimilarityKind::kStochasticRankCorrelation},
+                    OnDerivatives{OptimizerKind::kLbfgs, SimilarityKind::kMutualInformation},
+                    OnDerivatives{OptimizerKind::kLbfgs, SimilarityKind::kNormalizedMutualInformation}),
+    [](const auto& of) {
+      std::string name = std::string(to_string(of.param.optimizer)) + "_" + std::string(to_string(of.param.similarity));
+      std::ranges::replace(name, '-', '_');
+      return name;
+    });
+
+TEST_P(SearchOnDerivatives, EndsWhereBobyqaEnds) {
+  Stage stage = coarse_stage();
+  stage.similarity = GetParam().similarity;
+  stage.pixel_mm = stage.voxel_mm = 2.5;
+  stage.initial_step_mm = 1.0;
+  stage.initial_step_rad = rad_from_deg(0.6);
+  const std::vector<double> start = {2.2, -1.4, 4.7, 1.5, -2.0, 3.0};
+  const SearchResult by_values = search_in(near_scene(), {stage}, {.parameters = start});
+  stage.optimizer = GetParam().optimizer;
+  const SearchResult found = search_in(near_scene(), {stage}, {.parameters = start});
+  EXPECT_EQ(found.stages[0].optimizer, to_string(GetParam().optimizer));
+  EXPECT_GT(found.stages[0].value, by_values.stages[0].value - 0.002);
+  EXPECT_LT(found.stages[0].evaluations, by_values.stages[0].evaluations);
+  EXPECT_THAT(found_in(found), PoseNear(near_scene().truth, 0.8, 0.8));
+}
+
+TEST(Search, WithoutDerivativesAClimbIsBobyqas) {
+  const RegistrationScene& scene = near_scene();
+  Stage stage = coarse_stage();
+  stage.similarity = SimilarityKind::kGradientCorrelation;
+  const RendererPyramid siddon(RendererKind::kSiddon, scene.ct, {}, std::array{Beam::kKilovoltage});
+  const auto end = [&](OptimizerKind optimizer) {
+    stage.optimizer = optimizer;
+    return search(siddon, scene.views(), scene.planned, {.stages = std::span(&stage, 1)});
+  };
+  const SearchResult climbed = end(OptimizerKind::kLevenbergMarquardt);
+  EXPECT_EQ(climbed.stages[0].optimizer, "bobyqa");
+  EXPECT_EQ(climbed.parameters, end(OptimizerKind::kBobyqa).parameters);
 }
 
 TEST(Search, StaysWithinItsBounds) {

@@ -69,29 +69,70 @@ TEST(Similarity, GradientCorrelationIgnoresSlowIntensityErrors) {
   EXPECT_NEAR(gradient_correlation(gradients(image, interior()), gradients(shaded, interior())), 1.0, 1e-6);
 }
 
+// Bin n has its middle at n.
+const Range kTwoToTheEighth = {.low = 0.0F, .per_unit = 1.0F / 255.0F};
+
+// Values on a raster of thousandths, from 0.001 to 5.
+std::vector<float> random_list(std::size_t size, std::uint64_t seed) {
+  std::mt19937_64 random(seed);
+  std::vector<float> list(size);
+  for (float& value : list) value = 0.001F * static_cast<float>(1 + random() % 5000);
+  return list;
+}
+
+double rank_correlation_of(const std::vector<float>& xray, const std::vector<float>& drr) {
+  return Comparison(SimilarityKind::kStochasticRankCorrelation, xray, {}, range_of(drr)).of(drr);
+}
+
 TEST(Similarity, EqualValuesShareTheMeanOfTheirRanks) {
   // Sorted: -2, 1, 1, 5, 5, 5, 9.
   const std::vector<float> values = {5, 1, 9, 5, 1, -2, 5};
   EXPECT_THAT(exact_ranks(values), ElementsAre(4.0F, 1.5F, 6.0F, 4.0F, 1.5F, 0.0F, 4.0F));
   // Each value has a bin of its own: the same.
-  EXPECT_EQ(histogram_ranks(values), exact_ranks(values));
-  EXPECT_THAT(exact_ranks(std::vector<float>{7, 7, 7}), ElementsAre(1.0F, 1.0F, 1.0F));
-  EXPECT_THAT(histogram_ranks(std::vector<float>{7, 7, 7}), ElementsAre(1.0F, 1.0F, 1.0F));
+  EXPECT_EQ(histogram_ranks(values, kTwoToTheEighth), exact_ranks(values));
+  const std::vector<float> equal = {7, 7, 7};
+  EXPECT_THAT(exact_ranks(equal), ElementsAre(1.0F, 1.0F, 1.0F));
+  EXPECT_THAT(histogram_ranks(equal, range_of(equal)), ElementsAre(1.0F, 1.0F, 1.0F));
   EXPECT_TRUE(exact_ranks({}).empty());
-  EXPECT_TRUE(histogram_ranks({}).empty());
+  EXPECT_TRUE(histogram_ranks({}, {}).empty());
 }
 
-TEST(Similarity, ValuesOfOneBinAreTies) {
-  const std::vector<float> values = {0.0F, 0.003F, 0.004F, 1.0F};  // bins are 1/256 wide: 0.0039
-  EXPECT_THAT(histogram_ranks(values), ElementsAre(0.5F, 0.5F, 2.0F, 3.0F));
-  EXPECT_THAT(exact_ranks(values), ElementsAre(0.0F, 1.0F, 2.0F, 3.0F));
+TEST(Similarity, RanksGrowLinearlyBetweenTwoBins) {
+  // Shares of 0, 1, 1/2 and 0 in bin 3: a half, one and a half, and again none pixels up to the middles of bins 2 to 4.
+  const std::vector<float> values = {2.0F, 3.0F, 3.5F, 9.0F};
+  const std::vector<float> ranks = histogram_ranks(values, kTwoToTheEighth);
+  EXPECT_NEAR(ranks[0], 0.0F, 1e-6F);                    // 0.5 pixels below the middle of bin 2
+  EXPECT_NEAR(ranks[1], 1.25F, 1e-6F);                   // 1 + 1.5 / 2 - 0.5
+  EXPECT_NEAR(ranks[2], 0.5F * (1.25F + 2.25F), 1e-6F);  // bin 4 has half a pixel above 2.5
+  EXPECT_NEAR(ranks[3], 3.0F, 1e-6F);
+}
+
+TEST(Similarity, WhatLiesBeyondTheRangeCountsAsItsEnd) {
+  const std::vector<float> values = {-50.0F, 0.0F, 128.0F, 255.0F, 9999.0F};
+  EXPECT_THAT(histogram_ranks(values, kTwoToTheEighth), ElementsAre(0.5F, 0.5F, 2.0F, 3.5F, 3.5F));
+  const Range range = wide_range_of(values);
+  EXPECT_GT(range(-50.0F), 0.0F);
+  EXPECT_LT(range(9999.0F), 1.0F);
+}
+
+TEST(Similarity, AnExtremePixelDoesNotMoveTheOthersBins) {
+  std::vector<float> drr = random_list(2000, 21), xray = random_list(2000, 22);
+  for (std::size_t n = 0; n < xray.size(); ++n) xray[n] += drr[n];
+  for (const SimilarityKind kind : {SimilarityKind::kStochasticRankCorrelation, SimilarityKind::kMutualInformation,
+                                    SimilarityKind::kNormalizedMutualInformation}) {
+    const Comparison comparison(kind, xray, {}, wide_range_of(drr));
+    const double before = comparison.of(drr);
+    std::vector<float> with_extreme = drr;
+    with_extreme[7] = 400.0F;
+    EXPECT_NEAR(comparison.of(with_extreme), before, 0.005) << to_string(kind);
+  }
 }
 
 TEST(Similarity, RanksOfEightBitDataAreExact) {
   std::mt19937_64 random(2);
   std::vector<float> values(5000);
   for (float& value : values) value = static_cast<float>(random() % 256);
-  EXPECT_EQ(histogram_ranks(values), exact_ranks(values));
+  EXPECT_EQ(histogram_ranks(values, kTwoToTheEighth), exact_ranks(values));
 }
 
 TEST(Similarity, RankCorrelationIsSpearmansRhoWithoutTies) {
@@ -116,32 +157,24 @@ TEST(Similarity, RankCorrelationWithTies) {
   EXPECT_NEAR(rank_correlation(a, b), 4.0 / 4.5, 1e-12);
 }
 
-// Values on a raster of thousandths, from 0.001 to 5.
-std::vector<float> random_list(std::size_t size, std::uint64_t seed) {
-  std::mt19937_64 random(seed);
-  std::vector<float> list(size);
-  for (float& value : list) value = 0.001F * static_cast<float>(1 + random() % 5000);
-  return list;
-}
-
 TEST(Similarity, RankCorrelationIsBlindToMonotoneChangesOfTheXray) {
   const std::vector<float> drr = random_list(2000, 4);
   std::vector<float> xray = random_list(2000, 5);
   // On the raster again: values one rounding apart could become equal.
   for (std::size_t n = 0; n < xray.size(); ++n) xray[n] = 0.001F * std::round(1000.0F * (xray[n] + drr[n]));
-  const double unchanged = Comparison(SimilarityKind::kStochasticRankCorrelation, xray).of(drr);
+  const double unchanged = rank_correlation_of(xray, drr);
   EXPECT_NEAR(unchanged, 0.69, 0.03);  // Spearman's rho where Pearson's correlation is sqrt(1/2): near 6/pi asin(r/2)
   for (const double gamma : {0.5, 0.7, 1.0, 1.5, 2.0}) {
     std::vector<float> changed = xray;
     for (float& value : changed) value = static_cast<float>(std::pow(value, gamma));
-    EXPECT_EQ(Comparison(SimilarityKind::kStochasticRankCorrelation, changed).of(drr), unchanged) << gamma;
+    EXPECT_EQ(rank_correlation_of(changed, drr), unchanged) << gamma;
     for (float& value : changed) value = -value;
-    EXPECT_NEAR(Comparison(SimilarityKind::kStochasticRankCorrelation, changed).of(drr), -unchanged, 1e-12) << gamma;
+    EXPECT_NEAR(rank_correlation_of(changed, drr), -unchanged, 1e-12) << gamma;
   }
 }
 
 double information(SimilarityKind kind, const std::vector<float>& xray, const std::vector<float>& drr) {
-  return Comparison(kind, xray).of(drr);
+  return Comparison(kind, xray, {}, range_of(drr)).of(drr);
 }
 
 TEST(Similarity, InformationOfIndependentAndOfIdenticalLists) {
@@ -187,7 +220,7 @@ TEST(Similarity, InformationStaysWithinItsBounds) {
 TEST(Similarity, ValuesBetweenTwoBinsAreSharedByDistance) {
   const std::vector<std::uint32_t> bins = {0, 0, 3, 0};
   const std::vector<float> drr = {0.0F, 31.0F, 4.25F, 4.25F};
-  const JointHistogram histogram = joint_histogram(bins, drr);
+  const JointHistogram histogram = joint_histogram(bins, drr, range_of(drr));
   EXPECT_EQ(histogram[0], 256U);
   EXPECT_EQ(histogram[31], 256U);
   EXPECT_EQ(histogram[4], 192U);
@@ -212,6 +245,82 @@ TEST(Similarity, InformationChangesSmoothlyWithTheDrr) {
   }
   for (std::size_t n = 1; n + 1 < along.size(); ++n)
     EXPECT_NEAR(along[n], 0.5 * (along[n - 1] + along[n + 1]), 0.01) << "step " << n;
+}
+
+constexpr int kImages =
+    800;  // of 5 x 5 pixels, one after the other: enough that no cell of a histogram is nearly empty
+
+// A DRR that depends on three parameters, smoothly and not only linearly, and an X-ray like it at 0.
+struct Parametric {
+  std::vector<float> xray = random_list(25 * kImages, 31), first = random_list(25 * kImages, 32),
+                     second = random_list(25 * kImages, 33), third = random_list(25 * kImages, 34);
+
+  std::vector<float> drr(const Eigen::Vector3d& p) const {
+    std::vector<float> result;
+    for (std::size_t n = 0; n < xray.size(); ++n)
+      result.push_back(static_cast<float>(xray[n] + 0.4 * third[n] + std::sin(p.x()) * first[n] + p.y() * second[n] +
+                                          p.z() * p.x() * third[n] + p.z() * xray[n] * third[n]));
+    return result;
+  }
+  PixelJacobian jacobian(const Eigen::Vector3d& p) const {
+    PixelJacobian result(static_cast<Eigen::Index>(xray.size()), 3);
+    for (std::size_t n = 0; n < xray.size(); ++n)
+      result.row(static_cast<Eigen::Index>(n)) << static_cast<float>(std::cos(p.x()) * first[n] + p.z() * third[n]),
+          second[n], static_cast<float>(p.x() * third[n] + xray[n] * third[n]);
+    return result;
+  }
+};
+
+class SimilarityModels : public testing::TestWithParam<SimilarityKind> {
+ protected:
+  // Of the images' interiors.
+  std::vector<Neighbors> neighbors() const {
+    std::vector<Neighbors> all;
+    for (std::uint32_t image = 0; image < kImages; ++image)
+      for (const Neighbors& at : interior())
+        all.push_back({25 * image + at.left, 25 * image + at.right, 25 * image + at.above, 25 * image + at.below});
+    return all;
+  }
+  Parametric scene_;
+  Comparison comparison_{GetParam(), scene_.xray, neighbors(), wide_range_of(scene_.drr({0, 0, 0}))};
+};
+INSTANTIATE_TEST_SUITE_P(All, SimilarityModels, testing::ValuesIn(kSimilarityKinds), [](const auto& kind) {
+  std::string name(to_string(kind.param));
+  std::ranges::replace(name, '-', '_');
+  return name;
+});
+
+TEST_P(SimilarityModels, HaveTheValueAndTheGradientOfTheSimilarity) {
+  const Eigen::Vector3d at(0.04, -0.02, 0.01);
+  const QuadraticModel model = comparison_.model(scene_.drr(at), scene_.jacobian(at));
+  EXPECT_NEAR(model.value, comparison_.of(scene_.drr(at)), 1e-6);
+  // Shares of pixels are whole 256ths: differences over a step in which many pixels cross some.
+  const double step = has_histogram(GetParam()) ? 4e-3 : 1e-3;
+  for (int axis = 0; axis < 3; ++axis) {
+    const Eigen::Vector3d along = step * Eigen::Vector3d::Unit(axis);
+    const double expected =
+        (comparison_.of(scene_.drr(at + along)) - comparison_.of(scene_.drr(at - along))) / (2.0 * step);
+    EXPECT_NEAR(model.gradient[axis], expected, 0.03 * std::abs(expected) + 2e-3) << "parameter " << axis;
+  }
+}
+
+TEST_P(SimilarityModels, BendAsTheSimilarityDoesAtItsTop) {
+  if (!has_curvature(GetParam())) {
+    EXPECT_EQ(comparison_.model(scene_.drr({0, 0, 0}), scene_.jacobian({0, 0, 0})).curvature.size(), 0);
+    return;
+  }
+  // Against itself: the top lies at the parameters rendered.
+  const Eigen::Vector3d top = Eigen::Vector3d::Zero();
+  const Comparison with_itself(GetParam(), scene_.drr(top), neighbors(), wide_range_of(scene_.drr(top)));
+  const QuadraticModel model = with_itself.model(scene_.drr(top), scene_.jacobian(top));
+  const double value = with_itself.of(scene_.drr(top));
+  const double step = has_histogram(GetParam()) ? 0.03 : 0.01;
+  for (const Eigen::Vector3d& axis :
+       {Eigen::Vector3d(1, 0, 0), Eigen::Vector3d(0, 1, 0), Eigen::Vector3d(1, -1, 0.5)}) {
+    const double bend =
+        2.0 * value - with_itself.of(scene_.drr(step * axis)) - with_itself.of(scene_.drr(-step * axis));
+    EXPECT_NEAR(axis.dot(model.curvature * axis), bend / (step * step), 0.1 * bend / (step * step));
+  }
 }
 
 }  // namespace

@@ -1,0 +1,107 @@
+// Derivatives of line integrals by the patient's motion, against central differences.
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "drr/renderer.h"
+#include "tests/drr/test_views.h"
+
+namespace isoshift {
+namespace {
+
+using Eigen::Vector3d;
+
+Eigen::Isometry3d motion(int axis, double step) {
+  Eigen::Isometry3d result = Eigen::Isometry3d::Identity();
+  if (axis < 3)
+    result.translation()[axis] = step;
+  else
+    result.linear() = Eigen::AngleAxisd(step, Vector3d::Unit(axis - 3)).toRotationMatrix();
+  return result;
+}
+
+std::vector<XrayView> three_views() {
+  return {centered_view(0.0, 24, 9.0), centered_view(90.0, 20, 11.0), centered_view(37.0, 17, 12.0)};
+}
+
+// rms(found - differences) / rms(differences) of each of the six derivatives, over all poses, views and pixels.
+std::array<double, 6> relative_errors(const RenderResult& found, Renderer& differentiated, const PixelSet& pixels,
+                                      std::span<const Eigen::Isometry3d> poses) {
+  const std::vector<XrayView> views = three_views();
+  std::array<double, 6> errors;
+  for (int axis = 0; axis < 6; ++axis) {
+    const double step = axis < 3 ? 0.1 : 0.001;
+    std::vector<Eigen::Isometry3d> before, behind;
+    for (const Eigen::Isometry3d& pose : poses) {
+      before.push_back(motion(axis, -step) * pose);
+      behind.push_back(motion(axis, step) * pose);
+    }
+    const RenderResult low = differentiated.render(views, before, pixels);
+    const RenderResult high = differentiated.render(views, behind, pixels);
+    double wrong = 0.0, all = 0.0;
+    for (std::size_t p = 0; p < poses.size(); ++p)
+      for (std::size_t v = 0; v < views.size(); ++v)
+        for (std::size_t n = 0; n < found.derivatives(p, v).size(); ++n) {
+          const double expected = (high.line_integrals(p, v)[n] - low.line_integrals(p, v)[n]) / (2.0 * step);
+          wrong += std::pow(found.derivatives(p, v)[n][axis] - expected, 2);
+          all += expected * expected;
+        }
+    errors[static_cast<std::size_t>(axis)] = std::sqrt(wrong / all);
+  }
+  return errors;
+}
+
+class DerivativesTest : public testing::TestWithParam<RendererKind> {
+ protected:
+  std::unique_ptr<Renderer> renderer_ = make_renderer(GetParam(), smooth_volume(), kAll, kBothBeams);
+  std::unique_ptr<Renderer> oracle_ = make_renderer(RendererKind::kTrilinear, smooth_volume(), kAll, kBothBeams);
+  std::vector<Eigen::Isometry3d> poses_ = random_poses(4);
+};
+INSTANTIATE_TEST_SUITE_P(All, DerivativesTest, testing::Values(RendererKind::kTrilinear, RendererKind::kCpu),
+                         [](const auto& kind) { return std::string(to_string(kind.param)); });
+
+TEST_P(DerivativesTest, AreTheCentralDifferencesOfTheOracle) {
+  const RenderResult found = renderer_->render_with_derivatives(three_views(), poses_, PixelSet::all());
+  // The oracle differs by what differences of finite steps leave. Joseph's planes interpolate a little differently, and
+  // slopes show that more than values do.
+  const double bound = GetParam() == RendererKind::kTrilinear ? 0.004 : 0.08;
+  for (const double error : relative_errors(found, *oracle_, PixelSet::all(), poses_)) EXPECT_LT(error, bound);
+}
+
+TEST_P(DerivativesTest, AreTheCentralDifferencesOfTheSameRenderer) {
+  const RenderResult found = renderer_->render_with_derivatives(three_views(), poses_, PixelSet::all());
+  for (const double error : relative_errors(found, *renderer_, PixelSet::all(), poses_)) EXPECT_LT(error, 0.02);
+}
+
+TEST_P(DerivativesTest, OfAListOfPixelsAreThoseOfTheWholeImage) {
+  const PixelSet some = PixelSet::random(three_views(), 0.3, 5);
+  const RenderResult listed = renderer_->render_with_derivatives(three_views(), poses_, some);
+  for (const double error : relative_errors(listed, *renderer_, some, poses_)) EXPECT_LT(error, 0.02);
+}
+
+TEST_P(DerivativesTest, LineIntegralsAreThoseWithoutDerivatives) {
+  const RenderResult with = renderer_->render_with_derivatives(three_views(), poses_, PixelSet::all());
+  const RenderResult without = renderer_->render(three_views(), poses_, PixelSet::all());
+  for (std::size_t p = 0; p < poses_.size(); ++p)
+    for (std::size_t v = 0; v < three_views().size(); ++v)
+      for (std::size_t n = 0; n < with.line_integrals(p, v).size(); ++n)
+        ASSERT_EQ(with.line_integrals(p, v)[n], without.line_integrals(p, v)[n]);
+}
+
+TEST_P(DerivativesTest, AreZeroWhereARayMissesTheVolume) {
+  const Eigen::Isometry3d away(Eigen::Translation3d(0.0, 900.0, 0.0));
+  const RenderResult found = renderer_->render_with_derivatives(three_views(), std::span(&away, 1), PixelSet::all());
+  for (const MotionDerivatives& derivatives : found.derivatives(0, 0)) ASSERT_TRUE(derivatives.isZero());
+}
+
+TEST(Derivatives, ARendererWithoutThemSaysSo) {
+  const auto siddon = make_renderer(RendererKind::kSiddon, smooth_volume(), kAll, kBothBeams);
+  EXPECT_FALSE(siddon->has_derivatives());
+  const auto pose = Eigen::Isometry3d::Identity();
+  EXPECT_THROW(siddon->render_with_derivatives(three_views(), std::span(&pose, 1), PixelSet::all()), std::logic_error);
+}
+
+}  // namespace
+}  // namespace isoshift
