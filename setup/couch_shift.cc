@@ -18,15 +18,22 @@ CouchShift couch_shift_for(const Eigen::Isometry3d& setup_error, const TableAngl
   return shift;
 }
 
-CouchShift applicable(const CouchShift& shift, const TableAngles& table, CouchDof dof) {
-  CouchShift part = shift;
+CouchShift applicable_shift(const Eigen::Isometry3d& setup_error, const TableAngles& table, CouchDof dof,
+                            const Eigen::Vector3d& point_mm) {
+  CouchShift part = couch_shift_for(setup_error, table);
   if (dof == CouchDof::kSix) return part;
   part.change.x_rad = part.change.y_rad = 0.0;
   part.target.x_rad = table.pitch_rad;
   part.target.y_rad = table.roll_rad;
-  if (dof == CouchDof::kFour) return part;
-  part.change.z_rad = 0.0;
-  part.target.z_rad = wrapped_rad(table.yaw_rad());
+  if (dof == CouchDof::kThree) {
+    part.change.z_rad = 0.0;
+    part.target.z_rad = wrapped_rad(table.yaw_rad());
+  }
+  // left_over_mm() at the point, taken back through the rotation of the couch and along the table top's axes.
+  const Eigen::Matrix3d room_from_table_turn =
+      rotation_from_zxy(part.target) * rotation_from_zxy(table.zxy()).transpose();
+  const Eigen::Vector3d left = left_over_mm(setup_error, table, part, point_mm);
+  part.translation_mm -= rotation_z(-table.yaw_rad()) * (room_from_table_turn.transpose() * left);
   return part;
 }
 

@@ -27,8 +27,10 @@ CouchShift couch_shift_for(const Eigen::Isometry3d& setup_error, const TableAngl
 // Which of its six motions a couch can make: all; translations and yaw; translations.
 enum class CouchDof { kThree = 3, kFour = 4, kSix = 6 };
 
-// The part of a shift that such a couch can apply; the angles it cannot change stay as at imaging.
-CouchShift applicable(const CouchShift& shift, const TableAngles& table, CouchDof dof);
+// The shift that such a couch can apply to undo `setup_error`. The angles it cannot change stay as at imaging; its
+// translation then brings anatomy planned at `point_mm` (from the isocenter, IEC 61217 fixed) to where it was planned.
+CouchShift applicable_shift(const Eigen::Isometry3d& setup_error, const TableAngles& table, CouchDof dof,
+                            const Eigen::Vector3d& point_mm);
 
 // Where anatomy planned at `point_mm` (from the isocenter, IEC 61217 fixed) lies after the couch has applied `shift`,
 // minus where it was planned (docs/dicom.md 5.1).

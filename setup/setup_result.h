@@ -14,6 +14,7 @@
 #include "setup/identity.h"
 #include "setup/registration.h"
 #include "setup/site_rules.h"
+#include "setup/target.h"
 #include "setup/view_picture.h"
 
 namespace isoshift {
@@ -52,6 +53,7 @@ struct SetupResult : Registration {
   TableAngles table;
   std::optional<Eigen::Vector3d> table_position_mm;  // lateral, longitudinal, vertical read-outs at imaging, IEC 61217
   std::vector<Point> points;
+  std::optional<Target> target;  // nothing: made by a version of isoshift that did not look for it
   Eigen::Isometry3d setup_error = Eigen::Isometry3d::Identity();
   bool translation_only = false;
 

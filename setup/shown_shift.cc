@@ -37,6 +37,7 @@ std::vector<ShownShift::LeftOver> left_over(const SetupResult& result, const Eig
     points.push_back({"50 mm superior", kAlongPatientMm * superior});
     points.push_back({"50 mm inferior", -kAlongPatientMm * superior});
   }
+  if (result.target) points.push_back({result.target->name, result.target->center_room_mm});
   points.insert(points.end(), result.points.begin(), result.points.end());
   std::vector<ShownShift::LeftOver> left;
   left.reserve(points.size());
@@ -57,7 +58,10 @@ Eigen::Isometry3d known_setup_error(Eigen::Isometry3d setup_error,
 ShownShift shown_shift(const SetupResult& result) {
   ShownShift shown;
   const Eigen::Isometry3d setup_error = known_setup_error(result);
+  const CouchDof dof = result.site ? result.site->couch_dof : CouchDof::kSix;
+  const Eigen::Vector3d target_mm = result.target ? result.target->center_room_mm : Eigen::Vector3d::Zero();
   const CouchShift shift = couch_shift_for(setup_error, result.table);
+  const CouchShift applied = applicable_shift(setup_error, result.table, dof, target_mm);
   const ZxyAngles error = zxy_from_rotation(setup_error.linear());
   shown.setup_error_mm = determined(setup_error.translation(), result.unobservable_room);
   shown.setup_error_deg = {deg_from_rad(error.x_rad), deg_from_rad(error.y_rad), deg_from_rad(error.z_rad)};
@@ -66,11 +70,18 @@ ShownShift shown_shift(const SetupResult& result) {
     for (int axis = 0; axis < 3 && !result.translation_only; ++axis)
       shown.sigma_deg[axis] = deg_from_rad(result.uncertainty->rotation_rad[axis]);
   }
+  if (result.target) {
+    shown.target_mm = determined(displacement_mm(setup_error, target_mm), result.unobservable_room);
+    if (result.uncertainty)
+      shown.target_sigma_mm =
+          determined(displacement_sigma_mm(*result.uncertainty, target_mm), result.unobservable_room);
+  }
   shown.withheld = result.verdict == Verdict::kRejected;
   std::vector<Eigen::Vector3d> unobservable_table;
   for (const Eigen::Vector3d& direction : result.unobservable_room)
     unobservable_table.push_back(rotation_z(-result.table.yaw_rad()) * direction);
   shown.couch_mm = determined(shift.translation_mm, unobservable_table);
+  shown.applied_mm = determined(applied.translation_mm, unobservable_table);
   shown.couch_deg = yaw_pitch_roll_deg(shift.change);
   shown.couch_target_deg = yaw_pitch_roll_deg(shift.target);
   if (result.uncertainty) {
@@ -81,10 +92,8 @@ ShownShift shown_shift(const SetupResult& result) {
     for (std::size_t axis = 0; axis < 3; ++axis)
       if (shown.couch_mm[axis]) shown.couch_sigma_mm[axis] = std::sqrt(variance[static_cast<Eigen::Index>(axis)]);
   }
-  const CouchDof dof = result.site ? result.site->couch_dof : CouchDof::kSix;
   shown.can_rotate = {dof != CouchDof::kThree, dof == CouchDof::kSix, dof == CouchDof::kSix};
-  if (!shown.withheld && result.unobservable_room.empty())
-    shown.left_over = left_over(result, setup_error, applicable(shift, result.table, dof));
+  if (!shown.withheld && result.unobservable_room.empty()) shown.left_over = left_over(result, setup_error, applied);
   if (!shown.withheld && result.site && result.site->level)
     shown.decision = decide_action(
         *result.site->level, shown.setup_error_mm,

@@ -18,12 +18,17 @@ struct ShownShift {
   std::array<double, 3> setup_error_deg;                // rx, ry, rz of R = Rz Rx Ry
   std::array<std::optional<double>, 3> sigma_mm;        // x, y, z; absent where the component is
   std::array<std::optional<double>, 3> sigma_deg;       // about x, y, z
-  bool withheld = false;                                // the verdict forbids a couch shift
-  std::array<std::optional<double>, 3> couch_mm;        // lateral, longitudinal, vertical
+  std::array<std::optional<double>, 3> target_mm;  // how far the target's center lies from its plan, as setup_error_mm
+  std::array<std::optional<double>, 3> target_sigma_mm;  // absent where the component is
+  bool withheld = false;                                 // the verdict forbids a couch shift
+  std::array<std::optional<double>, 3> couch_mm;         // lateral, longitudinal, vertical
   std::array<std::optional<double>, 3> couch_sigma_mm;
   std::array<double, 3> couch_deg;         // yaw, pitch, roll: change of the read-outs
   std::array<double, 3> couch_target_deg;  // yaw, pitch, roll: resulting read-outs
   std::array<bool, 3> can_rotate;          // yaw, pitch, roll: whether the site's couch can
+  // Lateral, longitudinal, vertical of what the site's couch can do: where it cannot make all rotations, the
+  // translation that brings the target's center (the isocenter, if no target is known) to where it was planned.
+  std::array<std::optional<double>, 3> applied_mm;
   // The error that remains after the couch has applied what it can of the shift: at the isocenter, 50 mm superior and
   // inferior of it, and at the points of the result. Empty if a component is not determined.
   struct LeftOver {

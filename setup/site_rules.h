@@ -32,8 +32,9 @@ struct AutomaticRelease {
 
 // What holds for the result of one anatomy.
 struct SiteRules {
-  std::string name, sha256;          // of the site's file
-  std::string anatomy;               // whose action level it is
+  std::string name, sha256;  // of the site's file
+  std::string anatomy;       // whose action level it is
+  std::string target;        // of the anatomy: the name of a structure, or "isocenter"; empty: the plan names it
   std::optional<ActionLevel> level;  // unset: none
   CouchDof couch_dof = CouchDof::kSix;
   std::optional<ValidatedScale> couch_scale;  // shown beside IEC 61217

@@ -55,7 +55,11 @@ void add_result_options(CLI::App& command, RegisterOptions& options) {
       .add_option("--site", options.site,
                   "Site file: action levels, the couch's degrees of freedom and scale (docs/site-file.md)")
       ->type_name("FILE");
-  command.add_option("--anatomy", options.anatomy, "Anatomy of the site file whose action level applies")
+  command.add_option("--anatomy", options.anatomy, "Anatomy of the site file whose action level and target apply")
+      ->type_name("NAME");
+  command
+      .add_option("--target", options.target,
+                  "The structure that the setup must bring right, or isocenter [what the site file or the plan names]")
       ->type_name("NAME");
   command.add_flag("--write-reg-for-review", options.write_reg_for_review,
                    "Also write the registration object of a result for review, marked as not accepted");

@@ -96,6 +96,16 @@ SiteFile read_site_file(const std::filesystem::path& path) {
       site.action_levels.emplace(anatomy,
                                  level_from(JsonSection(json, fmt::format("{}: {}", levels->where(), anatomy))));
   }
+  if (const auto targets = section.section("targets")) {
+    using Targets = std::map<std::string, std::string>;
+    for (const auto& [anatomy, name] :
+         section.required<Targets>("targets", "an object of structure names by anatomy")) {
+      if (name.find_first_not_of(' ') == std::string::npos)
+        throw Error(
+            fmt::format("{}: {} is empty, expected the name of a structure, or isocenter", targets->where(), anatomy));
+      site.targets.emplace(anatomy, name);
+    }
+  }
   if (auto couch = section.section("couch")) read_couch(std::move(*couch), site);
   if (const auto unit = section.find<std::string>("length_unit", "mm or cm")) {
     if (unit != "mm" && unit != "cm") section.refuse("length_unit", "mm or cm");
@@ -110,11 +120,17 @@ SiteFile read_site_file(const std::filesystem::path& path) {
 std::optional<ActionLevel> action_level(const SiteFile& site, std::string_view anatomy) {
   const auto level = site.action_levels.find(anatomy.empty() ? "default" : anatomy);
   if (level != site.action_levels.end()) return level->second;
-  if (anatomy.empty()) return std::nullopt;
+  if (anatomy.empty() || site.targets.contains(anatomy)) return std::nullopt;
   std::string names;
   for (const auto& [name, unused] : site.action_levels) names += (names.empty() ? "" : ", ") + name;
   throw UsageError(fmt::format("--anatomy {}: site file \"{}\" has action levels for {}", anatomy, site.name,
                                names.empty() ? "none" : names));
+}
+
+std::string target_named(const SiteFile& site, std::string_view anatomy) {
+  for (const std::string_view name : {anatomy, std::string_view("default")})
+    if (const auto target = site.targets.find(name); target != site.targets.end()) return target->second;
+  return "";
 }
 
 }  // namespace isoshift

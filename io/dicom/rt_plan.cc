@@ -70,6 +70,13 @@ RtPlan read_rt_plan(const std::filesystem::path& path) {
       throw Error(fmt::format("{}: {} is CHAIR, expected TABLE", beam.where(), described(DCM_PatientSupportType)));
     plan.beams.push_back(read_beam(beam, is_ion ? DCM_IonControlPointSequence : DCM_ControlPointSequence, dataset));
   }
+  for (const DicomItem& reference : dataset.items(DCM_DoseReferenceSequence)) {
+    const auto roi_number = reference.number(DCM_ReferencedROINumber);
+    plan.dose_references.push_back(
+        {.number = static_cast<int>(reference.number(DCM_DoseReferenceNumber).value_or(0.0)),
+         .type = reference.text(DCM_DoseReferenceType).value_or(""),
+         .roi_number = roi_number ? std::optional(static_cast<int>(*roi_number)) : std::nullopt});
+  }
   if (plan.beams.empty())
     throw Error(fmt::format("{}: {} is missing or empty", path.string(),
                             described(is_ion ? DCM_IonBeamSequence : DCM_BeamSequence)));

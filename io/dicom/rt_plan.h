@@ -24,6 +24,13 @@ struct RtPlan {
     Eigen::Vector3d setup_displacement_mm = Eigen::Vector3d::Zero();  // vertical, longitudinal, lateral (300A,01D2..6)
   };
 
+  // What the prescription speaks of (PS3.3 C.8.8.10).
+  struct DoseReference {
+    int number = 0;
+    std::string type;               // DoseReferenceType: TARGET, ORGAN_AT_RISK
+    std::optional<int> roi_number;  // ReferencedROINumber, in the plan's RT Structure Set
+  };
+
   std::filesystem::path path;
   std::string sha256;  // of the file
   Identity identity;
@@ -34,6 +41,7 @@ struct RtPlan {
   std::optional<std::string> frame_of_reference_uid;
   std::string approval_status;
   std::vector<Beam> beams;
+  std::vector<DoseReference> dose_references;
 };
 
 RtPlan read_rt_plan(const std::filesystem::path& path);

@@ -59,6 +59,19 @@ Json couch_target_json(const ShownShift& shown) {
       {"yaw", shown.couch_target_deg[0]}, {"pitch", shown.couch_target_deg[1]}, {"roll", shown.couch_target_deg[2]}};
 }
 
+// What a couch that cannot make all six motions can do of the shift.
+Json couch_applied_json(const SetupResult& report, const ShownShift& shown) {
+  if (shown.withheld || !report.site || report.site->couch_dof == CouchDof::kSix) return nullptr;
+  const auto turn = [&](std::size_t n) { return shown.can_rotate[n] ? shown.couch_deg[n] : 0.0; };
+  return {{"brings_right", report.target ? report.target->name : "isocenter"},
+          {"lateral_mm", or_null(shown.applied_mm[0])},
+          {"longitudinal_mm", or_null(shown.applied_mm[1])},
+          {"vertical_mm", or_null(shown.applied_mm[2])},
+          {"yaw_deg", turn(0)},
+          {"pitch_deg", turn(1)},
+          {"roll_deg", turn(2)}};
+}
+
 Json sigma_json(bool is_known, const std::array<std::optional<double>, 3>& components) {
   if (!is_known) return nullptr;
   Json array = Json::array();
@@ -99,13 +112,10 @@ Json picture_json(const ViewPicture& picture) {
 
 Json site_json(const std::optional<SiteRules>& site) {
   if (!site) return nullptr;
-  Json json = {{"name", site->name},
-               {"sha256", site->sha256},
-               {"anatomy", site->anatomy},
-               {"action_level", nullptr},
-               {"couch_degrees_of_freedom", static_cast<int>(site->couch_dof)},
-               {"couch_scale", nullptr},
-               {"length_unit", site->length_unit == LengthUnit::kCm ? "cm" : "mm"},
+  Json json = {{"name", site->name},          {"sha256", site->sha256},
+               {"anatomy", site->anatomy},    {"target", or_null(site->target)},
+               {"action_level", nullptr},     {"couch_degrees_of_freedom", static_cast<int>(site->couch_dof)},
+               {"couch_scale", nullptr},      {"length_unit", site->length_unit == LengthUnit::kCm ? "cm" : "mm"},
                {"automatic_release", nullptr}};
   if (site->automatic_release)
     json["automatic_release"] = {{"by", site->automatic_release->by}, {"on", site->automatic_release->on}};
@@ -118,6 +128,20 @@ Json site_json(const std::optional<SiteRules>& site) {
                            {"validated_by", site->couch_scale->validated_by},
                            {"validated_on", site->couch_scale->validated_on}};
   return json;
+}
+
+Json target_json(const SetupResult& report, const ShownShift& shown) {
+  if (!report.target) return nullptr;
+  const Target& target = *report.target;
+  Json extent = Json::array(), displacement = Json::array();
+  for (const Eigen::Vector3d& point : target.extent_room_mm) extent.push_back(array_of(point));
+  for (const auto& component : shown.target_mm) displacement.push_back(or_null(component));
+  return {{"name", target.name},
+          {"chosen_by", target.chosen_by},
+          {"center_room_mm", array_of(target.center_room_mm)},
+          {"extent_room_mm", extent},
+          {"displacement_mm", displacement},
+          {"sigma_mm", sigma_json(report.uncertainty.has_value(), shown.target_sigma_mm)}};
 }
 
 Json points_json(const SetupResult& report) {
@@ -216,6 +240,8 @@ std::string json_report(const SetupResult& report) {
                {"setup_error", setup_error_json(report, shown)},
                {"couch_shift", couch_shift_json(shown)},
                {"couch_target_deg", couch_target_json(shown)},
+               {"couch_applied", couch_applied_json(report, shown)},
+               {"target", target_json(report, shown)},
                {"uncertainty",
                 {{"translation_mm", sigma_json(report.uncertainty.has_value(), shown.sigma_mm)},
                  {"rotation_deg", sigma_json(report.uncertainty.has_value(), shown.sigma_deg)},

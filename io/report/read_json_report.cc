@@ -106,6 +106,15 @@ StageReport stage_from(const Json& json) {
   return stage;
 }
 
+std::optional<Target> target_from(const Json& json) {
+  if (json.is_null()) return std::nullopt;
+  Target target{.name = json.at("name"),
+                .chosen_by = json.at("chosen_by"),
+                .center_room_mm = vector_from<3>(json.at("center_room_mm"))};
+  for (const Json& point : json.at("extent_room_mm")) target.extent_room_mm.push_back(vector_from<3>(point));
+  return target;
+}
+
 // A word that has a meaning here.
 template <class T>
 T one_of(const std::optional<T>& meaning, const char* place) {
@@ -127,6 +136,7 @@ std::optional<SiteRules> site_from(const Json& json) {
       .anatomy = json.at("anatomy"),
       .couch_dof = one_of(couch_dof_from(json.at("couch_degrees_of_freedom")), "site: couch_degrees_of_freedom"),
       .length_unit = json.at("length_unit") == "cm" ? LengthUnit::kCm : LengthUnit::kMm};
+  if (json.contains("target")) site.target = text_from(json.at("target"));  // not in results before 0.2
   if (const Json& level = json.at("action_level"); !level.is_null())
     site.level = {.translation_mm = number_from(level.at("translation_mm")),
                   .vector_mm = number_from(level.at("vector_mm")),
@@ -183,6 +193,7 @@ SetupResult report_from(const Json& json) {
   if (!table.at("position_mm").is_null()) report.table_position_mm = vector_from<3>(table.at("position_mm"));
   for (const Json& point : json.at("points"))
     report.points.push_back({.name = point.at("name"), .room_mm = vector_from<3>(point.at("room_mm"))});
+  if (json.contains("target")) report.target = target_from(json.at("target"));  // not in results before 0.2
   const Json& error = json.at("setup_error");
   report.setup_error.translation() = vector_from<3>(error.at("known_translation_mm"));
   for (std::size_t row = 0; row < 3; ++row)

@@ -115,6 +115,8 @@ std::vector<ReportPage::Row> who(const SetupResult& report) {
        joined({name_for_people(patient.patient_name), "ID " + printable(patient.patient_id),
                patient.patient_birth_date.empty() ? "" : "born " + day(printable(patient.patient_birth_date)),
                printable(patient.patient_sex)})});
+  if (report.target)
+    rows.push_back({"Target", fmt::format("{} ({})", printable(report.target->name), report.target->chosen_by)});
   rows.push_back({"Plan", report.plan_uid.empty()
                               ? "none; isocenter given by hand"
                               : joined({printable(report.plan_label), printable(report.plan_approval)})});
@@ -146,13 +148,14 @@ std::string action_words(const SetupResult& report, const ShownShift& shown) {
 std::vector<Quantity> couch_rows(const ShownShift& shown, const SetupResult& report, LengthUnit unit) {
   const auto sigma_of = [&](int axis) { return shown.sigma_deg[static_cast<std::size_t>(axis)]; };
   const double yaw = report.table.yaw_rad();
-  std::vector<Quantity> rows = {length("Lateral", shown.couch_mm[0], shown.couch_sigma_mm[0], unit, kLateral),
-                                length("Longitudinal", shown.couch_mm[1], shown.couch_sigma_mm[1], unit, kLongitudinal),
-                                length("Vertical", shown.couch_mm[2], shown.couch_sigma_mm[2], unit, kVertical)};
+  std::vector<Quantity> rows = {
+      length("Lateral", shown.applied_mm[0], shown.couch_sigma_mm[0], unit, kLateral),
+      length("Longitudinal", shown.applied_mm[1], shown.couch_sigma_mm[1], unit, kLongitudinal),
+      length("Vertical", shown.applied_mm[2], shown.couch_sigma_mm[2], unit, kVertical)};
   for (int axis = 0; axis < 3; ++axis)
     if (Quantity& row = rows[static_cast<std::size_t>(axis)]; !row.words.empty())
-      row.words = room_words(rotation_z(yaw).col(axis) * *shown.couch_mm[static_cast<std::size_t>(axis)] /
-                             std::abs(*shown.couch_mm[static_cast<std::size_t>(axis)]));
+      row.words = room_words(rotation_z(yaw).col(axis) * *shown.applied_mm[static_cast<std::size_t>(axis)] /
+                             std::abs(*shown.applied_mm[static_cast<std::size_t>(axis)]));
   // Its ends and sides have these names with the couch straight.
   const bool is_turned = std::abs(std::sin(yaw)) > 0.3 || std::cos(yaw) < 0.0;
   constexpr Sense kTurnedPitch = {"end up that is at the gantry at couch angle 0",
@@ -205,11 +208,11 @@ ReportPage::Display display_of(const SetupResult& report, const ShownShift& show
   if (report.table_position_mm) before.position_mm = report.table_position_mm->unaryExpr(to_tenth);
   for (int axis = 0; axis < 3; ++axis)
     after.position_mm[axis] =
-        to_tenth(before.position_mm[axis] + shown.couch_mm[static_cast<std::size_t>(axis)].value_or(0.0));
+        to_tenth(before.position_mm[axis] + shown.applied_mm[static_cast<std::size_t>(axis)].value_or(0.0));
   const CouchReadOut from = on_scale(scale.scale, before), to = on_scale(scale.scale, after);
   const auto is_precise = [](const std::optional<double>& sigma) { return !sigma || 2.0 * *sigma <= 1.0; };
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    const auto& mm = shown.couch_mm[axis];
+    const auto& mm = shown.applied_mm[axis];
     const std::optional<double> change = mm ? std::optional(signs[axis] * *mm) : std::nullopt;
     Quantity row = length(kNames[axis], change, shown.couch_sigma_mm[axis], unit, {"", ""});
     if (mm && report.table_position_mm && is_precise(shown.couch_sigma_mm[axis])) {
@@ -278,6 +281,25 @@ ReportPage::Section geometry_section(const SetupResult& report) {
     section.rows.push_back({printable(view.label),
                             fmt::format("source at {} IEC fixed; {} x {} pixels of {:.3f} mm at the isocenter",
                                         vector_words(view.source_room_mm), view.columns, view.rows, view.pixel_mm)});
+  return section;
+}
+
+// Where the target lies, as planned and as found.
+ReportPage::Section target_section(const SetupResult& report, const ShownShift& shown, LengthUnit unit) {
+  const auto words = [&](const std::array<std::optional<double>, 3>& mm) {
+    std::vector<std::string> components;
+    for (const auto& component : mm)
+      components.push_back(component ? rounded_length(*component, unit) : std::string(kNotDetermined));
+    return fmt::format("({}) {}", fmt::join(components, ", "), name_of(unit));
+  };
+  ReportPage::Section section{.title = "Target"};
+  section.rows.push_back({"Name", printable(report.target->name)});
+  section.rows.push_back({"Chosen by", report.target->chosen_by});
+  section.rows.push_back(
+      {"Center as planned", vector_words(report.target->center_room_mm) + " from the isocenter, IEC 61217 fixed"});
+  if (!shown.withheld) section.rows.push_back({"Center lies off plan by", words(shown.target_mm)});
+  if (!shown.withheld && report.uncertainty)
+    section.rows.push_back({"One sigma of that", words(shown.target_sigma_mm)});
   return section;
 }
 
@@ -425,6 +447,7 @@ ReportPage report_page(const SetupResult& report) {
   page.left_aside = all_printable(report.left_aside);
   page.details = {geometry_section(report), search_section(report), checks_section(report), provenance_section(report)};
   if (!page.left_over.empty()) page.details.insert(page.details.begin() + 1, left_over_section(page));
+  if (report.target) page.details.insert(page.details.begin(), target_section(report, shown, unit));
   return page;
 }
 

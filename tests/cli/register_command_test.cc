@@ -100,6 +100,7 @@ TEST_F(RegisterCommandTest, ASiteFileDecidesAboutActionAndCouch) {
   if (result()["verdict"] != "rejected") {
     EXPECT_EQ(result()["action"], "exceeds");
     EXPECT_EQ(result()["left_over"].back()["at"], "centroid of TARGET");
+    EXPECT_EQ(result()["couch_applied"]["brings_right"], result()["target"]["name"]);
   }
   EXPECT_FALSE(result()["views"][0]["picture"]["structures"][0]["planned"].empty());
   EXPECT_EQ(register_study(study_, {"--overwrite", "--anatomy", "head"}).exit_status, 2);

@@ -52,15 +52,33 @@ TEST(CouchShift, IsThatOfDicomMd51) {
 // 50 mm superior (HFS: toward the gantry).
 TEST(CouchShift, SmallerCouchesLeaveWhatDicomMd51Says) {
   const Eigen::Isometry3d error = setup_error({3, -2, 1.5}, 1, -0.5, 0.8);
-  const CouchShift shift = couch_shift_for(error, couch(0));
   const Vector3d superior(0, 50, 0);
   const auto left_over = [&](CouchDof dof, const Vector3d& point) {
-    return left_over_mm(error, couch(0), applicable(shift, couch(0), dof), point);
+    return left_over_mm(error, couch(0), applicable_shift(error, couch(0), dof, Vector3d::Zero()), point);
   };
   EXPECT_THAT(left_over(CouchDof::kFour, superior), VectorNear(Vector3d(-0.006, -0.002, -0.436), 6e-4));
   EXPECT_THAT(left_over(CouchDof::kThree, superior), VectorNear(Vector3d(-0.873, -0.010, -0.436), 6e-4));
   EXPECT_THAT(left_over(CouchDof::kSix, superior), VectorNear(Vector3d(0, 0, 0), 1e-12));
   EXPECT_THAT(left_over(CouchDof::kThree, Vector3d::Zero()), VectorNear(Vector3d(0, 0, 0), 1e-12));
+}
+
+// Where the couch cannot rotate, its translation brings the target's center right, and no longer the isocenter: 2
+// degrees and 80 mm would leave 2.8 mm there.
+TEST(CouchShift, SmallerCouchesBringTheTargetRight) {
+  const Eigen::Isometry3d error = setup_error({3, -2, 1.5}, 0, 2, 0);
+  const TableAngles table{.support_rad = rad_from_deg(25), .pitch_rad = rad_from_deg(1), .roll_rad = rad_from_deg(-2)};
+  const Vector3d target(80, 0, 0);
+  for (const CouchDof dof : {CouchDof::kThree, CouchDof::kFour}) {
+    const CouchShift about_isocenter = applicable_shift(error, table, dof, Vector3d::Zero());
+    EXPECT_NEAR(left_over_mm(error, table, about_isocenter, target).norm(), 2.8, 0.05);
+    const CouchShift part = applicable_shift(error, table, dof, target);
+    EXPECT_THAT(left_over_mm(error, table, part, target), VectorNear(Vector3d(0, 0, 0), 1e-9));
+    EXPECT_NEAR(left_over_mm(error, table, part, Vector3d::Zero()).norm(), 2.8, 0.05);
+    EXPECT_EQ(part.change.z_rad, about_isocenter.change.z_rad);
+  }
+  const CouchShift whole = applicable_shift(error, table, CouchDof::kSix, target);
+  EXPECT_THAT(whole.translation_mm, VectorNear(couch_shift_for(error, table).translation_mm, 1e-12));
+  EXPECT_THAT(left_over_mm(error, table, whole, Vector3d::Zero()), VectorNear(Vector3d(0, 0, 0), 1e-9));
 }
 
 // The same by a simulation of the couch's motion, at any table angles.
@@ -70,7 +88,7 @@ TEST(CouchShift, WhatIsLeftOverIsWhereTheMotionPutsAPoint) {
       .support_rad = rad_from_deg(30), .pitch_rad = rad_from_deg(1.5), .roll_rad = rad_from_deg(-2)};
   const Vector3d point(20, 50, -30);
   for (const CouchDof dof : {CouchDof::kThree, CouchDof::kFour, CouchDof::kSix}) {
-    const CouchShift part = applicable(couch_shift_for(error, table), table, dof);
+    const CouchShift part = applicable_shift(error, table, dof, Vector3d(-15, 25, 40));
     EXPECT_THAT(left_over_mm(error, table, part, point),
                 VectorNear(Vector3d(couch_motion(part, table) * error * point - point), 1e-9));
     EXPECT_EQ(part.change.x_rad == 0.0, dof != CouchDof::kSix);

@@ -9,6 +9,7 @@
 #include "io/report/result_folder.h"
 #include "setup/couch_shift.h"
 #include "workflow/register/setup_result_of.h"
+#include "workflow/register/target_of.h"
 
 namespace isoshift {
 namespace {
@@ -54,6 +55,7 @@ SetupResult register_study(const RegisterOptions& options, SharedWork& shared, O
   StudyOptions named = options.study;
   if (site_file && site_file->sessions) named.max_span_s = site_file->sessions->max_span_s;
   const Study study = load(named, notes, observer, shared.cts);
+  const TargetChoice choice = target_of(study, {options.target, site ? site->target : ""});
   const RegistrationSetup setup(options.registration, study, beams_of(study), shared.renderers);
   const std::vector<FixedImage> images = prepared(study.xrays);
   const double seconds_load = total.seconds();
@@ -61,8 +63,9 @@ SetupResult register_study(const RegisterOptions& options, SharedWork& shared, O
                                             [&](double share) { observer.progress("Registering", share); });
   observer.progress("Registering", 1.0);
   for (const std::string& doubt : study.doubts) found.demote(Verdict::kReview, doubt);
+  for (const std::string& doubt : choice.doubts) found.demote(Verdict::kReview, doubt);
 
-  SetupResult result = setup_result_of(study, images, options.registration, setup, std::move(found));
+  SetupResult result = setup_result_of(study, images, options.registration, setup, choice.target, std::move(found));
   result.site = std::move(site);
   if (may_write_registration(options, result))
     result.spatial_registration_uid = write_spatial_registration(study, written_pose(study, result, notes),

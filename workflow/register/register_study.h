@@ -19,6 +19,7 @@ struct RegisterOptions {
   std::filesystem::path output;
   std::filesystem::path site;  // empty: no site file
   std::string anatomy;
+  std::string target;  // the structure that the setup must bring right, or "isocenter"; empty: as target_of() finds it
   bool overwrite = false;
   bool write_reg_for_review = false;
   bool accept_unobservable = false;

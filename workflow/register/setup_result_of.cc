@@ -39,9 +39,15 @@ std::vector<MarkedStructure> marked_structures(const Study& study, const RegionO
   return marked;
 }
 
-SetupResult::Point centroid_of(const MarkedStructure& structure, const Study& study) {
-  return {.name = "centroid of " + structure.name,
-          .room_mm = study.planned_room_from_patient * centroid_patient_mm(structure.mask)};
+// The centers of what is drawn; the target has its own.
+std::vector<SetupResult::Point> centroids_of(const std::vector<MarkedStructure>& structures, const Study& study,
+                                             const Target& target) {
+  std::vector<SetupResult::Point> points;
+  for (const MarkedStructure& structure : structures)
+    if (structure.name != target.name)
+      points.push_back({.name = "centroid of " + structure.name,
+                        .room_mm = study.planned_room_from_patient * centroid_patient_mm(structure.mask)});
+  return points;
 }
 
 }  // namespace
@@ -60,6 +66,7 @@ std::optional<SiteRules> chosen_site(const std::optional<SiteFile>& file, const 
   return SiteRules{.name = site.name,
                    .sha256 = site.sha256,
                    .anatomy = whose,
+                   .target = target_named(site, whose),
                    .level = action_level(site, whose),
                    .couch_dof = site.couch_dof,
                    .couch_scale = site.couch_scale,
@@ -68,7 +75,7 @@ std::optional<SiteRules> chosen_site(const std::optional<SiteFile>& file, const 
 }
 
 SetupResult setup_result_of(const Study& study, std::span<const FixedImage> images, const RegistrationRequest& request,
-                            const RegistrationSetup& setup, RegistrationResult found) {
+                            const RegistrationSetup& setup, Target target, RegistrationResult found) {
   Renderer& renderer = setup.renderers().finest();
   const RegistrationOptions& registration = setup.options();
   const std::vector<MarkedStructure> structures = marked_structures(study, request.region);
@@ -79,7 +86,8 @@ SetupResult setup_result_of(const Study& study, std::span<const FixedImage> imag
   result.made_on = local_time();
   result.version = kVersion;
   result.commit = kCommit;
-  for (const MarkedStructure& structure : structures) result.points.push_back(centroid_of(structure, study));
+  result.points = centroids_of(structures, study, target);
+  result.target = std::move(target);
   result.identity = study.ct->identity;
   result.patient_position = to_string(study.patient_position);
   result.isocenter_patient_mm = study.isocenter_patient_mm;

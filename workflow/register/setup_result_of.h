@@ -26,6 +26,6 @@ std::optional<SiteRules> chosen_site(const std::optional<SiteFile>& file, const 
 // The result without notes, loading times and written files. `images`: the prepared X-rays that were registered. The
 // DRRs in the pictures of the views are rendered anew.
 SetupResult setup_result_of(const Study& study, std::span<const FixedImage> images, const RegistrationRequest& request,
-                            const RegistrationSetup& setup, RegistrationResult found);
+                            const RegistrationSetup& setup, Target target, RegistrationResult found);
 
 }  // namespace isoshift

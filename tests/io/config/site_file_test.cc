@@ -73,6 +73,16 @@ TEST_F(SiteFileTest, MistakesAreNamed) {
   EXPECT_THAT(error_of("\"releases\": 1"), HasSubstr("there is no key releases"));
 }
 
+TEST_F(SiteFileTest, TargetsAreOfAnatomies) {
+  const SiteFile site = read(R"({"site_file": 1, "name": "A", "targets": {"head": "PTV 60", "default": "isocenter"}})");
+  EXPECT_EQ(target_named(site, "head"), "PTV 60");
+  EXPECT_EQ(target_named(site, ""), "isocenter");
+  EXPECT_EQ(target_named(site, "pelvis"), "isocenter");
+  EXPECT_FALSE(action_level(site, "head"));  // known by its target
+  EXPECT_EQ(target_named(read(R"({"site_file": 1, "name": "A"})"), "head"), "");
+  EXPECT_THAT(error_of("\"targets\": {\"head\": \" \"}"), HasSubstr("targets: head is empty"));
+}
+
 TEST_F(SiteFileTest, AnAnatomyItDoesNotKnowIsRefused) {
   const SiteFile site = read(R"({"site_file": 1, "name": "A", "action_levels": {"head": {"vector_mm": 2}}})");
   EXPECT_FALSE(action_level(site, ""));

@@ -41,6 +41,24 @@ TEST_F(RtPlanTest, ReadsIsocenterPositionAndCouchOfEveryBeam) {
   EXPECT_THAT(common_isocenter(plan, plan.beams), VectorNear(Eigen::Vector3d(-12.5, 38, -410), 1e-12));
 }
 
+TEST_F(RtPlanTest, ReadsWhatThePrescriptionSpeaksOf) {
+  EXPECT_TRUE(read_rt_plan(study_.plan()).dose_references.empty());
+  edit(study_.plan(), [](DicomItem plan) {
+    DicomItem target = plan.append_item(DCM_DoseReferenceSequence);
+    target.put(DCM_DoseReferenceNumber, "3");
+    target.put(DCM_DoseReferenceType, "TARGET");
+    target.put(DCM_ReferencedROINumber, "12");
+    DicomItem site = plan.append_item(DCM_DoseReferenceSequence);
+    site.put(DCM_DoseReferenceType, "TARGET");
+  });
+  const RtPlan plan = read_rt_plan(study_.plan());
+  ASSERT_EQ(plan.dose_references.size(), 2U);
+  EXPECT_EQ(plan.dose_references[0].number, 3);
+  EXPECT_EQ(plan.dose_references[0].type, "TARGET");
+  EXPECT_EQ(plan.dose_references[0].roi_number, 12);
+  EXPECT_FALSE(plan.dose_references[1].roi_number);
+}
+
 TEST_F(RtPlanTest, DifferentIsocentersAreRefusedUnlessTheBeamIsNamed) {
   change_beam(2, [](DicomItem point) { point.put(DCM_IsocenterPosition, "-12.5\\48\\-410"); });
   EXPECT_THAT(

@@ -239,7 +239,7 @@ TEST(Report, SmallCouchesSayWhatTheyApplyAndWhatRemains) {
   EXPECT_THAT(text, HasSubstr("from 350.0 to 347.0 deg"));
   for (const auto& left : shown_shift(report).left_over) {
     const CouchShift applied =
-        applicable(couch_shift_for(report.setup_error, report.table), report.table, CouchDof::kFour);
+        applicable_shift(report.setup_error, report.table, CouchDof::kFour, Eigen::Vector3d::Zero());
     if (left.at != "centroid of PTV") continue;
     EXPECT_LT((left.mm - left_over_mm(report.setup_error, report.table, applied, {10, 20, 30})).norm(), 1e-12);
     EXPECT_GT(left.mm.norm(), 0.1);
@@ -247,6 +247,44 @@ TEST(Report, SmallCouchesSayWhatTheyApplyAndWhatRemains) {
   EXPECT_EQ(shown_shift(report).left_over.size(), 4U);
   report.site->couch_dof = CouchDof::kSix;
   EXPECT_TRUE(report_page(report).left_over.empty());
+}
+
+TEST(Report, TheTargetStandsBehindThePatientAndIsBroughtRight) {
+  SetupResult report = oblique_report(Verdict::kAccepted);
+  EXPECT_THAT(text_of(report), testing::Not(HasSubstr("Target ")));
+  report.target = Target{.name = "PTV 60", .chosen_by = "dose reference of the plan", .center_room_mm = {10, 80, -20}};
+  report.uncertainty = {.translation_mm = {0.1, 0.1, 0.1}, .rotation_rad = Eigen::Vector3d::Constant(0.001)};
+  const ReportPage page = report_page(report);
+  EXPECT_EQ(page.who[0].name, "Patient");
+  EXPECT_EQ(page.who[1].name, "Target");
+  EXPECT_EQ(page.who[1].value, "PTV 60 (dose reference of the plan)");
+  const Eigen::Vector3d center = report.target->center_room_mm;
+  const ShownShift shown = shown_shift(report);
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const auto n = static_cast<Eigen::Index>(axis);
+    EXPECT_NEAR(*shown.target_mm[axis], (report.setup_error * center - center)[n], 1e-9);
+    // By hand: 0.1 mm and 0.001 rad about the two other axes, at their distances.
+    EXPECT_NEAR(*shown.target_sigma_mm[axis],
+                std::hypot(0.1, 0.001 * std::hypot(center[(n + 1) % 3], center[(n + 2) % 3])), 1e-9);
+    EXPECT_EQ(shown.applied_mm[axis], shown.couch_mm[axis]);  // a couch that can do all
+  }
+  report.site = small_couch();
+  const ShownShift small = shown_shift(report);
+  EXPECT_GT(std::abs(*small.applied_mm[2] - *small.couch_mm[2]), 0.5);
+  for (const auto& left : small.left_over) {
+    if (left.at != "PTV 60") continue;
+    EXPECT_LT(left.mm.norm(), 1e-9);
+  }
+  EXPECT_EQ(small.left_over.size(), 4U);
+  const auto json = nlohmann::json::parse(json_report(report));
+  EXPECT_EQ(json["target"]["name"], "PTV 60");
+  EXPECT_EQ(json["couch_applied"]["brings_right"], "PTV 60");
+  EXPECT_EQ(json["couch_applied"]["pitch_deg"], 0.0);
+  EXPECT_NEAR(json["couch_applied"]["vertical_mm"], *small.applied_mm[2], 1e-9);
+  const SetupResult read = report_from_json(json.dump(), "test");
+  ASSERT_TRUE(read.target);
+  EXPECT_EQ(read.target->chosen_by, "dose reference of the plan");
+  EXPECT_EQ(read.target->center_room_mm, center);
 }
 
 // dicom.md 5.1: 50 mm superior with a couch of 4 degrees of freedom; feet first the patient points the other way.

@@ -1,0 +1,128 @@
+// Which structure is the target: a person's, the site's or the plan's word, in this order, and what holds the
+// isocenter.
+
+#include "workflow/register/target_of.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "base/error.h"
+#include "tests/support/small_study.h"
+
+namespace isoshift {
+namespace {
+
+using Eigen::Vector3d;
+using testing::HasSubstr;
+using testing::IsEmpty;
+
+constexpr double kSliceMm = 4.0;
+
+// A box of 5 to 7 slices around a center.
+Structure box(int number, const std::string& name, const std::string& type, const Vector3d& center_mm, double edge_mm) {
+  Structure structure{.number = number, .name = name, .interpreted_type = type};
+  const double lowest = std::round((center_mm.z() - 0.5 * edge_mm) / kSliceMm) * kSliceMm;
+  for (double z = lowest; z <= center_mm.z() + 0.5 * edge_mm; z += kSliceMm)
+    structure.contours.push_back({.points_patient_mm = rectangle({center_mm.x(), center_mm.y(), z}, edge_mm, edge_mm)});
+  return structure;
+}
+
+// A CT of 160 mm about the patient's origin; the isocenter at (10, 0, 0).
+Study study_with(std::vector<Structure> structures) {
+  Study study;
+  CtSeries ct;
+  Eigen::Affine3d lattice(Eigen::Translation3d(-80.0, -80.0, -80.0));
+  lattice.scale(kSliceMm);
+  ct.hu = Volume<float>(Eigen::Vector3i(41, 41, 41), lattice);
+  ct.frame_of_reference_uid = "1.2.3";
+  study.ct = std::make_shared<const CtSeries>(std::move(ct));
+  study.isocenter_patient_mm = Vector3d(10, 0, 0);
+  study.planned_room_from_patient =
+      planned_room_from_patient(PatientPosition::kHfs, study.table, study.isocenter_patient_mm);
+  study.plan = RtPlan{};
+  study.structures = RtStructures{.structures = std::move(structures)};
+  return study;
+}
+
+TEST(TargetOf, APersonsWordComesFirst) {
+  Study study = study_with({box(1, "PTV", "PTV", {10, 0, 0}, 40), box(2, "Node", "", {30, 20, 0}, 24)});
+  study.plan->dose_references = {{.number = 1, .type = "TARGET", .roi_number = 1}};
+  const TargetChoice choice = target_of(study, {.by_person = "Node", .by_site = "PTV"});
+  EXPECT_EQ(choice.target.name, "Node");
+  EXPECT_EQ(choice.target.chosen_by, "--target");
+  EXPECT_THAT(choice.doubts, IsEmpty());
+  // HFS: the room's x is the patient's, its y the patient's z, its z against the patient's y.
+  EXPECT_LT((choice.target.center_room_mm - Vector3d(20, 0, -20)).norm(), 2.5);
+  EXPECT_EQ(target_of(study, {.by_person = "", .by_site = "Node"}).target.name, "Node");
+  EXPECT_EQ(target_of(study, {.by_person = "", .by_site = "Node"}).target.chosen_by, "the site file");
+}
+
+TEST(TargetOf, TheIsocenterCanBeAskedFor) {
+  const Study study = study_with({box(1, "PTV", "PTV", {10, 0, 0}, 40)});
+  const TargetChoice choice = target_of(study, {.by_person = "isocenter", .by_site = ""});
+  EXPECT_THAT(choice.target.name, HasSubstr("isocenter's surroundings"));
+  EXPECT_EQ(choice.target.center_room_mm, Vector3d(0, 0, 0));
+  for (const Vector3d& point : choice.target.extent_room_mm) EXPECT_NEAR(point.norm(), 30.0, 1e-9);
+}
+
+TEST(TargetOf, ThePlansDoseReferenceComesBeforeTypes) {
+  Study study = study_with({box(1, "PTV_all", "PTV", {10, 0, 0}, 60), box(7, "Boost", "", {10, 0, 0}, 24),
+                            box(9, "Cord", "ORGAN", {10, 0, 0}, 80)});
+  study.plan->dose_references = {{.number = 1, .type = "TARGET", .roi_number = 7},
+                                 {.number = 2, .type = "ORGAN_AT_RISK", .roi_number = 9},
+                                 {.number = 3, .type = "TARGET", .roi_number = {}},
+                                 {.number = 4, .type = "TARGET", .roi_number = 7}};
+  const TargetChoice choice = target_of(study, {});
+  EXPECT_EQ(choice.target.name, "Boost");
+  EXPECT_EQ(choice.target.chosen_by, "dose reference of the plan");
+  EXPECT_THAT(choice.doubts, IsEmpty());
+}
+
+TEST(TargetOf, OfTypesThePtvThatHoldsTheIsocenterCounts) {
+  const TargetChoice choice =
+      target_of(study_with({box(1, "far PTV", "PTV", {-50, 0, 0}, 30), box(2, "CTV", "CTV", {10, 0, 0}, 30),
+                            box(3, "GTV", "GTV", {10, 0, 0}, 20)}),
+                {});
+  EXPECT_EQ(choice.target.name, "CTV");
+  EXPECT_EQ(choice.target.chosen_by, "the CTV that holds the isocenter");
+  EXPECT_THAT(choice.doubts, IsEmpty());
+  double farthest = 0.0;
+  for (const Vector3d& point : choice.target.extent_room_mm) farthest = std::max(farthest, point.norm());
+  EXPECT_NEAR(farthest, std::sqrt(3.0) * 15.0, 5.0);  // a corner, to a voxel
+}
+
+TEST(TargetOf, SeveralThatFitAreADoubt) {
+  const TargetChoice choice =
+      target_of(study_with({box(1, "PTV 50", "PTV", {10, 0, 0}, 60), box(2, "PTV 66", "PTV", {10, 0, 0}, 30)}), {});
+  EXPECT_EQ(choice.target.name, "PTV 66");
+  ASSERT_EQ(choice.doubts.size(), 1U);
+  EXPECT_THAT(choice.doubts[0], HasSubstr("several structures may be the target (PTV 50, PTV 66); PTV 66 was taken"));
+  EXPECT_THAT(choice.doubts[0], HasSubstr("--target NAME"));
+}
+
+TEST(TargetOf, WithoutAVolumeAtTheIsocenterItIsTheSurroundings) {
+  Study study = study_with({box(1, "far PTV", "PTV", {-50, 0, 0}, 30), box(2, "Body", "EXTERNAL", {0, 0, 0}, 140)});
+  study.structures->structures.push_back({.number = 3, .name = "empty PTV", .interpreted_type = "PTV"});
+  Structure elsewhere = box(4, "PTV of another CT", "PTV", {10, 0, 0}, 30);
+  elsewhere.frame_of_reference_uid = "9.9";
+  study.structures->structures.push_back(elsewhere);
+  EXPECT_EQ(target_of(study, {}).target.chosen_by, "no target volume holds the isocenter");
+  study.structures.reset();
+  study.plan.reset();
+  EXPECT_EQ(target_of(study, {}).target.chosen_by, "no target volume holds the isocenter");
+}
+
+TEST(TargetOf, ANameThatIsNotThereIsAnError) {
+  Study study = study_with({box(1, "PTV", "PTV", {10, 0, 0}, 40)});
+  EXPECT_THROW(target_of(study, {.by_person = "GTV", .by_site = ""}), Error);
+  study.structures.reset();
+  try {
+    target_of(study, {.by_person = "", .by_site = "PTV"});
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_THAT(error.what(), HasSubstr("target PTV (the site file): the study holds no RT Structure Set"));
+  }
+}
+
+}  // namespace
+}  // namespace isoshift

@@ -1,0 +1,141 @@
+#include "workflow/register/target_of.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <optional>
+
+#include "base/error.h"
+#include "geometry/mask.h"
+#include "io/dicom/structure_mask.h"
+
+namespace isoshift {
+namespace {
+
+constexpr const char* kIsocenter = "isocenter";
+constexpr double kSurroundingsMm = 30.0;
+
+// The six neighbors of a cube's center, its edges and its corners.
+std::vector<Eigen::Vector3d> directions_all_around() {
+  std::vector<Eigen::Vector3d> directions;
+  for (int n = 0; n < 27; ++n)
+    if (n != 13) directions.push_back(Eigen::Vector3d(n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1).normalized());
+  return directions;
+}
+
+Target surroundings(std::string chosen_by) {
+  Target target{.name = fmt::format("the isocenter's surroundings, {:.0f} mm", kSurroundingsMm),
+                .chosen_by = std::move(chosen_by)};
+  for (const Eigen::Vector3d& direction : directions_all_around())
+    target.extent_room_mm.push_back(kSurroundingsMm * direction);
+  return target;
+}
+
+// A structure that may be the target, and its voxels.
+struct Candidate {
+  const Structure* structure;
+  Volume<std::uint8_t> mask;
+  bool holds_isocenter = false;
+  std::size_t voxels = 0;
+};
+
+bool is_drawn_here(const Structure& structure, const Study& study) {
+  const std::string& frame = study.ct->frame_of_reference_uid;
+  return !structure.contours.empty() && structure.frame_of_reference_uid.value_or(frame) == frame;
+}
+
+Candidate candidate_of(const Structure& structure, const Study& study) {
+  const Volume<float>& ct = study.ct->hu;
+  Candidate candidate{.structure = &structure, .mask = mask_of(structure, ct.size, ct.patient_from_voxel)};
+  candidate.voxels = static_cast<std::size_t>(std::ranges::count(candidate.mask.voxels, 1));
+  const Eigen::Vector3d voxel = ct.patient_from_voxel.inverse() * study.isocenter_patient_mm;
+  const Eigen::Vector3i at = voxel.array().round().cast<int>();
+  const bool inside = (at.array() >= 0).all() && (at.array() < ct.size.array()).all();
+  candidate.holds_isocenter = inside && candidate.mask.at(at.x(), at.y(), at.z()) != 0;
+  return candidate;
+}
+
+Target target_from(const Candidate& candidate, const Study& study, std::string chosen_by) {
+  const Eigen::Isometry3d& room_from_patient = study.planned_room_from_patient;
+  Target target{.name = candidate.structure->name,
+                .chosen_by = std::move(chosen_by),
+                .center_room_mm = room_from_patient * centroid_patient_mm(candidate.mask)};
+  const Volume<std::uint8_t>& mask = candidate.mask;
+  const Eigen::Affine3d room_from_voxel = room_from_patient * mask.patient_from_voxel;
+  const std::vector<Eigen::Vector3d> directions = directions_all_around();
+  target.extent_room_mm.assign(directions.size(), target.center_room_mm);
+  for (int k = 0; k < mask.size.z(); ++k)
+    for (int j = 0; j < mask.size.y(); ++j)
+      for (int i = 0; i < mask.size.x(); ++i) {
+        if (mask.at(i, j, k) == 0) continue;
+        const Eigen::Vector3d at = room_from_voxel * Eigen::Vector3d(i, j, k);
+        for (std::size_t n = 0; n < directions.size(); ++n)
+          if (directions[n].dot(at) > directions[n].dot(target.extent_room_mm[n])) target.extent_room_mm[n] = at;
+      }
+  return target;
+}
+
+TargetChoice named(const Study& study, const std::string& name, const std::string& by) {
+  if (name == kIsocenter) return {.target = surroundings(by), .doubts = {}};
+  if (!study.structures)
+    throw Error(
+        fmt::format("target {} ({}): the study holds no RT Structure Set (--structures FILE names one)", name, by));
+  return {.target = target_from(candidate_of(structure_named(*study.structures, name), study), study, by),
+          .doubts = {}};
+}
+
+// Of several that fit, the smallest around the isocenter, or the smallest of all.
+TargetChoice chosen_among(std::vector<Candidate> candidates, const Study& study, const std::string& why) {
+  const bool any_holds = std::ranges::any_of(candidates, &Candidate::holds_isocenter);
+  if (any_holds) std::erase_if(candidates, [](const Candidate& candidate) { return !candidate.holds_isocenter; });
+  const Candidate& smallest = *std::ranges::min_element(candidates, {}, &Candidate::voxels);
+  TargetChoice choice{.target = target_from(smallest, study, why), .doubts = {}};
+  if (candidates.size() == 1) return choice;
+  std::vector<std::string> names;
+  for (const Candidate& candidate : candidates) names.push_back(candidate.structure->name);
+  choice.doubts.push_back(fmt::format("several structures may be the target ({}); {} was taken. Name it: --target NAME",
+                                      fmt::join(names, ", "), choice.target.name));
+  return choice;
+}
+
+std::vector<Candidate> prescribed(const Study& study) {
+  std::vector<Candidate> candidates;
+  if (!study.plan || !study.structures) return candidates;
+  for (const RtPlan::DoseReference& reference : study.plan->dose_references) {
+    if (reference.type != "TARGET" || !reference.roi_number) continue;
+    for (const Structure& structure : study.structures->structures) {
+      const auto is_this = [&](const Candidate& candidate) { return candidate.structure == &structure; };
+      if (structure.number == *reference.roi_number && is_drawn_here(structure, study) &&
+          std::ranges::none_of(candidates, is_this))
+        candidates.push_back(candidate_of(structure, study));
+    }
+  }
+  return candidates;
+}
+
+std::vector<Candidate> around_isocenter(const Study& study, std::string_view type) {
+  std::vector<Candidate> candidates;
+  if (!study.structures) return candidates;
+  for (const Structure& structure : study.structures->structures) {
+    if (structure.interpreted_type != type || !is_drawn_here(structure, study)) continue;
+    Candidate candidate = candidate_of(structure, study);
+    if (candidate.holds_isocenter) candidates.push_back(std::move(candidate));
+  }
+  return candidates;
+}
+
+}  // namespace
+
+TargetChoice target_of(const Study& study, const TargetWish& wish) {
+  if (!wish.by_person.empty()) return named(study, wish.by_person, "--target");
+  if (!wish.by_site.empty()) return named(study, wish.by_site, "the site file");
+  if (std::vector<Candidate> candidates = prescribed(study); !candidates.empty())
+    return chosen_among(std::move(candidates), study, "dose reference of the plan");
+  for (const char* type : {"PTV", "CTV", "GTV"})
+    if (std::vector<Candidate> candidates = around_isocenter(study, type); !candidates.empty())
+      return chosen_among(std::move(candidates), study, fmt::format("the {} that holds the isocenter", type));
+  return {.target = surroundings("no target volume holds the isocenter"), .doubts = {}};
+}
+
+}  // namespace isoshift

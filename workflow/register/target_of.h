@@ -1,0 +1,29 @@
+#pragma once
+// Which volume of a study is its target.
+
+#include <string>
+#include <vector>
+
+#include "io/study/study.h"
+#include "setup/target.h"
+
+namespace isoshift {
+
+// Who names the target; both may be empty.
+struct TargetWish {
+  std::string by_person;  // --target: the name of a structure, or "isocenter"
+  std::string by_site;    // the site file's, for the anatomy: the same
+};
+
+struct TargetChoice {
+  Target target;
+  std::vector<std::string> doubts;  // why a person must confirm the choice
+};
+
+// The structure that a person or else the site names; else the one to which the plan's dose references of type TARGET
+// refer; else the PTV, or else CTV or GTV, that holds the isocenter; else the isocenter's surroundings. If several fit,
+// the smallest that holds the isocenter is taken, and the choice is a doubt. Throws Error if a structure that is named
+// is not there or has no closed contour in the CT.
+TargetChoice target_of(const Study& study, const TargetWish& wish);
+
+}  // namespace isoshift
