@@ -35,6 +35,10 @@ float AttenuationModel::attenuation_per_mm(float hu, Beam beam) const {
   return static_cast<float>(std::max(0.0, curve.water_per_mm * relative));
 }
 
+const Eigen::Affine3d& lattice_of(const AttenuationByBeam& attenuation_per_mm) {
+  return attenuation_per_mm.begin()->second.patient_from_voxel;
+}
+
 Volume<float> attenuation_volume(const Volume<float>& ct_hu, const AttenuationModel& model, Beam beam) {
   Volume<float> volume(ct_hu.size, ct_hu.patient_from_voxel);
   const std::size_t of_slice = static_cast<std::size_t>(volume.size.x()) * volume.size.y();

@@ -1,6 +1,8 @@
 #pragma once
 // From HU to attenuation, per voxel and before any interpolation (docs/algorithms.md, "Attenuation").
 
+#include <map>
+
 #include "geometry/volume.h"
 #include "geometry/xray_view.h"
 
@@ -26,5 +28,9 @@ struct AttenuationModel {
 
 // The whole CT seen by one beam quality.
 Volume<float> attenuation_volume(const Volume<float>& ct_hu, const AttenuationModel& model, Beam beam);
+
+// Attenuation in 1/mm as every beam quality sees it, all on one lattice.
+using AttenuationByBeam = std::map<Beam, Volume<float>>;
+const Eigen::Affine3d& lattice_of(const AttenuationByBeam& attenuation_per_mm);  // patient from voxel
 
 }  // namespace isoshift

@@ -27,6 +27,28 @@ double largest_attenuation_per_mm(const Volume<float>& ct_hu, const AttenuationM
   return highest > 0.0F ? highest : 1.0;
 }
 
+// `attenuation` turns a voxel into 1/mm; integers span 0 to `largest_per_mm`.
+template <class Attenuation>
+QuantizedVolume quantized_values(const Volume<float>& source, VolumePrecision precision, double largest_per_mm,
+                                 const Attenuation& attenuation) {
+  QuantizedVolume volume{.size = source.size, .voxels = storage(precision, source.voxels.size())};
+  std::visit(
+      [&]<class T>(std::vector<T>& voxels) {
+        constexpr bool kInteger = std::is_integral_v<T>;
+        if (kInteger) volume.unit_per_mm = largest_per_mm / static_cast<double>(std::numeric_limits<T>::max());
+        const auto per_unit = static_cast<float>(1.0 / volume.unit_per_mm);
+        const std::size_t of_slice = static_cast<std::size_t>(source.size.x()) * source.size.y();
+        parallel_for(0, source.size.z(), [&](int k) {
+          for (std::size_t n = k * of_slice; n != (k + 1) * of_slice; ++n) {
+            const float value = per_unit * attenuation(source.voxels[n]);
+            voxels[n] = static_cast<T>(kInteger ? value + 0.5F : value);
+          }
+        });
+      },
+      volume.voxels);
+  return volume;
+}
+
 }  // namespace
 
 std::string_view to_string(VolumePrecision precision) {
@@ -54,24 +76,14 @@ double QuantizedVolume::full_scale_per_mm() const {
 
 QuantizedVolume quantized_attenuation(const Volume<float>& ct_hu, const AttenuationModel& model, Beam beam,
                                       VolumePrecision precision) {
-  QuantizedVolume volume{.size = ct_hu.size, .voxels = storage(precision, ct_hu.voxels.size())};
-  std::visit(
-      [&]<class T>(std::vector<T>& voxels) {
-        constexpr bool kInteger = std::is_integral_v<T>;
-        if (kInteger)
-          volume.unit_per_mm =
-              largest_attenuation_per_mm(ct_hu, model, beam) / static_cast<double>(std::numeric_limits<T>::max());
-        const auto per_unit = static_cast<float>(1.0 / volume.unit_per_mm);
-        const std::size_t of_slice = static_cast<std::size_t>(ct_hu.size.x()) * ct_hu.size.y();
-        parallel_for(0, ct_hu.size.z(), [&](int k) {
-          for (std::size_t n = k * of_slice; n != (k + 1) * of_slice; ++n) {
-            const float value = per_unit * model.attenuation_per_mm(ct_hu.voxels[n], beam);
-            voxels[n] = static_cast<T>(kInteger ? value + 0.5F : value);
-          }
-        });
-      },
-      volume.voxels);
-  return volume;
+  return quantized_values(ct_hu, precision, largest_attenuation_per_mm(ct_hu, model, beam),
+                          [&](float hu) { return model.attenuation_per_mm(hu, beam); });
+}
+
+QuantizedVolume quantized(const Volume<float>& attenuation_per_mm, VolumePrecision precision) {
+  const float largest = attenuation_per_mm.voxels.empty() ? 0.0F : *std::ranges::max_element(attenuation_per_mm.voxels);
+  return quantized_values(attenuation_per_mm, precision, largest > 0.0F ? largest : 1.0,
+                          [](float value) { return value; });
 }
 
 VoxelBox occupied_voxels(const QuantizedVolume& volume) {

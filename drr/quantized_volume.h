@@ -43,6 +43,9 @@ struct QuantizedVolume {
 QuantizedVolume quantized_attenuation(const Volume<float>& ct_hu, const AttenuationModel& model, Beam beam,
                                       VolumePrecision precision);
 
+// The same of attenuation that is known already, 1/mm; integers span 0 to its largest value.
+QuantizedVolume quantized(const Volume<float>& attenuation_per_mm, VolumePrecision precision);
+
 // The box of voxels that are not 0, bounds included. Empty (first above last) for a volume of nothing.
 struct VoxelBox {
   Eigen::Vector3i first, last;

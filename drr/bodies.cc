@@ -1,0 +1,150 @@
+#include "drr/bodies.h"
+
+#include <algorithm>
+#include <array>
+#include <limits>
+
+#include "base/parallel.h"
+
+namespace isoshift {
+namespace {
+
+// A body's share at a place, 0 to 1.
+float share_at(const BodyShare& share, const Eigen::Vector3d& voxel) {
+  const Eigen::Vector3i lower = voxel.array().floor().cast<int>();
+  const Eigen::Vector3f beyond = (voxel - lower.cast<double>()).cast<float>();
+  if ((lower.array() < -1).any() || (lower.array() >= share.size.array()).any()) return 0.0F;
+  float sum = 0.0F;
+  for (int n = 0; n < 8; ++n) {
+    const Eigen::Vector3i step(n & 1, (n >> 1) & 1, n >> 2), at = lower + step;
+    if ((at.array() < 0).any() || (at.array() >= share.size.array()).any()) continue;
+    float weight = 1.0F;
+    for (int axis = 0; axis < 3; ++axis) weight *= step[axis] != 0 ? beyond[axis] : 1.0F - beyond[axis];
+    sum += weight * static_cast<float>(share.at(at.x(), at.y(), at.z()));
+  }
+  return sum / 255.0F;
+}
+
+// A box of voxels, bounds included; empty if first lies above last.
+struct Box {
+  Eigen::Vector3i first, last;
+  bool is_empty() const { return (first.array() > last.array()).any(); }
+};
+
+// The voxels of a CT that lie in the box of a share's lattice, one voxel wider, where the share is not 0.
+Box box_in(const Volume<float>& ct, const BodyShare& share) {
+  Eigen::Vector3i first = share.size, last = Eigen::Vector3i::Constant(-1);
+  for (int k = 0; k < share.size.z(); ++k)
+    for (int j = 0; j < share.size.y(); ++j)
+      for (int i = 0; i < share.size.x(); ++i)
+        if (share.at(i, j, k) != 0) {
+          first = first.cwiseMin(Eigen::Vector3i(i, j, k));
+          last = last.cwiseMax(Eigen::Vector3i(i, j, k));
+        }
+  Box box{.first = ct.size, .last = Eigen::Vector3i::Constant(-1)};
+  if (last.x() < 0) return box;
+  const Eigen::Affine3d ct_from_share = ct.patient_from_voxel.inverse() * share.patient_from_voxel;
+  Eigen::Vector3d low = Eigen::Vector3d::Constant(std::numeric_limits<double>::max()), high = -low;
+  for (int n = 0; n < 8; ++n) {
+    const auto end = [&](int axis, int bit) { return (n & bit) != 0 ? last[axis] + 1.0 : first[axis] - 1.0; };
+    const Eigen::Vector3d corner = ct_from_share * Eigen::Vector3d(end(0, 1), end(1, 2), end(2, 4));
+    low = low.cwiseMin(corner);
+    high = high.cwiseMax(corner);
+  }
+  box.first = low.array().floor().max(0.0).cast<int>();
+  box.last = high.array().ceil().min(ct.size.array().cast<double>() - 1.0).cast<int>();
+  return box;
+}
+
+Eigen::Vector3d center_of_mass(const Volume<float>& volume) {
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  double mass = 0.0;
+  for (int k = 0; k < volume.size.z(); ++k)
+    for (int j = 0; j < volume.size.y(); ++j)
+      for (int i = 0; i < volume.size.x(); ++i) {
+        const double value = volume.at(i, j, k);
+        sum += value * Eigen::Vector3d(i, j, k);
+        mass += value;
+      }
+  return volume.patient_from_voxel * Eigen::Vector3d(mass > 0.0 ? Eigen::Vector3d(sum / mass) : sum);
+}
+
+// The places in a list of the pixels whose rays may meet a box: those within its projection. All of them if the box
+// reaches behind the source.
+std::vector<std::uint32_t> covered(std::span<const std::uint32_t> pixels, const XrayView& view,
+                                   const Eigen::Isometry3d& room_from_patient,
+                                   std::span<const Eigen::Vector3d> corners_patient_mm) {
+  Eigen::AlignedBox2d shadow;
+  bool is_behind = false;
+  for (const Eigen::Vector3d& corner : corners_patient_mm) {
+    const auto pixel = view.project(room_from_patient * corner);
+    if (pixel) shadow.extend(*pixel);
+    is_behind = is_behind || !pixel;
+  }
+  std::vector<std::uint32_t> places;
+  const auto columns = static_cast<std::uint32_t>(view.columns);
+  for (std::uint32_t n = 0; n < pixels.size(); ++n)
+    if (is_behind || shadow.contains(Eigen::Vector2d(pixels[n] % columns, pixels[n] / columns))) places.push_back(n);
+  return places;
+}
+
+}  // namespace
+
+AttenuationByBeam attenuation_of_body(const Volume<float>& ct_hu, const AttenuationModel& model,
+                                      std::span<const Beam> beams, const BodyShare& share) {
+  AttenuationByBeam result;
+  const Box box = box_in(ct_hu, share);
+  if (box.is_empty()) return result;
+  const Eigen::Affine3d lattice = ct_hu.patient_from_voxel * Eigen::Translation3d(box.first.cast<double>());
+  const Eigen::Affine3d share_from_voxel = share.patient_from_voxel.inverse() * lattice;
+  for (const Beam beam : beams)
+    result.emplace(beam, Volume<float>(box.last - box.first + Eigen::Vector3i::Ones(), lattice));
+  const Eigen::Vector3i& size = result.begin()->second.size;
+  parallel_for(0, size.z(), [&](int k) {
+    for (int j = 0; j < size.y(); ++j)
+      for (int i = 0; i < size.x(); ++i) {
+        const float part = share_at(share, share_from_voxel * Eigen::Vector3d(i, j, k));
+        if (part == 0.0F) continue;
+        const float hu = ct_hu.at(box.first.x() + i, box.first.y() + j, box.first.z() + k);
+        for (auto& [beam, volume] : result) volume.at(i, j, k) = part * model.attenuation_per_mm(hu, beam);
+      }
+  });
+  return result;
+}
+
+BodyRenderers::BodyRenderers(RendererKind kind, const Volume<float>& ct_hu, const AttenuationModel& model,
+                             std::span<const Beam> beams, std::span<const BodyShare> shares) {
+  for (const BodyShare& share : shares) {
+    Body& body = bodies_.emplace_back();
+    AttenuationByBeam attenuation = attenuation_of_body(ct_hu, model, beams, share);
+    if (attenuation.empty()) continue;
+    const Volume<float>& volume = attenuation.begin()->second;
+    for (int n = 0; n < 8; ++n) {
+      const auto end = [&](int axis, int bit) { return (n & bit) != 0 ? volume.size[axis] : -1; };
+      body.corners_patient_mm.push_back(volume.patient_from_voxel * Eigen::Vector3d(end(0, 1), end(1, 2), end(2, 4)));
+    }
+    body.center_patient_mm = center_of_mass(volume);
+    body.renderer = make_renderer(kind, std::move(attenuation));
+  }
+}
+
+void BodyRenderers::add(std::size_t body, const XrayView& view, const Eigen::Isometry3d& room_from_patient,
+                        std::span<const std::uint32_t> pixels, std::span<float> line_integrals,
+                        std::span<MotionDerivatives> derivatives) const {
+  std::ranges::fill(derivatives, MotionDerivatives::Zero());
+  const Body& part = bodies_[body];
+  if (!part.renderer) return;
+  const std::vector<std::uint32_t> places = covered(pixels, view, room_from_patient, part.corners_patient_mm);
+  if (places.empty()) return;
+  PixelSet listed{.of_view = {{}}};
+  for (const std::uint32_t place : places) listed.of_view.front().push_back(pixels[place]);
+  const auto views = std::span(&view, 1);
+  const auto poses = std::span(&room_from_patient, 1);
+  const RenderResult drr = derivatives.empty() ? part.renderer->render(views, poses, listed)
+                                               : part.renderer->render_with_derivatives(views, poses, listed);
+  for (std::size_t n = 0; n < places.size(); ++n) line_integrals[places[n]] += drr.line_integrals(0, 0)[n];
+  if (derivatives.empty()) return;
+  for (std::size_t n = 0; n < places.size(); ++n) derivatives[places[n]] = drr.derivatives(0, 0)[n];
+}
+
+}  // namespace isoshift
