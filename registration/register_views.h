@@ -16,6 +16,7 @@
 #include "drr/renderer_pyramid.h"
 #include "registration/quality/alternatives.h"
 #include "registration/quality/consistency.h"
+#include "registration/quality/contradiction.h"
 #include "registration/quality/cross_checks.h"
 #include "registration/quality/uncertainty.h"
 #include "registration/search.h"

@@ -42,6 +42,9 @@ struct ViewMatch {
   bool has_all_excluded = true;  // false: what should be excluded covers nearly all of the view, and was compared
   ViewConsistency consistency;   // of its parts with the pose found
   std::optional<LeftOutView> left_out;  // with three or more views
+  // With two or more views: how far this view alone would want the anatomy from where all views put it, as root mean
+  // square over 100 mm about the isocenter, in this view.
+  std::optional<double> contradiction_mm;
 };
 
 // How well the images would match if they were not what they say they are.

@@ -204,6 +204,7 @@ Json view_json(const SetupResult::View& view) {
           {"similarity_final", view.match.similarity_final},
           {"left_out_mm", left_out ? Json(left_out->distance_mm) : Json(nullptr)},
           {"left_out_deg", left_out ? Json(deg_from_rad(left_out->angle_rad)) : Json(nullptr)},
+          {"contradiction_mm", or_null(view.match.contradiction_mm)},
           {"parts", parts_json(view)},
           {"picture", picture_json(view.picture)}};
 }

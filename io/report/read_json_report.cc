@@ -56,6 +56,8 @@ ViewMatch match_from(const Json& json) {
                   .similarity_final = or_nan(json.at("similarity_final"))};
   if (const auto distance_mm = number_from(json.at("left_out_mm")))
     match.left_out = {.distance_mm = *distance_mm, .angle_rad = rad_from_deg(json.at("left_out_deg"))};
+  if (json.contains("contradiction_mm"))  // not in results before 0.2
+    match.contradiction_mm = number_from(json.at("contradiction_mm"));
   for (const Json& part : json.at("parts"))
     match.consistency.parts.push_back({.center_px = vector_from<2>(part.at("center_px")),
                                        .width_px = part.at("width_px"),

@@ -338,6 +338,8 @@ ReportPage::Section checks_section(const SetupResult& report) {
     if (const auto& left_out = view.match.left_out)
       words += fmt::format("; without it the pose moves {:.2f} mm, {:.2f} deg", left_out->distance_mm,
                            deg_from_rad(left_out->angle_rad));
+    if (const auto& contradiction_mm = view.match.contradiction_mm)
+      words += fmt::format("; alone it would want the anatomy {:.2f} mm elsewhere", *contradiction_mm);
     section.rows.push_back({printable(view.label), words});
   }
   for (const Alternative& alternative : report.alternatives)

@@ -78,6 +78,13 @@ TEST(Quality, TooLittleToCheckForMovedAnatomyNeedsReview) {
   expect_accepted([](RegistrationResult& r) { r.views[0].consistency = parts(2, 0); });
 }
 
+TEST(Quality, ViewsThatContradictEachOtherNeedReview) {
+  expect_review([](RegistrationResult& r) { r.views[0].contradiction_mm = 0.9, r.views[1].contradiction_mm = 0.4; },
+                "the views contradict each other: each of them alone would want the anatomy elsewhere, 0.7 mm in the");
+  expect_review([](RegistrationResult& r) { r.views[1].contradiction_mm = std::nan(""); }, "contradict each other");
+  expect_accepted([](RegistrationResult& r) { r.views[0].contradiction_mm = 0.2, r.views[1].contradiction_mm = 0.3; });
+}
+
 TEST(Quality, AnExclusionThatCannotBeKeptNeedsReview) {
   expect_review([](RegistrationResult& r) { r.views[0].has_all_excluded = false; },
                 "what is excluded covers nearly all that view 1 shows");

@@ -1,0 +1,122 @@
+// Views that contradict each other are found, from both sides: by X-rays of a patient who moved between them, and by
+// geometry that lies in one of them. What no two views can show is not.
+
+#include "registration/quality/contradiction.h"
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "geometry/rotation.h"
+#include "registration/pose_parameters.h"
+#include "registration/register_views.h"
+#include "tests/support/registration_scene.h"
+
+namespace isoshift {
+namespace {
+
+using Eigen::Vector3d;
+
+constexpr double kLimitMm = 0.5;  // judge.cc's
+
+RegistrationScene scene_with(const Vector3d& rotation_deg, const Vector3d& translation_mm = {3.0, -2.0, 4.0}) {
+  SceneOptions options{.shapes = asymmetric_body(), .pixels = 128};
+  options.placement.translation_mm = translation_mm;
+  options.placement.rotation_deg = rotation_deg;
+  return make_scene(options);
+}
+
+// After a registration of all views from the plan.
+double contradiction_mm(const RegistrationScene& scene, const std::vector<FixedImage>& images) {
+  const FixedViews views{.images = images, .region = scene.everything};
+  Stage coarse = fine_stage();
+  coarse.initial_step_mm = 4.0;
+  coarse.initial_step_rad = rad_from_deg(2.0);
+  coarse.pixel_mm = coarse.voxel_mm = 4.0;
+  coarse.similarity = SimilarityKind::kNcc;
+  const std::array stages = {coarse, fine_stage()};
+  const SearchResult found = search(*scene.renderers, views, scene.planned, {.stages = stages});
+  const Eigen::Isometry3d pose = setup_error_from_parameters(found.parameters) * scene.planned;
+  double squares = 0.0;
+  for (const double mm : contradictions(*scene.renderers, views, scene.planned, pose, fine_stage(), Dof::kRigid))
+    squares += mm * mm / static_cast<double>(images.size());
+  return std::sqrt(squares);
+}
+
+const Vector3d kRotation(1.0, -1.5, 2.0);
+
+TEST(Contradiction, ViewsOfOnePoseAgree) {
+  const RegistrationScene scene = scene_with(kRotation);
+  EXPECT_LT(contradiction_mm(scene, scene.images), 0.3);
+}
+
+TEST(Contradiction, APatientWhoMovedBetweenTheViewsIsSeen) {
+  const RegistrationScene scene = scene_with(kRotation);
+  for (int axis = 0; axis < 3; ++axis) {
+    std::vector<FixedImage> images = scene.images;
+    images[1] = scene_with(kRotation + 2.0 * Vector3d::Unit(axis)).images[1];
+    EXPECT_GT(contradiction_mm(scene, images), kLimitMm) << "turned about axis " << axis;
+  }
+  std::vector<FixedImage> images = scene.images;
+  images[1] = scene_with(kRotation, {3.0, 0.5, 4.0}).images[1];  // along the patient, which both views see
+  EXPECT_GT(contradiction_mm(scene, images), kLimitMm);
+}
+
+TEST(Contradiction, GeometryThatLiesInOneViewIsSeen) {
+  const RegistrationScene scene = scene_with(kRotation);
+  const Eigen::Vector2d center = *scene.images[0].view.project(Vector3d::Zero());
+  const auto with_pixels_moved = [&](const Eigen::Matrix3d& moved_from_pixel) {
+    std::vector<FixedImage> images = scene.images;
+    images[0].view.pixel_from_room = moved_from_pixel * images[0].view.pixel_from_room;
+    return contradiction_mm(scene, images);
+  };
+  Eigen::Matrix3d panel = Eigen::Matrix3d::Identity();
+  const Eigen::Vector2d along_y = *scene.images[0].view.project(Vector3d::UnitY()) - center;
+  panel.topRightCorner<2, 1>() = 5.0 / 1.5 * along_y;  // 5 mm on the receptor
+  EXPECT_GT(with_pixels_moved(panel), kLimitMm);
+  const double roll = rad_from_deg(3.0);
+  Eigen::Matrix3d receptor = Eigen::Matrix3d::Identity();
+  receptor.topLeftCorner<2, 2>() << std::cos(roll), -std::sin(roll), std::sin(roll), std::cos(roll);
+  receptor.topRightCorner<2, 1>() = center - receptor.topLeftCorner<2, 2>() * center;
+  EXPECT_GT(with_pixels_moved(receptor), kLimitMm);
+  Eigen::Matrix3d distance = Eigen::Matrix3d::Identity();
+  distance.topLeftCorner<2, 2>() *= 1.02;
+  distance.topRightCorner<2, 1>() = -0.02 * center;
+  EXPECT_GT(with_pixels_moved(distance), kLimitMm);
+}
+
+// A gantry that is off in both views looks like a turned patient: documented, not found.
+TEST(Contradiction, AGantryThatLiesInBothViewsIsNotSeen) {
+  const RegistrationScene scene = scene_with(kRotation);
+  const Eigen::Isometry3d turn(Eigen::AngleAxisd(rad_from_deg(2.0), Vector3d::UnitY()));
+  std::vector<FixedImage> images = scene.images;
+  for (FixedImage& image : images) {
+    image.view.pixel_from_room = image.view.pixel_from_room * turn.matrix();
+    image.view.source_room_mm = turn.inverse() * image.view.source_room_mm;
+  }
+  EXPECT_LT(contradiction_mm(scene, images), 0.3);
+}
+
+TEST(Contradiction, OneViewContradictsNothing) {
+  const RegistrationScene scene = scene_with(kRotation);
+  const FixedViews one{.images = {scene.images[0]}, .region = scene.everything};
+  EXPECT_TRUE(contradictions(*scene.renderers, one, scene.planned, scene.actual(), fine_stage(), Dof::kRigid).empty());
+}
+
+// Without derivatives it is BOBYQA that climbs, to the same places.
+TEST(Contradiction, IsTheSameForARendererWithoutDerivatives) {
+  const RegistrationScene scene = scene_with(kRotation);
+  const RendererPyramid siddon(RendererKind::kSiddon, scene.ct, {}, std::array{Beam::kKilovoltage});
+  std::vector<FixedImage> images = scene.images;
+  images[1] = scene_with(kRotation + Vector3d(0, 2, 0)).images[1];
+  const FixedViews views{.images = images, .region = scene.everything};
+  const auto of = [&](const RendererPyramid& renderers) {
+    return contradictions(renderers, views, scene.planned, scene.actual(), fine_stage(), Dof::kRigid);
+  };
+  const std::vector<double> climbed = of(*scene.renderers), by_values = of(siddon);
+  for (std::size_t view = 0; view < 2; ++view) EXPECT_NEAR(climbed[view], by_values[view], 0.25);
+}
+
+}  // namespace
+}  // namespace isoshift
