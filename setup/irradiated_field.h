@@ -2,6 +2,7 @@
 // Where an X-ray's receptor was irradiated, and how sure that is.
 
 #include <Eigen/Core>
+#include <array>
 #include <string>
 #include <vector>
 
@@ -22,5 +23,10 @@ struct IrradiatedField {
 
   bool is_sure() const { return doubt.empty(); }
 };
+
+inline constexpr std::array kFieldOrigins = {IrradiatedField::Origin::kWholeReceptor, IrradiatedField::Origin::kFound,
+                                             IrradiatedField::Origin::kDeclared, IrradiatedField::Origin::kDrawn};
+// "whole receptor", "found", "declared", "drawn".
+const char* to_string(IrradiatedField::Origin origin);
 
 }  // namespace isoshift

@@ -50,12 +50,22 @@ ViewPicture picture_from(const Json& json) {
   return picture;
 }
 
+IrradiatedField irradiated_field_from(const Json& json) {
+  IrradiatedField field{.sigma_mm = json.at("sigma_mm"), .doubt = text_from(json.at("doubt"))};
+  for (const IrradiatedField::Origin origin : kFieldOrigins)
+    if (json.at("origin") == to_string(origin)) field.origin = origin;
+  for (const Json& corner : json.at("corners_px")) field.corners_px.push_back(vector_from<2>(corner));
+  return field;
+}
+
 ViewMatch match_from(const Json& json) {
   ViewMatch match{.label = json.at("label"),
                   .similarity_start = or_nan(json.at("similarity_start")),
                   .similarity_final = or_nan(json.at("similarity_final"))};
   if (const auto distance_mm = number_from(json.at("left_out_mm")))
     match.left_out = {.distance_mm = *distance_mm, .angle_rad = rad_from_deg(json.at("left_out_deg"))};
+  // Results of before 2026-11-23 do not say.
+  if (json.contains("irradiated_field")) match.field = irradiated_field_from(json.at("irradiated_field"));
   for (const Json& part : json.at("parts"))
     match.consistency.parts.push_back({.center_px = vector_from<2>(part.at("center_px")),
                                        .width_px = part.at("width_px"),

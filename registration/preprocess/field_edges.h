@@ -13,11 +13,11 @@ namespace isoshift {
 // An X-ray in blocks of pixels, turned so that the collimator's edges are upright. Positions are pixels of this image,
 // whole numbers between pixels: 0 is the left rim.
 struct UprightXray {
-  cv::Mat intensity;          // in units of the brightest; of line integrals of unknown scale exp(-value), so scaled that
-                              // the image's range is that of a usual image
-  cv::Mat valid;              // 0: beyond the receptor
-  double mm = 1.0;            // edge of a pixel at the isocenter
-  cv::Matx23d from_image;     // of (column, row) of the X-ray
+  cv::Mat intensity;       // in units of the brightest; of line integrals of unknown scale exp(-value), so scaled that
+                           // the image's range is that of a usual image
+  cv::Mat valid;           // 0: beyond the receptor
+  double mm = 1.0;         // edge of a pixel at the isocenter
+  cv::Matx23d from_image;  // of (column, row) of the X-ray
 
   UprightXray transposed() const;
   UprightXray cropped(const cv::Rect& part) const;  // `from_image` stays that of the whole
@@ -67,6 +67,7 @@ class FieldEdges {
 
   // The rectangle with the best score; the whole receptor where no edge helps.
   FieldRectangle best() const;
+  FieldRectangle whole() const { return with(0, across_.size, 0, down_.size, 0.0); }
   // The rectangle whose sides are the clearest edges within 3 mm of these places. Places beyond the rim are open.
   FieldRectangle near(const std::array<double, 4>& places) const;
 

@@ -10,18 +10,19 @@
 namespace isoshift {
 namespace {
 
-constexpr double kBlockMm = 5.0;    // along the side
-constexpr double kWindowMm = 8.0;   // across it, to either side
-constexpr double kSearchMm = 3.5;   // the edge lies so near to where it is looked for
-constexpr double kInwardMm = 1.0;   // the logarithm falls most outside of where half the beam arrives
-constexpr double kStepMm = 0.35;
+constexpr double kBlockMm = 5.0;   // along the side
+constexpr double kWindowMm = 8.0;  // across it, to either side
+constexpr double kWeightMm = 4.0;  // sigma of the weights in the window: what is near the edge tells its place
+constexpr double kPlacesMm = 3.5;  // the edge lies so near to where it is looked for
+constexpr double kPlaceStepMm = 0.35;
 constexpr std::array kBlurMm = {0.3, 0.6, 1.0, 1.5, 2.1};  // sigma of the penumbra
-constexpr double kBestSigmaMm = 0.05;  // what no edge is measured better than
-constexpr double kMaxSlope = 0.035;    // 2 degrees
+constexpr double kBestSigmaMm = 0.05;                      // what no edge is measured better than
+constexpr double kMaxSlope = 0.035;                        // 2 degrees
+constexpr double kSlopeSigma = 0.003;  // what no slope is measured better than: what lies behind an edge may slope
 constexpr double kSameMm = 0.15;       // blocks of one edge differ by so much
 constexpr double kFarMm = 0.4;         // and hardly by more
 
-double median(std::vector<double> values) {
+double middle_value(std::vector<double> values) {
   if (values.empty()) return 0.0;
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
   std::ranges::nth_element(values, middle);
@@ -53,32 +54,34 @@ std::vector<Block> blocks_of(const UprightXray& xray, int from, int count, int f
 // The model of an edge at one place with one blur, in which the intensity is linear: inside a + b x, outside c, d x.
 class EdgeModel {
  public:
-  EdgeModel(int count, double pixel_mm, double at_mm, double blur_mm, int sign)
-      : design_(count, 4), passing_slope_(count) {
+  EdgeModel(int count, double pixel_mm, double middle_mm, double at_mm, double blur_mm, int sign)
+      : design_(count, 4), passing_slope_(count), weight_(count) {
     for (int n = 0; n < count; ++n) {
       const double x = (n + 0.5) * pixel_mm - at_mm;
       const double passing = 0.5 * std::erfc(-sign * x / (blur_mm * std::numbers::sqrt2));
+      weight_[n] = std::exp(-0.5 * std::pow(((n + 0.5) * pixel_mm - middle_mm) / kWeightMm, 2));
       design_.row(n) << passing, passing * x, 1.0 - passing, (1.0 - passing) * x;
-      passing_slope_[n] =
-          std::exp(-0.5 * x * x / (blur_mm * blur_mm)) / (blur_mm * std::sqrt(2.0 * std::numbers::pi));
+      design_.row(n) *= weight_[n];
+      passing_slope_[n] = std::exp(-0.5 * x * x / (blur_mm * blur_mm)) / (blur_mm * std::sqrt(2.0 * std::numbers::pi));
     }
     solver_.compute(design_);
   }
 
   // Sum of squares that it leaves.
   double left(const Eigen::VectorXd& intensity) const {
-    return (intensity - design_ * solver_.solve(intensity)).squaredNorm();
+    const Eigen::VectorXd weighted = weight_.cwiseProduct(intensity);
+    return (weighted - design_ * solver_.solve(weighted)).squaredNorm();
   }
   // Step from outside to inside.
   double step(const Eigen::VectorXd& intensity) const {
-    const Eigen::VectorXd solution = solver_.solve(intensity);
+    const Eigen::VectorXd solution = solver_.solve(weight_.cwiseProduct(intensity));
     return solution[0] - solution[2];
   }
   double passing_slope_squared() const { return passing_slope_.squaredNorm(); }
 
  private:
   Eigen::MatrixXd design_;
-  Eigen::VectorXd passing_slope_;
+  Eigen::VectorXd passing_slope_, weight_;
   Eigen::HouseholderQR<Eigen::MatrixXd> solver_;
 };
 
@@ -92,9 +95,9 @@ BlurFit fit_with(const std::vector<Block>& blocks, int count, double pixel_mm, d
                  int sign) {
   std::vector<EdgeModel> models;
   std::vector<double> places;
-  for (double off = -kSearchMm; off <= kSearchMm + 1e-9; off += kStepMm) {
+  for (double off = -kPlacesMm; off <= kPlacesMm + 1e-9; off += kPlaceStepMm) {
     places.push_back(middle_mm + off);
-    models.emplace_back(count, pixel_mm, places.back(), blur_mm, sign);
+    models.emplace_back(count, pixel_mm, middle_mm, places.back(), blur_mm, sign);
   }
   BlurFit fit;
   for (const Block& block : blocks) {
@@ -110,17 +113,14 @@ BlurFit fit_with(const std::vector<Block>& blocks, int count, double pixel_mm, d
     const double noise_squared = left[best] / std::max(1, count - 6);
     const double sigma = std::sqrt(noise_squared / models[best].passing_slope_squared()) / step;
     fit.seen.push_back({.row = block.row,
-                        .at = (places[best] + std::clamp(off, -0.5, 0.5) * kStepMm) / pixel_mm,
+                        .at = (places[best] + std::clamp(off, -0.5, 0.5) * kPlaceStepMm) / pixel_mm,
                         .sigma_mm = std::hypot(sigma, kBestSigmaMm)});
   }
   return fit;
 }
 
-}  // namespace
-
-SideSightings sightings_of_side(const UprightXray& xray, int near, int sign, int first, int end) {
+SideSightings sightings_at(const UprightXray& xray, int near, int sign, int first, int end) {
   const int reach = static_cast<int>(std::lround(kWindowMm / xray.mm));
-  near += sign * static_cast<int>(std::lround(kInwardMm / xray.mm));
   const int from = std::max(0, near - reach), count = std::min(xray.intensity.cols, near + reach) - from;
   if (count < reach) return {};
   const std::vector<Block> blocks = blocks_of(xray, from, count, first, end);
@@ -133,6 +133,20 @@ SideSightings sightings_of_side(const UprightXray& xray, int near, int sign, int
   return {.seen = std::move(best.seen), .blocks = static_cast<int>(blocks.size())};
 }
 
+}  // namespace
+
+SideSightings sightings_of_side(const UprightXray& xray, int near, int sign, int first, int end) {
+  // The logarithm falls most outside of where half the beam arrives: by 1 mm, or by more where the penumbra is wide.
+  SideSightings best;
+  for (const double inward_mm : {1.0, 3.0, 4.5}) {
+    SideSightings other =
+        sightings_at(xray, near + sign * static_cast<int>(std::lround(inward_mm / xray.mm)), sign, first, end);
+    if (other.seen.size() > best.seen.size() || best.blocks == 0) best = std::move(other);
+    if (4 * best.seen.size() >= 3 * static_cast<std::size_t>(best.blocks)) break;
+  }
+  return best;
+}
+
 SideLine line_through(const std::vector<Sighting>& seen, double pixel_mm, double slope, double slope_sigma) {
   const auto count = static_cast<double>(seen.size());
   std::vector<double> places;
@@ -141,7 +155,7 @@ SideLine line_through(const std::vector<Sighting>& seen, double pixel_mm, double
     places.push_back(sighting.at);
     line.middle += sighting.row / count;
   }
-  line.at = median(places);
+  line.at = middle_value(places);
   for (int round = 0; round < 10; ++round) {
     Eigen::Matrix2d normal = Eigen::Matrix2d::Zero();
     Eigen::Vector2d right = Eigen::Vector2d::Zero();
@@ -165,9 +179,9 @@ SideLine line_through(const std::vector<Sighting>& seen, double pixel_mm, double
     off.push_back(pixel_mm * std::abs(sighting.at - line.x(sighting.row)));
     square_mm2 += std::pow((sighting.row - line.middle) * pixel_mm, 2);
   }
-  line.scatter_mm = 1.48 * median(off);
+  line.scatter_mm = 1.48 * middle_value(off);
   line.sigma_mm = std::hypot(line.scatter_mm / std::sqrt(count), kBestSigmaMm);
-  line.slope_sigma = std::hypot(std::max(line.scatter_mm, kSameMm) / std::sqrt(square_mm2 + 1.0), 0.002);
+  line.slope_sigma = std::hypot(std::max(line.scatter_mm, kSameMm) / std::sqrt(square_mm2 + 1.0), kSlopeSigma);
   return line;
 }
 
@@ -187,7 +201,7 @@ double brightness_beyond(const UprightXray& xray, int at, int sign, int first, i
     }
     rises.push_back(std::log((beyond + 1e-3) / (inside + 1e-3)));
   }
-  return median(rises);
+  return middle_value(rises);
 }
 
 }  // namespace isoshift
