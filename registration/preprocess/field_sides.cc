@@ -19,7 +19,7 @@ constexpr std::array kBlurMm = {0.3, 0.6, 1.0, 1.5, 2.1};  // sigma of the penum
 constexpr double kBestSigmaMm = 0.05;                      // what no edge is measured better than
 constexpr double kMaxSlope = 0.035;                        // 2 degrees
 constexpr double kSlopeSigma = 0.003;  // what no slope is measured better than: what lies behind an edge may slope
-constexpr double kSameMm = 0.15;       // blocks of one edge differ by so much
+constexpr double kSameMm = 0.06;       // blocks of one edge differ by so much
 constexpr double kFarMm = 0.4;         // and hardly by more
 
 double middle_value(std::vector<double> values) {
@@ -106,7 +106,7 @@ BlurFit fit_with(const std::vector<Block>& blocks, int count, double pixel_mm, d
     const auto best = static_cast<std::size_t>(std::ranges::min_element(left) - left.begin());
     const double step = models[best].step(block.intensity);
     const double brightest = std::max(block.intensity.maxCoeff(), 1e-9);
-    fit.left += std::min(1.0, left[best] / (brightest * brightest));
+    fit.left += std::log(left[best] / (brightest * brightest) + 1e-7);
     if (best == 0 || best + 1 == models.size() || step < 0.1 * brightest) continue;
     const double curvature = left[best - 1] - 2.0 * left[best] + left[best + 1];
     const double off = curvature > 0.0 ? 0.5 * (left[best - 1] - left[best + 1]) / curvature : 0.0;
