@@ -71,7 +71,8 @@ class SideScore {
   // Nothing where the side is no edge.
   std::optional<double> operator()(const EdgeMap& map, int at, bool is_open, const Span& span) const {
     if (is_open) return 0.0;
-    const int first = span.first + (span.is_first_open ? 0 : corner_), end = span.end - (span.is_end_open ? 0 : corner_);
+    const int first = span.first + (span.is_first_open ? 0 : corner_),
+              end = span.end - (span.is_end_open ? 0 : corner_);
     if (end - first < 2) return std::nullopt;
     const double evidence = map.mean(at, first, end), length_mm = mm_ * map.compared_rows(at, first, end);
     if (evidence < kMinEvidence || length_mm < 0.6 * kMinSideMm) return std::nullopt;
@@ -97,14 +98,15 @@ class SideScore {
 }  // namespace
 
 UprightXray UprightXray::transposed() const {
-  UprightXray result{.intensity = {}, .valid = {}, .mm = mm, .from_image = from_image};
+  UprightXray result{.intensity = {}, .valid = {}, .has_scale = has_scale, .mm = mm, .from_image = from_image};
   cv::transpose(intensity, result.intensity);
   cv::transpose(valid, result.valid);
   return result;
 }
 
 UprightXray UprightXray::cropped(const cv::Rect& part) const {
-  return {.intensity = intensity(part), .valid = valid(part), .mm = mm, .from_image = from_image};
+  return {
+      .intensity = intensity(part), .valid = valid(part), .has_scale = has_scale, .mm = mm, .from_image = from_image};
 }
 
 UprightXray upright_xray(const XrayImage& xray, double pixels_per_mm) {
@@ -120,6 +122,7 @@ UprightXray upright_xray(const XrayImage& xray, double pixels_per_mm) {
   if (xray.meaning == XrayImage::Meaning::kIntensity) {
     result.intensity = cv::max(smooth, 0.0) / largest;
   } else {
+    result.has_scale = false;
     cv::exp((least - smooth) * (kRange / std::max(largest - least, 1e-30)), result.intensity);
   }
   result.mm = block / pixels_per_mm;
@@ -142,14 +145,15 @@ UprightXray upright_xray(const XrayImage& xray, double pixels_per_mm) {
   cv::warpAffine(result.valid, result.valid, for_opencv, size, cv::INTER_NEAREST, cv::BORDER_CONSTANT);
   cv::erode(result.valid, result.valid, cv::Mat(), cv::Point(-1, -1), 2, cv::BORDER_CONSTANT, 0);
   const cv::Matx23d f = result.from_image;
-  result.from_image = cv::Matx23d(turn(0, 0) * f(0, 0), turn(0, 1) * f(1, 1),
-                                  turn(0, 0) * f(0, 2) + turn(0, 1) * f(1, 2) + turn(0, 2), turn(1, 0) * f(0, 0),
-                                  turn(1, 1) * f(1, 1), turn(1, 0) * f(0, 2) + turn(1, 1) * f(1, 2) + turn(1, 2));
+  result.from_image =
+      cv::Matx23d(turn(0, 0) * f(0, 0), turn(0, 1) * f(1, 1), turn(0, 0) * f(0, 2) + turn(0, 1) * f(1, 2) + turn(0, 2),
+                  turn(1, 0) * f(0, 0), turn(1, 1) * f(1, 1), turn(1, 0) * f(0, 2) + turn(1, 1) * f(1, 2) + turn(1, 2));
   return result;
 }
 
 EdgeMap::EdgeMap(const cv::Mat& steps, const cv::Mat& compared, int sign)
-    : sums_(steps.rows + 1, steps.cols, CV_32F, cv::Scalar(0)), counts_(steps.rows + 1, steps.cols, CV_32F, cv::Scalar(0)) {
+    : sums_(steps.rows + 1, steps.cols, CV_32F, cv::Scalar(0)),
+      counts_(steps.rows + 1, steps.cols, CV_32F, cv::Scalar(0)) {
   for (int y = 0; y < steps.rows; ++y) {
     const auto* step = steps.ptr<float>(y);
     const auto* both = compared.ptr<std::uint8_t>(y);
@@ -205,9 +209,7 @@ std::vector<int> EdgeMap::candidates(int least_apart, double least_score, int mo
 
 bool FieldRectangle::is_whole() const { return found() == 0; }
 
-int FieldRectangle::found() const {
-  return static_cast<int>(std::ranges::count(sides, false, &FieldSide::is_open));
-}
+int FieldRectangle::found() const { return static_cast<int>(std::ranges::count(sides, false, &FieldSide::is_open)); }
 
 cv::Rect FieldRectangle::rect() const {
   return {sides[0].at, sides[2].at, sides[1].at - sides[0].at, sides[3].at - sides[2].at};

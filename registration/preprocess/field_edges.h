@@ -16,6 +16,7 @@ struct UprightXray {
   cv::Mat intensity;       // in units of the brightest; of line integrals of unknown scale exp(-value), so scaled that
                            // the image's range is that of a usual image
   cv::Mat valid;           // 0: beyond the receptor
+  bool has_scale = true;   // false: of line integrals of unknown scale
   double mm = 1.0;         // edge of a pixel at the isocenter
   cv::Matx23d from_image;  // of (column, row) of the X-ray
 

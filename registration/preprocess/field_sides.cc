@@ -15,9 +15,8 @@ constexpr double kWindowMm = 8.0;  // across it, to either side
 constexpr double kWeightMm = 4.0;  // sigma of the weights in the window: what is near the edge tells its place
 constexpr double kPlacesMm = 3.5;  // the edge lies so near to where it is looked for
 constexpr double kPlaceStepMm = 0.35;
-constexpr std::array kBlurMm = {0.3, 0.6, 1.0, 1.5, 2.1};  // sigma of the penumbra
-constexpr double kBestSigmaMm = 0.05;                      // what no edge is measured better than
-constexpr double kMaxSlope = 0.035;                        // 2 degrees
+constexpr double kBestSigmaMm = 0.05;  // what no edge is measured better than
+constexpr double kMaxSlope = 0.035;    // 2 degrees
 constexpr double kSlopeSigma = 0.003;  // what no slope is measured better than: what lies behind an edge may slope
 constexpr double kSameMm = 0.06;       // blocks of one edge differ by so much
 constexpr double kFarMm = 0.4;         // and hardly by more
@@ -119,28 +118,24 @@ BlurFit fit_with(const std::vector<Block>& blocks, int count, double pixel_mm, d
   return fit;
 }
 
-SideSightings sightings_at(const UprightXray& xray, int near, int sign, int first, int end) {
+SideSightings sightings_at(const UprightXray& xray, int near, int sign, int first, int end, double penumbra_mm) {
   const int reach = static_cast<int>(std::lround(kWindowMm / xray.mm));
   const int from = std::max(0, near - reach), count = std::min(xray.intensity.cols, near + reach) - from;
   if (count < reach) return {};
   const std::vector<Block> blocks = blocks_of(xray, from, count, first, end);
-  BlurFit best{.seen = {}, .left = 1e30};
-  for (const double blur_mm : kBlurMm) {
-    BlurFit fit = fit_with(blocks, count, xray.mm, (near - from) * xray.mm, blur_mm, sign);
-    if (fit.left < best.left) best = std::move(fit);
-  }
+  BlurFit best = fit_with(blocks, count, xray.mm, (near - from) * xray.mm, penumbra_mm, sign);
   for (Sighting& sighting : best.seen) sighting.at += from;
-  return {.seen = std::move(best.seen), .blocks = static_cast<int>(blocks.size())};
+  return {.seen = std::move(best.seen), .blocks = static_cast<int>(blocks.size()), .misfit = best.left};
 }
 
 }  // namespace
 
-SideSightings sightings_of_side(const UprightXray& xray, int near, int sign, int first, int end) {
+SideSightings sightings_of_side(const UprightXray& xray, int near, int sign, int first, int end, double penumbra_mm) {
   // The logarithm falls most outside of where half the beam arrives: by 1 mm, or by more where the penumbra is wide.
   SideSightings best;
   for (const double inward_mm : {1.0, 3.0, 4.5}) {
-    SideSightings other =
-        sightings_at(xray, near + sign * static_cast<int>(std::lround(inward_mm / xray.mm)), sign, first, end);
+    SideSightings other = sightings_at(xray, near + sign * static_cast<int>(std::lround(inward_mm / xray.mm)), sign,
+                                       first, end, penumbra_mm);
     if (other.seen.size() > best.seen.size() || best.blocks == 0) best = std::move(other);
     if (4 * best.seen.size() >= 3 * static_cast<std::size_t>(best.blocks)) break;
   }

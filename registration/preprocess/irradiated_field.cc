@@ -34,9 +34,11 @@ struct Side {
   SideLine line;
   double brightness_beyond = -10.0;
   double seen = 0.0;  // share of its blocks
+  // Without the scale of the intensity, half of it is not where half the beam arrives.
+  double least_seen = 0.5, max_scatter_mm = kMaxScatterMm;
 
   bool is_open() const { return edge.is_open; }
-  bool is_straight() const { return seen > 0.5 && line.scatter_mm <= kMaxScatterMm; }
+  bool is_straight() const { return seen > least_seen && line.scatter_mm <= max_scatter_mm; }
   bool is_clear() const { return edge.evidence >= kClear && is_straight(); }
 };
 
@@ -50,24 +52,45 @@ struct Upright {
   const UprightXray& of(std::size_t side) const { return side < 2 ? xray : transposed; }
 };
 
+// All sides seen with the penumbra that fits them best.
+std::array<SideSightings, 4> sightings_of(const Upright& upright, const FieldRectangle& rectangle) {
+  const int corner = static_cast<int>(std::lround(4.0 / upright.xray.mm));
+  std::array<SideSightings, 4> best;
+  double least = 1e30;
+  for (const double penumbra_mm : kPenumbraSigmasMm) {
+    std::array<SideSightings, 4> all;
+    double misfit = 0.0;
+    for (std::size_t n = 0; n < 4; ++n) {
+      if (rectangle.sides[n].is_open) continue;
+      const std::size_t across = n < 2 ? 2 : 0;
+      const FieldSide &before = rectangle.sides[across], &after = rectangle.sides[across + 1];
+      all[n] = sightings_of_side(upright.of(n), rectangle.sides[n].at, n % 2 == 0 ? 1 : -1,
+                                 before.at + (before.is_open ? 0 : corner), after.at - (after.is_open ? 0 : corner),
+                                 penumbra_mm);
+      misfit += all[n].misfit;
+    }
+    if (misfit >= least) continue;
+    least = misfit;
+    best = std::move(all);
+  }
+  return best;
+}
+
 // The four sides measured: each by itself, then all with the turn that they share.
 Sides measured(const Upright& upright, const FieldRectangle& rectangle) {
   Sides sides;
   const double mm = upright.xray.mm;
-  const int corner = static_cast<int>(std::lround(4.0 / mm));
-  std::array<SideSightings, 4> sightings;
+  const std::array<SideSightings, 4> sightings = sightings_of(upright, rectangle);
   double turn = 0.0, weights = 1.0 / (kTurnSigma * kTurnSigma);
   for (std::size_t n = 0; n < 4; ++n) {
     Side& side = sides[n];
     side.edge = rectangle.sides[n];
     side.line.at = side.edge.at;
+    if (!upright.xray.has_scale) side.least_seen = 0.3, side.max_scatter_mm = 2.0 * kMaxScatterMm;
     if (side.is_open()) continue;
     const std::size_t across = n < 2 ? 2 : 0;
-    const FieldSide &before = rectangle.sides[across], &after = rectangle.sides[across + 1];
-    const int first = before.at + (before.is_open ? 0 : corner), end = after.at - (after.is_open ? 0 : corner);
-    const int sign = n % 2 == 0 ? 1 : -1;
-    sightings[n] = sightings_of_side(upright.of(n), side.edge.at, sign, first, end);
-    side.brightness_beyond = brightness_beyond(upright.of(n), side.edge.at, sign, first, end);
+    const int first = rectangle.sides[across].at, end = rectangle.sides[across + 1].at;
+    side.brightness_beyond = brightness_beyond(upright.of(n), side.edge.at, n % 2 == 0 ? 1 : -1, first, end);
     side.line.middle = 0.5 * (first + end);
     side.seen = static_cast<double>(sightings[n].seen.size()) / std::max(1, sightings[n].blocks);
     if (sightings[n].seen.empty()) {
