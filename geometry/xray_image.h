@@ -1,12 +1,21 @@
 #pragma once
 // An X-ray image as registration sees it: a camera and pixel values of known meaning.
 
+#include <Eigen/Core>
+#include <optional>
 #include <string>
+#include <vector>
 
 #include "geometry/image.h"
 #include "geometry/xray_view.h"
 
 namespace isoshift {
+
+// Where jaws and leaves leave the treatment beam open, as a file says it: a rectangle along the collimator's axes.
+struct DeclaredAperture {
+  std::vector<Eigen::Vector2d> corners_px;  // on the image, one after the other; may lie beyond its rim
+  bool is_of_exposure = true;               // false: the X-ray need not have been taken through it (kV, a plan's beam)
+};
 
 struct XrayImage {
   enum class Meaning {
@@ -19,6 +28,7 @@ struct XrayImage {
   Image<float> values;
   Meaning meaning = Meaning::kIntensity;
   double collimator_angle_rad = 0.0;  // how the field's edges are turned in the image, counter-clockwise as displayed
+  std::optional<DeclaredAperture> declared_aperture;
 };
 
 }  // namespace isoshift

@@ -48,6 +48,7 @@ void report_views(const RendererPyramid& renderers, const FixedViews& views, con
                             .similarity_start = similarity[0][view],
                             .similarity_final = similarity[1][view],
                             .has_all_excluded = level[view].has_all_excluded,
+                            .field = level[view].irradiated,
                             .consistency = std::move(consistency[view])});
   }
 }

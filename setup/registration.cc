@@ -13,6 +13,16 @@ int ViewConsistency::disagreeing() const {
   return static_cast<int>(std::ranges::count_if(parts, &ViewPart::disagrees));
 }
 
+const char* to_string(IrradiatedField::Origin origin) {
+  switch (origin) {
+    case IrradiatedField::Origin::kWholeReceptor: return "whole receptor";
+    case IrradiatedField::Origin::kFound: return "found";
+    case IrradiatedField::Origin::kDeclared: return "declared";
+    case IrradiatedField::Origin::kDrawn: return "drawn";
+  }
+  return "";
+}
+
 void Registration::demote(Verdict to, std::string reason) {
   verdict = std::max(verdict, to);
   reasons.push_back(std::move(reason));

@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "setup/irradiated_field.h"
 #include "setup/verdict.h"
 
 namespace isoshift {
@@ -40,6 +41,7 @@ struct ViewMatch {
   double similarity_start = -1.0;
   double similarity_final = -1.0;
   bool has_all_excluded = true;  // false: what should be excluded covers nearly all of the view, and was compared
+  IrradiatedField field;         // in which it was compared
   ViewConsistency consistency;   // of its parts with the pose found
   std::optional<LeftOutView> left_out;  // with three or more views
   // With two or more views: how far this view alone would want the anatomy from where all views put it, as root mean

@@ -15,6 +15,7 @@
 namespace isoshift {
 namespace {
 
+constexpr double kOpenMm = 500.0;          // beyond any receptor, at the isocenter
 constexpr double kMaxReadOutNoise = 0.01;  // degrees or mm, between exposures of one image
 
 // The items of the Exposure Sequence that speak of one frame: of several frames those that name it.
@@ -89,10 +90,26 @@ std::optional<double> frame_offset_s(const DicomItem& d, int frame) {
   return increment_ms && *increment_ms > 0.0 ? std::optional(frame * *increment_ms / 1000.0) : std::nullopt;
 }
 
+// Jaws of several exposures of one image: the largest opening was irradiated.
+JawOpenings jaws_of(const std::vector<DicomItem>& exposures) {
+  JawOpenings all;
+  const auto widen = [](std::optional<JawOpening>& wide, const std::optional<JawOpening>& by) {
+    if (by) wide = wide ? JawOpening{std::min(wide->from_mm, by->from_mm), std::max(wide->to_mm, by->to_mm)} : *by;
+  };
+  for (const DicomItem& exposure : exposures) {
+    JawOpenings of_one;
+    for (const DicomItem& device : exposure.items(DCM_BeamLimitingDeviceSequence)) add_jaws(device, of_one);
+    widen(all.x, of_one.x);
+    widen(all.y, of_one.y);
+  }
+  return all;
+}
+
 RtImage read_frame(const std::filesystem::path& path, const DicomItem& d, const PixelFormat& format, int frame,
                    std::vector<DicomItem> exposures) {
-  const FrameAttributes attributes(d, std::move(exposures));
   RtImage image;
+  image.jaws = jaws_of(exposures);
+  const FrameAttributes attributes(d, std::move(exposures));
   image.path = path;
   image.identity = read_identity(d);
   image.sop_class_uid = d.required_text(DCM_SOPClassUID);
@@ -189,6 +206,25 @@ std::vector<RtImage> read_rt_images(const DicomFile& file, Notes& notes) {
   return images;
 }
 
+std::optional<DeclaredAperture> declared_aperture(const RtImage& image, const JawOpenings& jaws, const XrayView& view) {
+  if (image.pixel_from_room || !image.gantry_angle_deg || (!jaws.x && !jaws.y)) return std::nullopt;
+  // Axes on which nothing is said are open beyond any receptor.
+  const JawOpening x = jaws.x.value_or(JawOpening{-kOpenMm, kOpenMm}),
+                   y = jaws.y.value_or(JawOpening{-kOpenMm, kOpenMm});
+  const Eigen::Isometry3d fixed_from_collimator(
+      Eigen::AngleAxisd(rad_from_deg(*image.gantry_angle_deg), Eigen::Vector3d::UnitY()) *
+      Eigen::AngleAxisd(rad_from_deg(image.collimator_angle_deg.value_or(0.0)), Eigen::Vector3d::UnitZ()));
+  // Jaws are those of the treatment beam: an X-ray of the kV imager may name them, and does not pass them.
+  DeclaredAperture aperture{.corners_px = {}, .is_of_exposure = view.beam == Beam::kMegavoltage};
+  for (const auto& [at_x, at_y] :
+       {std::pair{x.from_mm, y.from_mm}, {x.to_mm, y.from_mm}, {x.to_mm, y.to_mm}, {x.from_mm, y.to_mm}}) {
+    const auto corner_px = view.project(fixed_from_collimator * Eigen::Vector3d(at_x, at_y, 0.0));
+    if (!corner_px) return std::nullopt;
+    aperture.corners_px.push_back(*corner_px);
+  }
+  return aperture;
+}
+
 XrayImage read_xray_image(const DicomFile& file, const RtImage& image, const XrayView& view) {
   const PixelFormat format = pixel_format(file.dataset());
   const std::vector<std::int32_t> stored_values = decode_frame(file, format, image.frame);
@@ -201,6 +237,7 @@ XrayImage read_xray_image(const DicomFile& file, const RtImage& image, const Xra
   xray.view = view;
   xray.values = Image<float>(format.columns, format.rows);
   xray.collimator_angle_rad = collimator_angle_on_image_rad(image);
+  xray.declared_aperture = declared_aperture(image, image.jaws, view);
   const bool is_linear = image.intensity_relationship == "LIN";
   xray.meaning = is_linear ? XrayImage::Meaning::kIntensity : XrayImage::Meaning::kLineIntegral;
 

@@ -12,6 +12,7 @@
 #include "geometry/patient_setup.h"
 #include "geometry/xray_image.h"
 #include "io/dicom/identity.h"
+#include "io/dicom/jaws.h"
 #include "io/dicom/notes.h"
 #include "io/dicom/table_read_outs.h"
 
@@ -63,6 +64,7 @@ struct RtImage {
   std::optional<Eigen::Vector2d> pixel_spacing_mm;  // row spacing, column spacing
   std::optional<Eigen::Vector2d> position_mm;
   std::optional<double> gantry_angle_deg, gantry_pitch_angle_deg, collimator_angle_deg;
+  JawOpenings jaws;  // of the exposure
   TableReadOuts table;
   std::optional<Eigen::Vector3d> isocenter_mm;  // IsocenterPosition, in this image's own frame of reference
 
@@ -145,6 +147,9 @@ CarmGeometry carm_geometry(const RtImage& image, Notes& notes);
 
 // The camera: from carm_geometry(), or from the projection matrix.
 XrayView xray_view(const RtImage& image, Beam beam, Notes& notes);
+
+// The aperture of jaws on the image; nothing where the image has a projection matrix instead of angles.
+std::optional<DeclaredAperture> declared_aperture(const RtImage& image, const JawOpenings& jaws, const XrayView& view);
 
 // Turns the pixels of its file, read whole, into intensity or line integrals as the image declares
 // (docs/conventions.md).

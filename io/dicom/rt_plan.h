@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "io/dicom/identity.h"
+#include "io/dicom/jaws.h"
 
 namespace isoshift {
 
@@ -18,6 +19,7 @@ struct RtPlan {
     std::string name;
     std::optional<Eigen::Vector3d> isocenter_patient_mm;  // IsocenterPosition of the first control point
     std::optional<double> support_angle_deg;              // PatientSupportAngle of the first control point
+    JawOpenings jaws;                                     // of the first control point
     // Of the patient setup to which the beam refers. If it refers to none: the position that all setups share, and the
     // largest displacement.
     std::optional<std::string> patient_position;

@@ -164,7 +164,9 @@ double draw_view_tile(Canvas& canvas, double x, double y, double width, const Se
   canvas.image(x, y, width, height, pixels_of(picture, tile));
   canvas.begin_clip(x, y, width, height);
   const double fine = width / 200.0;
-  draw(picture.field, {.color = color::kSkyBlue, .width = fine, .dashed = true});
+  // A field that is not sure stands out.
+  const Rgb field_color = view.match.field.is_sure() ? color::kSkyBlue : color::kVermilion;
+  draw(picture.field, {.color = field_color, .width = fine, .dashed = true});
   const bool is_found = tile == ViewTile::kDrrFound || tile == ViewTile::kOverlayFound;
   if (tile != ViewTile::kXray)
     for (const ViewPicture::Outline& outline : picture.structures)

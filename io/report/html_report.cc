@@ -117,6 +117,7 @@ Json view_data(const SetupResult::View& view, std::size_t number) {
           {"pixels_per_mm", view.picture.pixels_per_mm},
           {"directions", view.picture.directions},
           {"field", polygons_json(view.picture.field)},
+          {"is_field_sure", view.match.field.is_sure()},
           {"structures", structures},
           {"squares", polygons_json(marks.squares)},
           {"ways", polygons_json(marks.ways)}};

@@ -185,6 +185,13 @@ Json unobservable_json(const SetupResult& report) {
   return directions;
 }
 
+Json irradiated_field_json(const IrradiatedField& field) {
+  return {{"origin", to_string(field.origin)},
+          {"corners_px", polygons_json({field.corners_px}).front()},
+          {"sigma_mm", field.sigma_mm},
+          {"doubt", or_null(field.doubt)}};
+}
+
 Json view_json(const SetupResult::View& view) {
   const std::optional<LeftOutView>& left_out = view.match.left_out;
   return {{"label", view.label},
@@ -205,6 +212,7 @@ Json view_json(const SetupResult::View& view) {
           {"left_out_mm", left_out ? Json(left_out->distance_mm) : Json(nullptr)},
           {"left_out_deg", left_out ? Json(deg_from_rad(left_out->angle_rad)) : Json(nullptr)},
           {"contradiction_mm", or_null(view.match.contradiction_mm)},
+          {"irradiated_field", irradiated_field_json(view.match.field)},
           {"parts", parts_json(view)},
           {"picture", picture_json(view.picture)}};
 }

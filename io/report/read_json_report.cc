@@ -50,14 +50,23 @@ ViewPicture picture_from(const Json& json) {
   return picture;
 }
 
+IrradiatedField irradiated_field_from(const Json& json) {
+  IrradiatedField field{.sigma_mm = json.at("sigma_mm"), .doubt = text_from(json.at("doubt"))};
+  for (const IrradiatedField::Origin origin : kFieldOrigins)
+    if (json.at("origin") == to_string(origin)) field.origin = origin;
+  for (const Json& corner : json.at("corners_px")) field.corners_px.push_back(vector_from<2>(corner));
+  return field;
+}
+
 ViewMatch match_from(const Json& json) {
   ViewMatch match{.label = json.at("label"),
                   .similarity_start = or_nan(json.at("similarity_start")),
                   .similarity_final = or_nan(json.at("similarity_final"))};
   if (const auto distance_mm = number_from(json.at("left_out_mm")))
     match.left_out = {.distance_mm = *distance_mm, .angle_rad = rad_from_deg(json.at("left_out_deg"))};
-  if (json.contains("contradiction_mm"))  // not in results before 0.2
-    match.contradiction_mm = number_from(json.at("contradiction_mm"));
+  // Results of before 2026-11-23 do not say.
+  if (json.contains("contradiction_mm")) match.contradiction_mm = number_from(json.at("contradiction_mm"));
+  if (json.contains("irradiated_field")) match.field = irradiated_field_from(json.at("irradiated_field"));
   for (const Json& part : json.at("parts"))
     match.consistency.parts.push_back({.center_px = vector_from<2>(part.at("center_px")),
                                        .width_px = part.at("width_px"),
@@ -138,7 +147,8 @@ std::optional<SiteRules> site_from(const Json& json) {
       .anatomy = json.at("anatomy"),
       .couch_dof = one_of(couch_dof_from(json.at("couch_degrees_of_freedom")), "site: couch_degrees_of_freedom"),
       .length_unit = json.at("length_unit") == "cm" ? LengthUnit::kCm : LengthUnit::kMm};
-  if (json.contains("target")) site.target = text_from(json.at("target"));  // not in results before 0.2
+  // Results of before 2026-11-23 do not say.
+  if (json.contains("target")) site.target = text_from(json.at("target"));
   if (const Json& level = json.at("action_level"); !level.is_null())
     site.level = {.translation_mm = number_from(level.at("translation_mm")),
                   .vector_mm = number_from(level.at("vector_mm")),
@@ -195,7 +205,8 @@ SetupResult report_from(const Json& json) {
   if (!table.at("position_mm").is_null()) report.table_position_mm = vector_from<3>(table.at("position_mm"));
   for (const Json& point : json.at("points"))
     report.points.push_back({.name = point.at("name"), .room_mm = vector_from<3>(point.at("room_mm"))});
-  if (json.contains("target")) report.target = target_from(json.at("target"));  // not in results before 0.2
+  // Results of before 2026-11-23 do not say.
+  if (json.contains("target")) report.target = target_from(json.at("target"));
   const Json& error = json.at("setup_error");
   report.setup_error.translation() = vector_from<3>(error.at("known_translation_mm"));
   for (std::size_t row = 0; row < 3; ++row)

@@ -328,6 +328,21 @@ ReportPage::Section search_section(const SetupResult& report) {
   return section;
 }
 
+// The field's size, as the lengths of two sides at the isocenter.
+std::string field_words(const SetupResult::View& view) {
+  const IrradiatedField& field = view.match.field;
+  std::string words = field.origin == IrradiatedField::Origin::kWholeReceptor ? "the whole receptor"
+                      : field.origin == IrradiatedField::Origin::kFound       ? "found in the image"
+                      : field.origin == IrradiatedField::Origin::kDeclared ? "declared by the file, seen in the image"
+                                                                           : "drawn by hand";
+  if (field.corners_px.size() == 4 && field.origin != IrradiatedField::Origin::kWholeReceptor)
+    words += fmt::format(": {:.1f} x {:.1f} mm at the isocenter",
+                         view.pixel_mm * (field.corners_px[1] - field.corners_px[0]).norm(),
+                         view.pixel_mm * (field.corners_px[2] - field.corners_px[1]).norm());
+  if (field.sigma_mm > 0.0 && field.sigma_mm < 100.0) words += fmt::format(", +/- {:.1f} mm", 2.0 * field.sigma_mm);
+  return field.is_sure() ? words : words + "; not sure: " + printable(field.doubt);
+}
+
 ReportPage::Section checks_section(const SetupResult& report) {
   ReportPage::Section section{.title = "Checks"};
   for (const SetupResult::View& view : report.views) {
@@ -341,6 +356,8 @@ ReportPage::Section checks_section(const SetupResult& report) {
     if (const auto& contradiction_mm = view.match.contradiction_mm)
       words += fmt::format("; alone it would want the anatomy {:.2f} mm elsewhere", *contradiction_mm);
     section.rows.push_back({printable(view.label), words});
+    if (!view.match.field.corners_px.empty())
+      section.rows.push_back({"Field of " + printable(view.label), field_words(view)});
   }
   for (const Alternative& alternative : report.alternatives)
     section.rows.push_back(

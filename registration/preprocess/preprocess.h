@@ -9,6 +9,7 @@
 
 #include "geometry/image.h"
 #include "geometry/xray_image.h"
+#include "setup/irradiated_field.h"
 
 namespace isoshift {
 
@@ -18,17 +19,13 @@ double pixels_per_mm(const XrayView& view);
 // Line integrals -ln(I / I_max) of an intensity image, or the values of an image that holds line integrals already.
 Image<float> line_integrals(const XrayImage& xray);
 
-// Where the receptor was irradiated: 1 inside the field, 0 behind the collimator and at the panel's rim. The field is a
-// rectangle around the isocenter, parallel to the image or turned by the collimator angle. Each side is looked for as a
-// straight edge beyond which the intensity is less by a factor of 2.5; a side without such an edge reaches to the rim.
-Image<std::uint8_t> irradiated_field(const XrayImage& xray, const Image<float>& line_integral);
-
 // One level of the pyramid: blocks of factor x factor pixels averaged over the field, and the blocks that lie wholly in
 // it. What the receptor or a display window has cut off is not in the field.
 struct FixedImage {
   XrayView view;
   Image<float> line_integral;
-  Image<std::uint8_t> field;
+  Image<std::uint8_t> field;  // 1 where pixels can be compared: off the sides of the irradiated field and off the rim
+  IrradiatedField irradiated;
   std::string label;             // of the X-ray; may be empty
   int reduced_by = 1;            // pixels of the X-ray along the edge of a pixel
   bool has_all_excluded = true;  // false: what is excluded would have left next to nothing, and is still in the field
@@ -44,7 +41,8 @@ struct PixelRectangle {
   int first_column = 0, first_row = 0, last_column = 0, last_row = 0;
 };
 
-// Takes out of the field what lies outside the rectangle.
+// Takes out of the field, at full resolution, what lies outside a rectangle drawn by a person. A field that is not sure
+// does not count: all of the receptor inside the rectangle is compared.
 void restrict_to(const PixelRectangle& rectangle, FixedImage& image);
 
 // The whole way for one X-ray, at full resolution. Throws Error for a blank one.

@@ -69,6 +69,8 @@ void judge_views(bool is_volume_chosen, RegistrationResult& result) {
     if (view.left_out && (view.left_out->distance_mm > kMaxSpreadMm || view.left_out->angle_rad > kMaxSpreadRad))
       review(result, fmt::format("without {} the pose lies {:.1f} mm and {:.1f} degrees away", name,
                                  view.left_out->distance_mm, deg_from_rad(view.left_out->angle_rad)));
+    if (!view.field.is_sure())
+      review(result, fmt::format("the irradiated field of {} is not sure: {}", name, view.field.doubt));
     if (!view.has_all_excluded)
       review(result,
              fmt::format("what is excluded covers nearly all that {} shows, and was compared nevertheless", name));

@@ -90,6 +90,11 @@ TEST(Quality, AnExclusionThatCannotBeKeptNeedsReview) {
                 "what is excluded covers nearly all that view 1 shows");
 }
 
+TEST(Quality, AFieldThatIsNotSureNeedsReview) {
+  expect_review([](RegistrationResult& r) { r.views[1].field.doubt = "its left edge is faint"; },
+                "the irradiated field of view 2 is not sure: its left edge is faint");
+}
+
 TEST(Quality, AParameterAtItsBoundNeedsReview) {
   constexpr std::array kNames = {"x translation",    "y translation",    "z translation",
                                  "rotation about x", "rotation about y", "rotation about z"};

@@ -79,8 +79,12 @@ SetupResult setup_result_of(const Study& study, std::span<const FixedImage> imag
   Renderer& renderer = setup.renderers().finest();
   const RegistrationOptions& registration = setup.options();
   const std::vector<MarkedStructure> structures = marked_structures(study, request.region);
+  std::vector<FixedImage> compared(images.begin(), images.end());
+  for (FixedImage& image : compared)
+    if (const auto drawn = registration.rectangles.find(image.label); drawn != registration.rectangles.end())
+      restrict_to(drawn->second, image);
   std::vector<ViewPicture> pictures =
-      view_pictures(study, images, renderer, structures, found.actual_room_from_patient);
+      view_pictures(study, compared, renderer, structures, found.actual_room_from_patient);
   SetupResult result;
   static_cast<Registration&>(result) = std::move(found);
   result.made_on = local_time();

@@ -1,0 +1,158 @@
+#include "registration/preprocess/irradiated_field.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "geometry/rotation.h"
+#include "registration/preprocess/preprocess.h"
+#include "tests/support/collimated_xray.h"
+
+namespace isoshift {
+namespace {
+
+using Origin = IrradiatedField::Origin;
+using testing::HasSubstr;
+
+IrradiatedField field_of(const XrayImage& xray) { return find_irradiated_field(xray, pixels_per_mm(xray.view)); }
+
+// A pixel of `xray` for a point of the isocenter plane, mm to the right and up as displayed.
+Eigen::Vector2d pixel_at(const XrayImage& xray, double x_mm, double y_mm) {
+  const double scale = pixels_per_mm(xray.view);
+  return {0.5 * (xray.view.columns - 1) + scale * x_mm, 0.5 * (xray.view.rows - 1) - scale * y_mm};
+}
+
+DeclaredAperture aperture(const XrayImage& xray, const Eigen::Vector2d& lower_mm, const Eigen::Vector2d& upper_mm) {
+  return {.corners_px = {pixel_at(xray, lower_mm.x(), lower_mm.y()), pixel_at(xray, upper_mm.x(), lower_mm.y()),
+                         pixel_at(xray, upper_mm.x(), upper_mm.y()), pixel_at(xray, lower_mm.x(), upper_mm.y())}};
+}
+
+// The acceptance: fields of 4 to 20 cm over bone, air and metal, with leakage of 0 to 2 %, within 1 mm. Other seeds
+// than those that the program was tuned on (1 to 500): of these 495 were within 1 mm, and 2 that were not were sure.
+TEST(IrradiatedField, AHundredFieldsAreFoundWithinAMillimeter) {
+  int within = 0, wrong_and_sure = 0, not_sure = 0;
+  double largest_mm = 0.0;
+  for (std::uint64_t seed = 1001; seed <= 1100; ++seed) {
+    const CollimatedXray scene = random_collimated_xray(seed);
+    const XrayImage xray = xray_of(scene);
+    const IrradiatedField field = field_of(xray);
+    const double error_mm = field_error_mm(scene, xray.view, field.corners_px);
+    largest_mm = std::max(largest_mm, error_mm);
+    within += error_mm <= 1.0;
+    not_sure += !field.is_sure();
+    if (field.is_sure() && error_mm > 1.0) ++wrong_and_sure;
+    if (error_mm > 1.0 || !field.is_sure())
+      std::cout << "seed " << seed << ": " << error_mm << " mm; " << field.doubt << '\n';
+  }
+  std::cout << within << " of 100 within 1 mm, the worst " << largest_mm << " mm; not sure: " << not_sure << '\n';
+  EXPECT_GE(within, 98);
+  EXPECT_LE(largest_mm, 1.5);
+  EXPECT_EQ(wrong_and_sure, 0);
+  EXPECT_LE(not_sure, 8);
+}
+
+// The outline of a patient, rods and a couch are no collimator.
+TEST(IrradiatedField, AnOpenFieldIsTheWholeReceptor) {
+  for (std::uint64_t seed = 1101; seed <= 1140; ++seed) {
+    const CollimatedXray scene = opened(random_collimated_xray(seed));
+    const IrradiatedField field = field_of(xray_of(scene));
+    EXPECT_EQ(field.origin, Origin::kWholeReceptor) << "seed " << seed;
+    EXPECT_TRUE(field.is_sure()) << "seed " << seed << ": " << field.doubt;
+    ASSERT_EQ(field.corners_px.size(), 4U);
+    for (const Eigen::Vector2d& corner : field.corners_px)
+      for (int axis = 0; axis < 2; ++axis) EXPECT_NEAR(std::abs(corner[axis] - 255.5), 256.0, 1e-6) << "seed " << seed;
+  }
+}
+
+TEST(IrradiatedField, ABallInASmallFieldDoesNotHideIt) {
+  CollimatedXray scene{.body = CollimatedXray::Body::kBall, .lower_mm = {-10, -10}, .upper_mm = {10, 10}};
+  const XrayImage xray = xray_of(scene);
+  const IrradiatedField field = field_of(xray);
+  EXPECT_TRUE(field.is_sure()) << field.doubt;
+  EXPECT_LT(field_error_mm(scene, xray.view, field.corners_px), 0.5);
+  EXPECT_EQ(field_of(xray_of(opened(scene))).origin, Origin::kWholeReceptor);
+}
+
+// Jaws behind leaves: the leakage of the leaves ends where the jaws begin.
+TEST(IrradiatedField, LeavesInsideOfJawsAreTheField) {
+  CollimatedXray leaves{
+      .body = CollimatedXray::Body::kThorax, .lower_mm = {-40, -30}, .upper_mm = {30, 50}, .scatter = 0.02};
+  CollimatedXray jaws = leaves;
+  jaws.lower_mm = {-80, -75};
+  jaws.upper_mm = {70, 90};
+  jaws.leakage = 0.0;
+  XrayImage xray = xray_of(leaves);
+  const XrayImage behind = xray_of(jaws);
+  const double brightest = *std::ranges::max_element(behind.values.pixels);
+  for (std::size_t n = 0; n < xray.values.pixels.size(); ++n)
+    xray.values.pixels[n] *=
+        static_cast<float>(0.02 + 0.98 * std::min(1.0, 50.0 * behind.values.pixels[n] / brightest));
+  const IrradiatedField field = field_of(xray);
+  EXPECT_TRUE(field.is_sure()) << field.doubt;
+  EXPECT_LT(field_error_mm(leaves, xray.view, field.corners_px), 1.0);
+}
+
+// A side of which a third is seen: the rest lies behind something that lets nothing through.
+TEST(IrradiatedField, AFaintSideIsNotSure) {
+  CollimatedXray scene{.body = CollimatedXray::Body::kNone, .leakage = 0.0, .scatter = 0.1};
+  XrayImage xray = xray_of(scene);
+  for (int row = 140; row < 320; ++row)
+    for (int column = 300; column < 512; ++column) xray.values.at(column, row) = 2500.0F;  // scatter alone
+  const IrradiatedField field = field_of(xray);
+  EXPECT_FALSE(field.is_sure());
+  // A person's rectangle is the last word.
+  FixedImage image = prepare(xray);
+  EXPECT_FALSE(image.irradiated.is_sure());
+  restrict_to({.first_column = 150, .first_row = 150, .last_column = 360, .last_row = 360}, image);
+  EXPECT_TRUE(image.irradiated.is_sure());
+  EXPECT_EQ(image.irradiated.origin, Origin::kDrawn);
+  EXPECT_EQ(image.field.at(150, 150), 1);
+  EXPECT_EQ(image.field.at(149, 150), 0);
+  EXPECT_EQ(image.field.at(360, 360), 1);
+}
+
+TEST(IrradiatedField, DeclaredJawsThatTheImageShowsAreSure) {
+  const CollimatedXray scene{.body = CollimatedXray::Body::kSkull, .lower_mm = {-50, -40}, .upper_mm = {60, 70}};
+  XrayImage xray = xray_of(scene);
+  xray.declared_aperture = aperture(xray, {-51, -40}, {60, 71});  // jaws are no better than that
+  const IrradiatedField field = field_of(xray);
+  EXPECT_EQ(field.origin, Origin::kDeclared);
+  EXPECT_TRUE(field.is_sure()) << field.doubt;
+  EXPECT_LT(field_error_mm(scene, xray.view, field.corners_px), 1.0);
+}
+
+TEST(IrradiatedField, DeclaredJawsThatTheImageContradictsAreNotSure) {
+  const CollimatedXray scene{.body = CollimatedXray::Body::kSkull, .lower_mm = {-70, -70}, .upper_mm = {70, 70}};
+  for (CollimatedXray other : {scene, opened(scene)}) {
+    XrayImage xray = xray_of(other);
+    xray.declared_aperture = aperture(xray, {-30, -30}, {30, 30});
+    EXPECT_THAT(field_of(xray).doubt, HasSubstr("the file declares a smaller aperture than the image shows"));
+    // The planned beam's jaws, or those of an imager that has none, are a hint at most.
+    xray.declared_aperture->is_of_exposure = false;
+    EXPECT_TRUE(field_of(xray).is_sure());
+  }
+}
+
+TEST(IrradiatedField, DeclaredJawsBeyondTheReceptorLeaveItOpen) {
+  XrayImage xray = xray_of(opened({.body = CollimatedXray::Body::kSkull}));
+  xray.declared_aperture = aperture(xray, {-200, -200}, {200, 200});
+  const IrradiatedField field = field_of(xray);
+  EXPECT_EQ(field.origin, Origin::kWholeReceptor);
+  EXPECT_TRUE(field.is_sure()) << field.doubt;
+}
+
+// A display's units: values that grow with the attenuation, of unknown scale and offset.
+TEST(IrradiatedField, DisplayedImagesShowTheirFieldToo) {
+  const CollimatedXray scene{.body = CollimatedXray::Body::kSkull, .lower_mm = {-50, -40}, .upper_mm = {60, 70}};
+  XrayImage xray = xray_of(scene);
+  xray.meaning = XrayImage::Meaning::kLineIntegral;
+  for (float& value : xray.values.pixels) value = 4000.0F - 300.0F * std::log(std::max(value, 4.0F));
+  const IrradiatedField field = field_of(xray);
+  EXPECT_TRUE(field.is_sure()) << field.doubt;
+  EXPECT_LT(field_error_mm(scene, xray.view, field.corners_px), 1.0);
+}
+
+}  // namespace
+}  // namespace isoshift
