@@ -16,7 +16,7 @@ namespace isoshift {
 struct Body {
   enum class Kind { kBone, kVertebra, kRib, kCouch };
   Kind kind = Kind::kBone;
-  std::string name;  // empty if it is not sure
+  std::string name;                                             // empty if it is not sure
   Eigen::Vector3d center_patient_mm = Eigen::Vector3d::Zero();  // of a vertebra its body's, else the mean of its voxels
   double volume_mm3 = 0.0;
   Eigen::AlignedBox3d box_patient_mm;  // of its voxels

@@ -78,8 +78,7 @@ PatientAndCouch patient_and_couch(const Volume<float>& hu) {
                          Volume<std::uint8_t>(hu.size, hu.patient_from_voxel)};
   Volume<std::uint8_t> dense(hu.size, hu.patient_from_voxel);
   std::ranges::transform(hu.voxels, dense.voxels.begin(), [](float value) { return value > kDenseHu ? 1 : 0; });
-  const auto parts =
-      connected_parts(dense, static_cast<std::size_t>(kLeastMm3 / std::pow(hu.spacing_mm().x(), 3.0)));
+  const auto parts = connected_parts(dense, static_cast<std::size_t>(kLeastMm3 / std::pow(hu.spacing_mm().x(), 3.0)));
   for (std::size_t n = 0; n < parts.size(); ++n) {
     Eigen::AlignedBox3d box;
     for (const std::uint32_t voxel : parts[n]) box.extend(voxel_of(hu.size, voxel).cast<double>());
@@ -91,7 +90,8 @@ PatientAndCouch patient_and_couch(const Volume<float>& hu) {
   return result;
 }
 
-void remove_contrast_agent(Volume<std::uint8_t>& bone, const Volume<float>& hu, const std::vector<Vertebra>& vertebrae) {
+void remove_contrast_agent(Volume<std::uint8_t>& bone, const Volume<float>& hu,
+                           const std::vector<Vertebra>& vertebrae) {
   constexpr float kCoreMm = 5.0F, kSurelyMm = 4.0F, kGrownMm = 8.0F;
   constexpr double kRimToCore = 1.05, kSurelyHu = 350.0, kNoBrighter = 1.25;
   constexpr std::size_t kLeastCore = 40, kLeastVertebrae = 4;

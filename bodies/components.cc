@@ -77,8 +77,7 @@ std::vector<VoxelSet> parts_between_necks(const Volume<float>& depth_mm, double 
         mine = other;
       } else if (mine != other) {
         if (peaks[other] > peaks[mine]) std::swap(mine, other);  // the deeper part goes on
-        const bool is_neck =
-            peaks[other] - depth > static_cast<float>(neck_mm) && depth <= kNeckShare * peaks[other];
+        const bool is_neck = peaks[other] - depth > static_cast<float>(neck_mm) && depth <= kNeckShare * peaks[other];
         if (!is_neck) groups.join(mine, other);
       }
     });

@@ -77,27 +77,30 @@ class Finder {
     }
   }
 
-  // Thin bones beside the spine, all of a side together: there are too many of them, and each shows too little, to be
-  // bodies of their own.
-  bool is_rib(const VoxelSet& voxels, const Volume<float>& depth_mm, const std::vector<Vertebra>& vertebrae,
-              bool& is_left) const {
-    if (vertebrae.size() < 4) return false;
+  // The vertebra at the level of a point.
+  static const Vertebra& level_of(const Eigen::Vector3d& at_mm, const std::vector<Vertebra>& vertebrae) {
+    return *std::ranges::min_element(vertebrae, {},
+                                     [&](const Vertebra& v) { return std::abs(v.center_patient_mm.z() - at_mm.z()); });
+  }
+
+  // Thin bones beside the spine, from 60 mm below the lowest vertebra to the highest: ribs, and shoulder blades.
+  bool is_rib(const VoxelSet& voxels, const Volume<float>& depth_mm, const std::vector<Vertebra>& vertebrae) const {
+    constexpr std::size_t kLeastVertebrae = 4;
     constexpr float kThickMm = 9.0F;
-    double left = 0.0;
+    constexpr double kAsideMm = 25.0, kBelowMm = 60.0;
+    if (vertebrae.size() < kLeastVertebrae) return false;
+    double aside = 0.0;
     float deepest = 0.0F;
     std::size_t among = 0;
     for (const std::uint32_t n : voxels) {
       const Eigen::Vector3d at = patient_mm(n);
       deepest = std::max(deepest, depth_mm.voxels[n]);
-      const auto nearest = std::ranges::min_element(
-          vertebrae, {}, [&](const Vertebra& v) { return std::abs(v.center_patient_mm.z() - at.z()); });
-      left += (at.x() - nearest->center_patient_mm.x()) / static_cast<double>(voxels.size());
-      if (at.z() > vertebrae.front().center_patient_mm.z() - 60.0 && at.z() < vertebrae.back().center_patient_mm.z())
-        ++among;
+      aside += std::abs(at.x() - level_of(at, vertebrae).center_patient_mm.x()) / static_cast<double>(voxels.size());
+      const bool is_among = at.z() > vertebrae.front().center_patient_mm.z() - kBelowMm &&
+                            at.z() < vertebrae.back().center_patient_mm.z();
+      among += is_among ? 1 : 0;
     }
-    constexpr double kAsideMm = 25.0;
-    is_left = left > 0.0;
-    return deepest < kThickMm && std::abs(left) > kAsideMm && 2 * among > voxels.size();
+    return deepest < kThickMm && aside > kAsideMm && 2 * among > voxels.size();
   }
 
   void take_other_bones(const std::vector<Vertebra>& vertebrae) {
@@ -110,12 +113,15 @@ class Finder {
     Volume<float> kept(depth.size, depth.patient_from_voxel);
     for (const VoxelSet& whole : wholes)
       for (const std::uint32_t n : whole) kept.voxels[n] = depth.voxels[n];
+    // All ribs of a side together: there are too many, and each shows too little, for bodies of their own.
     std::array<VoxelSet, 2> ribs;
     for (VoxelSet& part : parts_between_necks(kept, kNeckMm)) {
       if (part.size() < least) continue;
-      bool is_left = false;
-      if (is_rib(part, depth, vertebrae, is_left)) {
-        ribs[is_left ? 1 : 0].insert(ribs[is_left ? 1 : 0].end(), part.begin(), part.end());
+      if (is_rib(part, depth, vertebrae)) {
+        for (const std::uint32_t n : part) {
+          const Eigen::Vector3d at = patient_mm(n);
+          ribs[at.x() > level_of(at, vertebrae).center_patient_mm.x() ? 1 : 0].push_back(n);
+        }
         continue;
       }
       const int bone = next_bone_++;

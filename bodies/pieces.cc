@@ -48,7 +48,8 @@ void move_to_means(const std::vector<Eigen::Vector3f>& points, Clusters& cluster
 // k-means: a center more, where a point lies farthest from all of them, until all points are near enough.
 std::vector<VoxelSet> pieces_of(const VoxelSet& voxels, const Eigen::Vector3i& lattice_size, double edge_mm,
                                 double most_mm) {
-  const auto columns = static_cast<std::uint32_t>(lattice_size.x()), rows = static_cast<std::uint32_t>(lattice_size.y());
+  const auto columns = static_cast<std::uint32_t>(lattice_size.x()),
+             rows = static_cast<std::uint32_t>(lattice_size.y());
   std::vector<Eigen::Vector3f> points(voxels.size());
   std::ranges::transform(voxels, points.begin(), [&](std::uint32_t n) -> Eigen::Vector3f {
     return static_cast<float>(edge_mm) * Eigen::Vector3f(n % columns, n / columns % rows, n / (columns * rows));

@@ -53,7 +53,8 @@ void share_out(std::vector<double>& weights, std::vector<std::uint8_t>& parts) {
     parts[n] = static_cast<std::uint8_t>(255.0 * weights[n] / sum);
     left -= parts[n];
   }
-  parts[static_cast<std::size_t>(std::ranges::max_element(weights) - weights.begin())] += static_cast<std::uint8_t>(left);
+  parts[static_cast<std::size_t>(std::ranges::max_element(weights) - weights.begin())] +=
+      static_cast<std::uint8_t>(left);
 }
 
 // The smallest box that holds what is not 0.
@@ -93,7 +94,8 @@ SoftMasks soft_masks(const BodyMap& map, int block, double transition_mm) {
 
   std::vector<Volume<float>> distances;
   for (const int label : present) distances.push_back(distance_mm(where(labels, label)));
-  std::vector<Volume<std::uint8_t>> weights(present.size(), Volume<std::uint8_t>(labels.size, labels.patient_from_voxel));
+  std::vector<Volume<std::uint8_t>> weights(present.size(),
+                                            Volume<std::uint8_t>(labels.size, labels.patient_from_voxel));
   parallel_for(0, labels.size.z(), [&](int k) {
     std::vector<double> of_body(present.size());
     std::vector<std::uint8_t> parts(present.size());

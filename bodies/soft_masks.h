@@ -10,9 +10,9 @@ namespace isoshift {
 
 // Of one body: weight / 255 in the voxels of a box on the masks' lattice; 0 outside the box.
 struct SoftMask {
-  int body = -1;                                        // index into BodyMap::bodies
-  Eigen::Vector3i first = Eigen::Vector3i::Zero();      // of the box, a voxel of the lattice
-  Volume<std::uint8_t> weight;                          // the box, with its own patient_from_voxel
+  int body = -1;                                    // index into BodyMap::bodies
+  Eigen::Vector3i first = Eigen::Vector3i::Zero();  // of the box, a voxel of the lattice
+  Volume<std::uint8_t> weight;                      // the box, with its own patient_from_voxel
 };
 
 struct SoftMasks {

@@ -40,7 +40,9 @@ Volume<float> bone_in_cells(const Volume<float>& hu, int step) {
 class SliceMeans {
  public:
   SliceMeans(const Volume<float>& values, int k, double cell_mm)
-      : columns_(values.size.x()), rows_(values.size.y()), cell_mm_(cell_mm),
+      : columns_(values.size.x()),
+        rows_(values.size.y()),
+        cell_mm_(cell_mm),
         sums_(static_cast<std::size_t>(columns_ + 1) * (rows_ + 1), 0.0) {
     for (int j = 0; j < rows_; ++j) {
       double row = 0.0;
@@ -137,7 +139,8 @@ std::vector<Eigen::Vector3i> best_path(const Volume<float>& score) {
         for (int n = 0; n < 9; ++n) {
           const int x = i + n % 3 - 1, y = j + n / 3 - 1;
           if (x < 0 || y < 0 || x >= size.x() || y >= size.y()) continue;
-          const float value = best.at(x, y, k - 1) - kCostPerCell * static_cast<float>(std::abs(x - i) + std::abs(y - j));
+          const float value =
+              best.at(x, y, k - 1) - kCostPerCell * static_cast<float>(std::abs(x - i) + std::abs(y - j));
           if (value > most) {
             most = value;
             from.at(i, j, k) = static_cast<std::int8_t>(n);
@@ -148,7 +151,8 @@ std::vector<Eigen::Vector3i> best_path(const Volume<float>& score) {
   const auto end = std::ranges::max_element(best.voxels);
   if (*end <= 0.0F) return {};
   const auto n = static_cast<std::size_t>(end - best.voxels.begin());
-  Eigen::Vector3i at(static_cast<int>(n % size.x()), static_cast<int>(n % slice / size.x()), static_cast<int>(n / slice));
+  Eigen::Vector3i at(static_cast<int>(n % size.x()), static_cast<int>(n % slice / size.x()),
+                     static_cast<int>(n / slice));
   std::vector<Eigen::Vector3i> path = {at};
   for (int step = from.at(at.x(), at.y(), at.z()); step >= 0; step = from.at(at.x(), at.y(), at.z())) {
     at += Eigen::Vector3i(step % 3 - 1, step / 3 - 1, -1);
@@ -181,8 +185,7 @@ std::vector<Eigen::Vector3d> find_spine_line(const Volume<float>& hu, SpineSigns
   });
   std::vector<Eigen::Vector3d> line;
   for (const Eigen::Vector3i& cell : best_path(score))
-    line.emplace_back(hu.patient_from_voxel *
-                      ((cell.cast<double>().array() + 0.5) * step - 0.5).matrix().eval());
+    line.emplace_back(hu.patient_from_voxel * ((cell.cast<double>().array() + 0.5) * step - 0.5).matrix().eval());
   return line;
 }
 

@@ -121,7 +121,6 @@ std::optional<Reach> reach_of(const DiscMean& mean, const Eigen::Vector3d& cente
   return reach;
 }
 
-
 // Where the middle of a vertebral body lies beside the curve, and its radius, mm.
 struct Offset {
   double left = 0.0, back = 0.0, radius = 0.0;
@@ -147,7 +146,6 @@ std::vector<Offset> agreed(const std::vector<Offset>& offsets, int reach) {
   }
   return result;
 }
-
 
 // The row of vertebrae while it grows: edges[n] and edges[n + 1] are those of the vertebra seen[n].
 struct Row {
@@ -229,7 +227,8 @@ class RowFinder {
     const int to = from + direction * spacing;
     // Only the half toward its neighbor: the topmost vertebra's other half may lie within the skull.
     const Offset found = offset_between(from, from + 0.5 * direction * spacing, neighbor);
-    const bool is_alike = found.is_seen && neighbor.is_seen && std::abs(found.radius - neighbor.radius) < 0.3 * neighbor.radius &&
+    const bool is_alike = found.is_seen && neighbor.is_seen &&
+                          std::abs(found.radius - neighbor.radius) < 0.3 * neighbor.radius &&
                           std::hypot(found.left - neighbor.left, found.back - neighbor.back) < 0.5 * neighbor.radius;
     if (!is_alike && !ct_ends) return false;
     const CombTooth edge{.at = to, .lean = kLeans / 2};
@@ -294,8 +293,8 @@ std::vector<Vertebra> vertebrae_along(const Volume<float>& ct_hu, const Volume<f
   const SpineCurve curve = recentered(rough, survey(mean, rough));
   const LeaningProfiles profiles = profiles_along(mean, curve);
   constexpr int kMargin = SpineCurve::kBeyondMm - 12;
-  const std::vector<CombTooth> discs = find_discs(profiles, kMargin, curve.length() - kMargin,
-                                                   expected_spacings(survey(mean, curve), curve.length()));
+  const std::vector<CombTooth> discs =
+      find_discs(profiles, kMargin, curve.length() - kMargin, expected_spacings(survey(mean, curve), curve.length()));
   // Without an arch only what looks like discs tells a spine from any other bone.
   if (discs.size() < 2 || (signs == SpineSigns::kBodyAlone && !discs.front().is_dark)) return {};
   const Row row = RowFinder(mean, curve, profiles[kLeans / 2]).find(discs);
@@ -326,8 +325,7 @@ std::ptrdiff_t with_edges(const std::vector<Vertebra>& vertebrae) {
 
 std::vector<Vertebra> find_vertebrae(const Volume<float>& ct_hu, const Volume<float>& hu_on_patient_axes) {
   constexpr std::ptrdiff_t kSurely = 4, kLeast = 2;
-  std::vector<Vertebra> found =
-      vertebrae_along(ct_hu, hu_on_patient_axes, SpineSigns::kBodyCanalArch);
+  std::vector<Vertebra> found = vertebrae_along(ct_hu, hu_on_patient_axes, SpineSigns::kBodyCanalArch);
   if (with_edges(found) < kSurely) {
     std::vector<Vertebra> others = vertebrae_along(ct_hu, hu_on_patient_axes, SpineSigns::kBodyAlone);
     if (with_edges(others) > with_edges(found)) found = std::move(others);

@@ -4,7 +4,6 @@
 #include <Eigen/Core>
 #include <vector>
 
-
 #include "geometry/volume.h"
 
 namespace isoshift {

@@ -61,7 +61,8 @@ std::vector<DrawnBone> drawn_bones(const RtStructures& structures, const CtSerie
       std::regex::icase);
   std::vector<DrawnBone> result;
   for (const Structure& structure : structures.structures) {
-    const bool is_here = !structure.frame_of_reference_uid || *structure.frame_of_reference_uid == ct.frame_of_reference_uid;
+    const bool is_here =
+        !structure.frame_of_reference_uid || *structure.frame_of_reference_uid == ct.frame_of_reference_uid;
     if (is_here && !structure.contours.empty() && std::regex_match(structure.name, kBone))
       result.push_back({structure.name, mask_of(structure, ct.hu.size, ct.hu.patient_from_voxel)});
   }

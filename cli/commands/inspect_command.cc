@@ -213,13 +213,15 @@ void add_inspect_command(CLI::App& app, Console& console, int&) {
   CLI::App* command = app.add_subcommand(
       "inspect", "Show what files contain, how their geometry is understood, and every missing attribute");
   command->footer(
-      "\nExample:\n  isoshift inspect exported/\n  isoshift inspect RTIMAGE/KV_AP.dcm\n  isoshift inspect exported/ --bodies "
+      "\nExample:\n  isoshift inspect exported/\n  isoshift inspect RTIMAGE/KV_AP.dcm\n  isoshift inspect exported/ "
+      "--bodies "
       "bodies\n  isoshift inspect --devices");
   auto* paths = command->add_option("path", options->paths, "Files or folders")->type_name("PATH");
   command->add_option("--machine", options->machine, "Machine profile to apply to the X-rays before they are shown")
       ->type_name("FILE");
-  auto* bodies = command->add_option("--bodies", options->bodies,
-                                     "Find the rigid bodies that the CT shows, draw and list them in this folder")
+  auto* bodies = command
+                     ->add_option("--bodies", options->bodies,
+                                  "Find the rigid bodies that the CT shows, draw and list them in this folder")
                      ->type_name("FOLDER");
   command->add_flag("--overwrite", options->overwrite, "Replace an earlier output in that folder")->needs(bodies);
   auto* devices = command->add_flag("--devices", options->devices, "List the devices that can render");
