@@ -134,10 +134,11 @@ std::vector<CombTooth> find_discs(const LeaningProfiles& profiles, int first, in
   const bool is_dark = dark_share(straight, dark.teeth) < kThinShare;
   const Dips& dips = is_dark ? thick : thin;
   const std::vector<int>& teeth = is_dark ? dark.teeth : bright.teeth;
-  constexpr double kLeastDipHu = 20.0;  // on average; noise alone makes less
-  double dip_hu = 0.0;
-  for (const int s : teeth) dip_hu += dips.hu[s] / static_cast<double>(teeth.size());
-  if (dip_hu < kLeastDipHu) return {};
+  constexpr float kLeastDipHu = 20.0F;  // of half of them; noise alone makes less, and the end of a bone is one step
+  std::vector<float> dip_hu;
+  for (const int s : teeth) dip_hu.push_back(dips.hu[s]);
+  std::ranges::sort(dip_hu);
+  if (dip_hu.empty() || dip_hu[(dip_hu.size() - 1) / 2] < kLeastDipHu) return {};
   std::vector<CombTooth> result;
   for (const int s : teeth) result.push_back({.at = s, .lean = dips.lean[s], .dip_hu = dips.hu[s], .is_dark = is_dark});
   return result;

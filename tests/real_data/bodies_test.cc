@@ -20,7 +20,8 @@ CtSeries read(const std::filesystem::path& folder) {
 }
 
 // Seen by eye on sagittal and coronal sections through the spine: the middle between the discs, and between the front
-// and back of the vertebral bodies. The patient's back is bent forward at the top and, worn, to the side at the bottom.
+// and back of the vertebral bodies, to about 2 mm. The patient's back is bent forward at the top and, worn, to the side
+// at the bottom.
 TEST(BodiesOfAChest, AreAllItsVertebraeWhereAPersonSeesThem) {
   ISOSHIFT_NEED_REAL_DATA("chest/CT");
   const std::array<Eigen::Vector3d, 17> seen = {{
@@ -40,7 +41,7 @@ TEST(BodiesOfAChest, AreAllItsVertebraeWhereAPersonSeesThem) {
       {-2, 34, -53},
       {-4, 21, -39},
       {-5, 9, -26},
-      {-6, -2, -12},
+      {-6, -3, -10},
   }};
   const BodyMap map = find_bodies(read(real_data() / "chest" / "CT").hu);
   const auto vertebrae = std::ranges::count(map.bodies, Body::Kind::kVertebra, &Body::kind);
@@ -54,9 +55,10 @@ TEST(BodiesOfAChest, HoldNoHeartAndNoAorta) {
   ISOSHIFT_NEED_REAL_DATA("chest/CT");
   const BodyMap map = find_bodies(read(real_data() / "chest" / "CT").hu);
   const Eigen::Affine3d voxel_from_patient = map.labels.patient_from_voxel.inverse();
-  // The ascending and the descending aorta, the left ventricle: bright with contrast agent.
-  for (const Eigen::Vector3d& at : {Eigen::Vector3d(0, -20, -105), Eigen::Vector3d(34, 40, -172),
-                                    Eigen::Vector3d(60, -10, -172), Eigen::Vector3d(0, 6, -163)}) {
+  // The descending aorta, the left atrium, the root of the aorta and the superior vena cava, as seen in the slice at
+  // z = -172: bright with contrast agent.
+  for (const Eigen::Vector3d& at : {Eigen::Vector3d(23, 56, -172), Eigen::Vector3d(19, 14, -172),
+                                    Eigen::Vector3d(24, -24, -172), Eigen::Vector3d(-5, -16, -172)}) {
     const Eigen::Vector3i voxel = (voxel_from_patient * at).array().round().cast<int>();
     EXPECT_EQ(map.labels.at(voxel.x(), voxel.y(), voxel.z()), 0) << at.transpose();
   }
