@@ -6,16 +6,16 @@
 #include <array>
 
 #include "bodies/body_map.h"
+#include "io/dicom/ct_series.h"
 #include "io/study/study_files.h"
 #include "tests/support/real_data.h"
 
 namespace isoshift {
 namespace {
 
-CtSeries read(const std::filesystem::path& folder) {
+CtSeries ct_in(const std::filesystem::path& folder) {
   Notes notes;
-  const std::array paths = {folder};
-  const StudyFiles files = scan_study({paths.begin(), paths.end()});
+  const StudyFiles files = scan_study({folder});
   return read_ct_series(files.cts.front().files, {}, notes, {});
 }
 
@@ -43,7 +43,7 @@ TEST(BodiesOfAChest, AreAllItsVertebraeWhereAPersonSeesThem) {
       {-5, 9, -26},
       {-6, -3, -10},
   }};
-  const BodyMap map = find_bodies(read(real_data() / "chest" / "CT").hu);
+  const BodyMap map = find_bodies(ct_in(real_data() / "chest" / "CT").hu);
   const auto vertebrae = std::ranges::count(map.bodies, Body::Kind::kVertebra, &Body::kind);
   ASSERT_EQ(vertebrae, std::ssize(seen));
   for (std::size_t n = 0; n < seen.size(); ++n)
@@ -53,7 +53,7 @@ TEST(BodiesOfAChest, AreAllItsVertebraeWhereAPersonSeesThem) {
 
 TEST(BodiesOfAChest, HoldNoHeartAndNoAorta) {
   ISOSHIFT_NEED_REAL_DATA("chest/CT");
-  const BodyMap map = find_bodies(read(real_data() / "chest" / "CT").hu);
+  const BodyMap map = find_bodies(ct_in(real_data() / "chest" / "CT").hu);
   const Eigen::Affine3d voxel_from_patient = map.labels.patient_from_voxel.inverse();
   // The descending aorta, the left atrium, the root of the aorta and the superior vena cava, as seen in the slice at
   // z = -172: bright with contrast agent.
@@ -66,7 +66,7 @@ TEST(BodiesOfAChest, HoldNoHeartAndNoAorta) {
 
 TEST(BodiesOfAPlasticHead, AreBonesWithoutVertebrae) {
   ISOSHIFT_NEED_REAL_DATA("head/CT");
-  const BodyMap map = find_bodies(read(real_data() / "head" / "CT").hu);
+  const BodyMap map = find_bodies(ct_in(real_data() / "head" / "CT").hu);
   EXPECT_GT(map.bodies.size(), 5U);
   EXPECT_EQ(std::ranges::count(map.bodies, Body::Kind::kVertebra, &Body::kind), 0);
 }
