@@ -62,20 +62,23 @@ class Body {
 
   double vary(double value, double share) { return value * (1.0 + share * (2.0 * uniform_(random_) - 1.0)); }
 
+  // Says where a vertebral body is that shapes were added for.
+  void note_vertebra(const Vector3d& at) { vertebrae_.push_back(center_ + at); }
+
   std::vector<Shape> take() { return std::move(shapes_); }
+  std::vector<Vector3d> take_vertebrae() { return std::move(vertebrae_); }
 
  private:
   Vector3d center_;
+  std::vector<Vector3d> vertebrae_;
   std::mt19937_64 random_;
   std::normal_distribution<double> gauss_;
   std::uniform_real_distribution<double> uniform_;
   std::vector<Shape> shapes_;
 };
 
-}  // namespace
-
 // x is left, y posterior, z superior. Seeds differ as people do: by millimeters everywhere.
-std::vector<Shape> head_phantom(const Vector3d& center_patient_mm, std::uint64_t seed) {
+Body head(const Vector3d& center_patient_mm, std::uint64_t seed) {
   Body body(center_patient_mm, seed);
   constexpr double kPlacesMm = 4.0, kSidesMm = 1.5;  // how places differ between people, and between the sides of one
   const Vector3d skull_at(0, 4, 20);
@@ -117,11 +120,12 @@ std::vector<Shape> head_phantom(const Vector3d& center_patient_mm, std::uint64_t
     body.add(Kind::kCylinder, at, {11, 9, 7}, bone_in_tissue(0.55));
     body.add(Kind::kBox, at + Vector3d(0, 26, -2), {4, 14, 4}, bone_in_tissue(0.5), tilt(15));
     body.add_grains(6, at, {9, 7, 5}, false);
+    body.note_vertebra(at);
   }
-  return body.take();
+  return body;
 }
 
-std::vector<Shape> spine_phantom(const Vector3d& center_patient_mm, std::uint64_t seed) {
+Body spine(const Vector3d& center_patient_mm, std::uint64_t seed) {
   Body body(center_patient_mm, seed);
   body.add(Kind::kCylinder, {0, -30, 0}, {150, 95, 110}, kTissue);
   body.add(Kind::kEllipsoid, {body.vary(60, 0.2), -60, 10}, {40, 22, 30}, {.water = -0.95, .bone = 0});  // bowel gas
@@ -143,6 +147,7 @@ std::vector<Shape> spine_phantom(const Vector3d& center_patient_mm, std::uint64_
       body.add(Kind::kBox, at + Vector3d(side * process, 28, 2), {16, 4, 5}, bone_in_tissue(0.4), tilt(0, side * 12));
     }
     body.add(Kind::kBox, at + Vector3d(0, 50, -6), {3.5, 15, 10}, bone_in_tissue(0.5), tilt(20));  // spinous
+    body.note_vertebra(at);
   }
   for (const double side : {-1.0, 1.0}) {  // lowest ribs
     body.add(Kind::kCylinder, {side * body.vary(85, 0.1), 22, 62}, {4, 6, 52}, bone_in_tissue(0.5),
@@ -150,12 +155,11 @@ std::vector<Shape> spine_phantom(const Vector3d& center_patient_mm, std::uint64_
     body.add(Kind::kEllipsoid, {side * body.vary(95, 0.06), 10, body.vary(-92, 0.06)}, {48, 14, 34},
              bone_in_tissue(0.3));  // iliac wing
   }
-  return body.take();
+  return body;
 }
 
 // The target lies at 0 when it is not displaced; the middle of the body 65 mm to the left of it.
-std::vector<Shape> thorax_phantom(const Vector3d& target_patient_mm, std::uint64_t seed,
-                                  const Vector3d& displacement_mm) {
+Body thorax(const Vector3d& target_patient_mm, std::uint64_t seed, const Vector3d& displacement_mm) {
   Body body(target_patient_mm, seed);
   constexpr double kMiddle = 65.0, kLungAir = 0.72;
   const Material lung{.water = -kLungAir, .bone = 0.0}, in_lung{.water = kLungAir, .bone = 0.0};
@@ -188,6 +192,7 @@ std::vector<Shape> thorax_phantom(const Vector3d& target_patient_mm, std::uint64
     body.add(Kind::kBox, at + Vector3d(0, 32, -6), {3, 12, 9}, bone_in_tissue(0.45), tilt(20));
     for (const double side : {-1.0, 1.0})
       body.add(Kind::kBox, at + Vector3d(side * 25, 18, 0), {12, 4, 5}, bone_in_tissue(0.4), tilt(0, side * 15));
+    body.note_vertebra(at);
   }
   // Ribs: pieces along ellipses that come forward and down; their front follows the breath a little.
   constexpr int kPieces = 9;
@@ -204,7 +209,30 @@ std::vector<Shape> thorax_phantom(const Vector3d& target_patient_mm, std::uint64
             std::atan2(92 * std::cos(angle), -side * 138 * std::sin(angle)) * 180.0 / std::numbers::pi;
         body.add(Kind::kEllipsoid, at + moved, {26, 4, 6.5}, bone_in_tissue(0.5), tilt(0, along_deg));
       }
-  return body.take();
+  return body;
+}
+
+}  // namespace
+
+std::vector<Shape> head_phantom(const Vector3d& center_patient_mm, std::uint64_t seed) {
+  return head(center_patient_mm, seed).take();
+}
+std::vector<Shape> spine_phantom(const Vector3d& center_patient_mm, std::uint64_t seed) {
+  return spine(center_patient_mm, seed).take();
+}
+std::vector<Shape> thorax_phantom(const Vector3d& target_patient_mm, std::uint64_t seed,
+                                  const Vector3d& displacement_mm) {
+  return thorax(target_patient_mm, seed, displacement_mm).take();
+}
+
+std::vector<Vector3d> head_vertebrae(const Vector3d& center_patient_mm, std::uint64_t seed) {
+  return head(center_patient_mm, seed).take_vertebrae();
+}
+std::vector<Vector3d> spine_vertebrae(const Vector3d& center_patient_mm, std::uint64_t seed) {
+  return spine(center_patient_mm, seed).take_vertebrae();
+}
+std::vector<Vector3d> thorax_vertebrae(const Vector3d& target_patient_mm, std::uint64_t seed) {
+  return thorax(target_patient_mm, seed, Vector3d::Zero()).take_vertebrae();
 }
 
 }  // namespace isoshift

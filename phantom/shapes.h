@@ -50,4 +50,9 @@ inline constexpr double kTargetRadiusMm = 13.0;
 std::vector<Shape> thorax_phantom(const Eigen::Vector3d& target_patient_mm, std::uint64_t seed,
                                   const Eigen::Vector3d& displacement_mm);
 
+// Centers of the vertebral bodies in these phantoms, patient coordinates.
+std::vector<Eigen::Vector3d> head_vertebrae(const Eigen::Vector3d& center_patient_mm, std::uint64_t seed);
+std::vector<Eigen::Vector3d> spine_vertebrae(const Eigen::Vector3d& center_patient_mm, std::uint64_t seed);
+std::vector<Eigen::Vector3d> thorax_vertebrae(const Eigen::Vector3d& target_patient_mm, std::uint64_t seed);
+
 }  // namespace isoshift

@@ -15,7 +15,7 @@ complain() {
 }
 
 # may_include FOLDER BELOW...: of our own folders FOLDER includes itself and these only.
-our_folders='base|geometry|setup|drr|io|registration|workflow|phantom|cli|tests|bench'
+our_folders='base|geometry|bodies|setup|drr|io|registration|workflow|phantom|cli|tests|bench'
 may_include() {
   local folder=$1 allowed
   allowed="($(IFS='|' && echo "$*"))/"
@@ -28,7 +28,7 @@ may_include() {
 only_in() {
   local library=$1 folder
   shift
-  for folder in base geometry setup drr io registration workflow phantom cli; do
+  for folder in base geometry bodies setup drr io registration workflow phantom cli; do
     while IFS=: read -r file included; do
       [[ ! $included =~ ^$library || $file =~ ^($(IFS='|' && echo "$*")) ]] || complain "$file must not include $included"
     done < <(includes "$folder")
@@ -37,6 +37,7 @@ only_in() {
 
 may_include base
 may_include geometry base
+may_include bodies base geometry
 may_include setup base geometry
 may_include drr base geometry
 may_include io/dicom base geometry setup
@@ -45,10 +46,10 @@ may_include io/network base io/dicom io/config
 may_include io/study base geometry setup io/dicom io/config
 may_include io/objects base geometry setup io/dicom io/config io/study
 may_include io/report base geometry setup io/dicom io/config io/study io/objects
-may_include registration base geometry setup drr
-may_include workflow base geometry setup drr io registration
+may_include registration base geometry bodies setup drr
+may_include workflow base geometry bodies setup drr io registration
 may_include phantom base geometry setup io/dicom
-may_include cli base geometry setup drr io registration workflow phantom
+may_include cli base geometry bodies setup drr io registration workflow phantom
 
 only_in 'dcmtk/' io phantom
 only_in 'opencv2/' registration/preprocess/

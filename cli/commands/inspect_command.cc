@@ -4,7 +4,9 @@
 #include <memory>
 
 #include "base/error.h"
+#include "base/output_folder.h"
 #include "cli/commands/commands.h"
+#include "cli/commands/inspect_bodies.h"
 #include "drr/gl/context.h"
 #include "io/study/study.h"
 
@@ -143,6 +145,35 @@ std::string describe_ct(const std::string& series_uid, const std::vector<std::fi
   return text + "\n";
 }
 
+// The bodies of every CT: a picture each, and a table.
+void run_inspect_bodies(const std::vector<std::filesystem::path>& paths, const std::filesystem::path& folder,
+                        bool overwrite, Console& console) {
+  OutputFolder output(folder, overwrite);
+  const StudyFiles files = scan_study(paths);
+  if (files.cts.empty()) throw Error(fmt::format("{}: holds no CT", paths.front().string()));
+  std::string listing;
+  for (std::size_t n = 0; n < files.cts.size(); ++n) {
+    Notes notes;
+    CtSeries ct;
+    {
+      ProgressBar bar(console, "Reading CT");
+      ct = read_ct_series(files.cts[n].files, {{"gaps", "inspection"}}, notes,
+                          [&](std::size_t done, std::size_t total) { bar.update(done, total); });
+    }
+    std::vector<DrawnBone> drawn;
+    for (const auto& structures : files.structures)
+      for (DrawnBone& bone : drawn_bones(read_rt_structures(structures.file), ct)) drawn.push_back(std::move(bone));
+    const BodyMap map = find_bodies(ct.hu, drawn);
+    const std::string name = files.cts.size() == 1 ? "bodies" : fmt::format("bodies{}", n + 1);
+    const std::string title = fmt::format("CT series {}: {} bodies", ct.series_instance_uid, map.bodies.size());
+    if (!map.labels.voxels.empty()) write_text(output.path() / (name + ".png"), bodies_picture(map, title));
+    write_text(output.path() / (name + ".txt"), title + "\n" + bodies_table(map));
+    listing += title + "\n" + bodies_table(map);
+  }
+  output.commit();
+  console.out << listing;
+}
+
 void run_inspect(const std::vector<std::filesystem::path>& paths, const std::optional<MachineProfile>& machine,
                  Console& console) {
   const StudyFiles files = scan_study(paths);
@@ -175,21 +206,31 @@ void run_inspect(const std::vector<std::filesystem::path>& paths, const std::opt
 void add_inspect_command(CLI::App& app, Console& console, int&) {
   struct Options {
     std::vector<std::filesystem::path> paths;
-    std::filesystem::path machine;
-    bool devices = false;
+    std::filesystem::path machine, bodies;
+    bool devices = false, overwrite = false;
   };
   auto options = std::make_shared<Options>();
   CLI::App* command = app.add_subcommand(
       "inspect", "Show what files contain, how their geometry is understood, and every missing attribute");
   command->footer(
-      "\nExample:\n  isoshift inspect exported/\n  isoshift inspect RTIMAGE/KV_AP.dcm\n  isoshift inspect --devices");
+      "\nExample:\n  isoshift inspect exported/\n  isoshift inspect RTIMAGE/KV_AP.dcm\n  isoshift inspect exported/ "
+      "--bodies "
+      "bodies\n  isoshift inspect --devices");
   auto* paths = command->add_option("path", options->paths, "Files or folders")->type_name("PATH");
   command->add_option("--machine", options->machine, "Machine profile to apply to the X-rays before they are shown")
       ->type_name("FILE");
+  auto* bodies = command
+                     ->add_option("--bodies", options->bodies,
+                                  "Find the rigid bodies that the CT shows, draw and list them in this folder")
+                     ->type_name("FOLDER");
+  command->add_flag("--overwrite", options->overwrite, "Replace an earlier output in that folder")->needs(bodies);
   auto* devices = command->add_flag("--devices", options->devices, "List the devices that can render");
   command->require_option(1, 0);
   paths->excludes(devices);
+  bodies->needs(paths);
   command->callback([options, &console] {
+    if (!options->bodies.empty())
+      return run_inspect_bodies(options->paths, options->bodies, options->overwrite, console);
     if (!options->devices)
       return run_inspect(
           options->paths,

@@ -1,0 +1,196 @@
+#include "bodies/bone_regions.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <queue>
+
+#include "bodies/distance.h"
+
+namespace isoshift {
+namespace {
+
+// Where a point lies about a vertebra: mm to the left, back and up from its center, and whether between its discs.
+struct PlaceAbout {
+  double left, back, up;
+  bool is_between_discs;
+};
+
+PlaceAbout place_about(const Vertebra& vertebra, const Eigen::Vector3d& at_mm) {
+  const Eigen::Vector3d up = (vertebra.upper.center_patient_mm - vertebra.lower.center_patient_mm).normalized();
+  const Eigen::Vector3d left = Eigen::Vector3d::UnitY().cross(up).normalized();
+  const Eigen::Vector3d from_center = at_mm - vertebra.center_patient_mm;
+  const double below = (at_mm - vertebra.lower.center_patient_mm).dot(vertebra.lower.up_patient);
+  const double above = (at_mm - vertebra.upper.center_patient_mm).dot(vertebra.upper.up_patient);
+  return {from_center.dot(left), from_center.dot(up.cross(left)), from_center.dot(up), below >= 0.0 && above < 0.0};
+}
+
+bool is_in_body(const Vertebra& vertebra, const PlaceAbout& place, double margin_mm) {
+  return place.is_between_discs && std::hypot(place.left, place.back) < vertebra.radius_mm + margin_mm;
+}
+
+// Transverse processes reach about 20 mm beyond the body, the spinous process about 50; further out lie ribs.
+bool may_be_of(const Vertebra& vertebra, const PlaceAbout& place) {
+  const double r = vertebra.radius_mm;
+  const bool beside = place.back < 0.4 * r;
+  return place.back > -(r + 5.0) && place.back < r + 50.0 && std::abs(place.left) < r + (beside ? 4.0 : 19.0) &&
+         place.up > -2.6 * r - 0.6 * std::max(place.back - r, 0.0) && place.up < 1.8 * r;
+}
+
+Eigen::Vector3i voxel_of(const Eigen::Vector3i& size, std::uint32_t index) {
+  const auto columns = static_cast<std::uint32_t>(size.x()), rows = static_cast<std::uint32_t>(size.y());
+  return {static_cast<int>(index % columns), static_cast<int>(index / columns % rows),
+          static_cast<int>(index / (columns * rows))};
+}
+
+// Calls work(i, j, k) for the voxels of a box about a point.
+template <class T, class Work>
+void for_box(const Volume<T>& volume, const Eigen::Vector3d& center_mm, double reach_mm, Work&& work) {
+  const Eigen::Affine3d voxel_from_patient = volume.patient_from_voxel.inverse();
+  const Eigen::Array3d center = (voxel_from_patient * center_mm).array();
+  const double reach = reach_mm / volume.spacing_mm().x();
+  const Eigen::Array3i low = (center - reach).floor().template cast<int>().max(0);
+  const Eigen::Array3i high = (center + reach).ceil().template cast<int>().min(volume.size.array() - 1);
+  for (int k = low.z(); k <= high.z(); ++k)
+    for (int j = low.y(); j <= high.y(); ++j)
+      for (int i = low.x(); i <= high.x(); ++i) work(i, j, k);
+}
+
+double mean_of(const Volume<float>& hu, const VoxelSet& voxels) {
+  double sum = 0.0;
+  for (const std::uint32_t n : voxels) sum += hu.voxels[n];
+  return sum / static_cast<double>(std::max<std::size_t>(voxels.size(), 1));
+}
+
+// Whether the center of a part lies behind the middle of the nearest vertebra: no large vessel does.
+bool is_behind_spine(const Eigen::Vector3d& at_mm, const std::vector<Vertebra>& vertebrae) {
+  const auto nearest = std::ranges::min_element(
+      vertebrae, {}, [&](const Vertebra& v) { return std::abs(v.center_patient_mm.z() - at_mm.z()); });
+  return nearest == vertebrae.end() || at_mm.y() > nearest->center_patient_mm.y();
+}
+
+}  // namespace
+
+PatientAndCouch patient_and_couch(const Volume<float>& hu) {
+  constexpr float kDenseHu = -300.0F;
+  constexpr double kLeastMm3 = 3000.0, kCouchLength = 0.5, kSheet = 0.25;
+  PatientAndCouch result{Volume<std::uint8_t>(hu.size, hu.patient_from_voxel),
+                         Volume<std::uint8_t>(hu.size, hu.patient_from_voxel)};
+  Volume<std::uint8_t> dense(hu.size, hu.patient_from_voxel);
+  std::ranges::transform(hu.voxels, dense.voxels.begin(), [](float value) { return value > kDenseHu ? 1 : 0; });
+  const auto parts = connected_parts(dense, static_cast<std::size_t>(kLeastMm3 / std::pow(hu.spacing_mm().x(), 3.0)));
+  for (std::size_t n = 0; n < parts.size(); ++n) {
+    Eigen::AlignedBox3d box;
+    for (const std::uint32_t voxel : parts[n]) box.extend(voxel_of(hu.size, voxel).cast<double>());
+    const double filled = static_cast<double>(parts[n].size()) / (box.sizes().array() + 1.0).prod();
+    // A limb may lie apart from the trunk, but fills its box; a couch is a sheet or a shell.
+    const bool is_couch = n > 0 && box.sizes().z() > kCouchLength * hu.size.z() && filled < kSheet;
+    for (const std::uint32_t voxel : parts[n]) (is_couch ? result.couch : result.patient).voxels[voxel] = 1;
+  }
+  return result;
+}
+
+void remove_contrast_agent(Volume<std::uint8_t>& bone, const Volume<float>& hu,
+                           const std::vector<Vertebra>& vertebrae) {
+  constexpr float kCoreMm = 5.0F, kSurelyMm = 4.0F, kGrownMm = 8.0F;
+  constexpr double kRimToCore = 1.05, kSurelyHu = 350.0, kNoBrighter = 1.25;
+  constexpr std::size_t kLeastCore = 40, kLeastVertebrae = 4;
+  if (vertebrae.size() < kLeastVertebrae) return;  // no trunk: no vessel as thick as a bone
+  Volume<std::uint8_t> outside = bone;
+  for (std::uint8_t& value : outside.voxels) value = value == 0 ? 1 : 0;
+  const Volume<float> depth = distance_mm(outside);
+  Volume<std::uint8_t> core(bone.size, bone.patient_from_voxel);
+  for (std::size_t n = 0; n < core.voxels.size(); ++n) core.voxels[n] = depth.voxels[n] > kCoreMm ? 1 : 0;
+  for (const Vertebra& vertebra : vertebrae)  // their bodies stay
+    for_box(core, vertebra.center_patient_mm, 3.0 * vertebra.radius_mm, [&](int i, int j, int k) {
+      const PlaceAbout place = place_about(vertebra, core.patient_from_voxel * Eigen::Vector3d(i, j, k));
+      if (is_in_body(vertebra, place, 3.0) || (place.back > 0.0 && may_be_of(vertebra, place))) core.at(i, j, k) = 0;
+    });
+
+  double brightest = 0.0;
+  Volume<std::uint8_t> agent(bone.size, bone.patient_from_voxel);
+  for (const VoxelSet& part : connected_parts(core, kLeastCore)) {
+    // The rim: bone within 4 voxels of the core and near the surface.
+    Eigen::Vector3d center = Eigen::Vector3d::Zero();
+    double rim = 0.0, count = 1e-9;
+    for (const std::uint32_t n : part) {
+      const Eigen::Vector3i at = voxel_of(bone.size, n);
+      center += at.cast<double>() / static_cast<double>(part.size());
+      for (const Eigen::Vector3i& way : {Eigen::Vector3i(1, 0, 0), Eigen::Vector3i(0, 1, 0), Eigen::Vector3i(0, 0, 1)})
+        for (const int step : {-3, -2, 2, 3}) {
+          const Eigen::Vector3i to = at + step * way;
+          if ((to.array() < 0).any() || (to.array() >= bone.size.array()).any()) continue;
+          const std::size_t m = bone.index(to.x(), to.y(), to.z());
+          if (depth.voxels[m] < 1.0F || depth.voxels[m] > 4.5F) continue;
+          rim += hu.voxels[m];
+          ++count;
+        }
+    }
+    const double inside_hu = mean_of(hu, part);
+    if (rim / count > kRimToCore * inside_hu) continue;
+    if (inside_hu > kSurelyHu && is_behind_spine(bone.patient_from_voxel * center, vertebrae)) continue;
+    for (const std::uint32_t n : part) agent.voxels[n] = 1;
+    brightest = std::max(brightest, inside_hu);
+  }
+  if (brightest == 0.0) return;
+  const Volume<float> away = distance_mm(agent);
+  for (std::size_t n = 0; n < bone.voxels.size(); ++n)
+    if (away.voxels[n] < kSurelyMm || (away.voxels[n] < kGrownMm && hu.voxels[n] < kNoBrighter * brightest))
+      bone.voxels[n] = 0;
+  // What is left of thinner vessels: nowhere much brighter than the agent.
+  for (const VoxelSet& part : connected_parts(bone, 1)) {
+    std::vector<float> values;
+    for (const std::uint32_t n : part) values.push_back(hu.voxels[n]);
+    const auto high = values.begin() + static_cast<std::ptrdiff_t>(values.size() * 19 / 20);
+    std::ranges::nth_element(values, high);
+    if (*high < kNoBrighter * brightest)
+      for (const std::uint32_t n : part) bone.voxels[n] = 0;
+  }
+}
+
+std::vector<VoxelSet> bone_of(const std::vector<Vertebra>& vertebrae, const Volume<std::uint8_t>& bone) {
+  // Dijkstra's shortest ways through bone from all vertebral bodies at once.
+  struct Front {
+    float mm;
+    std::uint32_t voxel;
+    std::uint8_t vertebra;
+    bool operator<(const Front& other) const { return mm > other.mm || (mm == other.mm && voxel > other.voxel); }
+  };
+  const auto edge_mm = static_cast<float>(bone.spacing_mm().x());
+  std::vector<float> best(bone.voxels.size(), std::numeric_limits<float>::infinity());
+  std::vector<VoxelSet> result(vertebrae.size());
+  std::priority_queue<Front> fronts;
+  for (std::size_t v = 0; v < vertebrae.size(); ++v)
+    for_box(bone, vertebrae[v].center_patient_mm, 2.5 * vertebrae[v].radius_mm, [&](int i, int j, int k) {
+      const PlaceAbout place = place_about(vertebrae[v], bone.patient_from_voxel * Eigen::Vector3d(i, j, k));
+      const auto n = static_cast<std::uint32_t>(bone.index(i, j, k));
+      const double margin_mm = bone.voxels[n] != 0 ? 1.0 : -1.0;
+      if (!is_in_body(vertebrae[v], place, margin_mm) || best[n] == 0.0F) return;
+      best[n] = 0.0F;
+      fronts.push({0.0F, n, static_cast<std::uint8_t>(v)});
+    });
+  while (!fronts.empty()) {
+    const Front front = fronts.top();
+    fronts.pop();
+    if (front.mm > best[front.voxel]) continue;
+    best[front.voxel] = -1.0F;  // taken
+    result[front.vertebra].push_back(front.voxel);
+    const Eigen::Vector3i at = voxel_of(bone.size, front.voxel);
+    for (int n = 0; n < 27; ++n) {
+      const Eigen::Vector3i step(n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1), to = at + step;
+      if (n == 13 || (to.array() < 0).any() || (to.array() >= bone.size.array()).any()) continue;
+      const auto m = static_cast<std::uint32_t>(bone.index(to.x(), to.y(), to.z()));
+      const float mm = front.mm + edge_mm * step.cast<float>().norm();
+      if (bone.voxels[m] == 0 || mm >= best[m]) continue;
+      if (!may_be_of(vertebrae[front.vertebra],
+                     place_about(vertebrae[front.vertebra], bone.patient_from_voxel * to.cast<double>())))
+        continue;
+      best[m] = mm;
+      fronts.push({mm, m, front.vertebra});
+    }
+  }
+  for (VoxelSet& voxels : result) std::ranges::sort(voxels);
+  return result;
+}
+
+}  // namespace isoshift

@@ -1,0 +1,14 @@
+#pragma once
+// Euclidean distances on a lattice of cubes.
+
+#include <cstdint>
+
+#include "geometry/volume.h"
+
+namespace isoshift {
+
+// From each voxel to the nearest center of a voxel where `is_target` is not 0, mm; 1e9 if there is none. Exact:
+// Felzenszwalb and Huttenlocher, Theory of Computing 8 (2012) 415, one axis after the other. Voxels are cubes.
+Volume<float> distance_mm(const Volume<std::uint8_t>& is_target);
+
+}  // namespace isoshift
