@@ -115,7 +115,10 @@ Contents contents_of(const CollimatedXray& scene) {
                               between(random, 1.5, 5),
                               between(random, 1.5, 4)});
   if (scene.has_couch)
-    contents.bands.push_back({{between(random, 85, 105), 0}, 0.5 * std::numbers::pi, 1e4, between(random, 6, 15),
+    contents.bands.push_back({{between(random, 85, 105), 0},
+                              0.5 * std::numbers::pi,
+                              1e4,
+                              between(random, 6, 15),
                               between(random, 0.2, 0.7)});
   return contents;
 }
@@ -188,7 +191,8 @@ CollimatedXray random_collimated_xray(std::uint64_t seed) {
   Random random(seed);
   CollimatedXray scene;
   scene.seed = seed;
-  scene.body = std::array{CollimatedXray::Body::kSkull, CollimatedXray::Body::kThorax, CollimatedXray::Body::kLimb}[seed % 3];
+  scene.body =
+      std::array{CollimatedXray::Body::kSkull, CollimatedXray::Body::kThorax, CollimatedXray::Body::kLimb}[seed % 3];
   scene.metal_rods = static_cast<int>(random() % 4);
   scene.has_couch = random() % 3 == 0;
   scene.penumbra_mm = between(random, 1, 3);

@@ -15,7 +15,7 @@ struct CollimatedXray {
   enum class Body { kSkull, kThorax, kLimb, kBall, kNone };  // kLimb: air on both sides
 
   Body body = Body::kSkull;
-  int metal_rods = 0;     // straight ones, anywhere, at any angle
+  int metal_rods = 0;      // straight ones, anywhere, at any angle
   bool has_couch = false;  // a plate parallel to the panel's columns, seen edge-on
   // The field at the isocenter, along the collimator's axes: x to the right, y up, as the image is displayed.
   Eigen::Vector2d lower_mm = Eigen::Vector2d(-60, -60), upper_mm = Eigen::Vector2d(60, 60);
