@@ -69,6 +69,80 @@ bool is_behind_spine(const Eigen::Vector3d& at_mm, const std::vector<Vertebra>& 
   return nearest == vertebrae.end() || at_mm.y() > nearest->center_patient_mm.y();
 }
 
+constexpr double kNoBrighter = 1.25;  // than the brightest agent, in thin vessels and where it fades
+
+// Bone more than 5 mm below its surface, without the vertebral bodies and what may belong to them.
+Volume<std::uint8_t> deep_cores(const Volume<std::uint8_t>& bone, const Volume<float>& depth_mm,
+                                const std::vector<Vertebra>& vertebrae) {
+  constexpr float kCoreMm = 5.0F;
+  Volume<std::uint8_t> core(bone.size, bone.patient_from_voxel);
+  for (std::size_t n = 0; n < core.voxels.size(); ++n) core.voxels[n] = depth_mm.voxels[n] > kCoreMm ? 1 : 0;
+  for (const Vertebra& vertebra : vertebrae)
+    for_box(core, vertebra.center_patient_mm, 3.0 * vertebra.radius_mm, [&](int i, int j, int k) {
+      const PlaceAbout place = place_about(vertebra, core.patient_from_voxel * Eigen::Vector3d(i, j, k));
+      if (is_in_body(vertebra, place, 3.0) || (place.back > 0.0 && may_be_of(vertebra, place))) core.at(i, j, k) = 0;
+    });
+  return core;
+}
+
+// The mean HU of the rim of a core: bone near its surface, within 3 voxels of the core along the axes.
+double rim_hu(const VoxelSet& core, const Volume<float>& hu, const Volume<float>& depth_mm) {
+  double sum = 0.0, count = 1e-9;
+  for (const std::uint32_t n : core) {
+    const Eigen::Vector3i at = voxel_of(hu.size, n);
+    for (int axis = 0; axis < 3; ++axis)
+      for (const int step : {-3, -2, 2, 3}) {
+        const Eigen::Vector3i to = at + step * Eigen::Vector3i::Unit(axis);
+        if ((to.array() < 0).any() || (to.array() >= hu.size.array()).any()) continue;
+        const std::size_t m = hu.index(to.x(), to.y(), to.z());
+        if (depth_mm.voxels[m] < 1.0F || depth_mm.voxels[m] > 4.5F) continue;
+        sum += hu.voxels[m];
+        ++count;
+      }
+  }
+  return sum / count;
+}
+
+struct ContrastAgent {
+  Volume<std::uint8_t> cores;
+  double brightest_hu = 0.0;  // the mean of the brightest core; 0: there is no agent
+};
+
+// Cores whose rims are no brighter than they are: bone is, at its surface.
+ContrastAgent contrast_agent_of(const Volume<std::uint8_t>& bone, const Volume<float>& hu,
+                                const std::vector<Vertebra>& vertebrae) {
+  constexpr double kRimToCore = 1.05, kSurelyHu = 350.0;
+  constexpr std::size_t kLeastCore = 40;
+  Volume<std::uint8_t> outside = bone;
+  for (std::uint8_t& value : outside.voxels) value = value == 0 ? 1 : 0;
+  const Volume<float> depth_mm = distance_mm(outside);
+  ContrastAgent agent{.cores = Volume<std::uint8_t>(bone.size, bone.patient_from_voxel)};
+  for (const VoxelSet& core : connected_parts(deep_cores(bone, depth_mm, vertebrae), kLeastCore)) {
+    Eigen::Vector3d center = Eigen::Vector3d::Zero();
+    for (const std::uint32_t n : core)
+      center += voxel_of(bone.size, n).cast<double>() / static_cast<double>(core.size());
+    const double inside_hu = mean_of(hu, core);
+    if (rim_hu(core, hu, depth_mm) > kRimToCore * inside_hu) continue;
+    if (inside_hu > kSurelyHu && is_behind_spine(bone.patient_from_voxel * center, vertebrae)) continue;
+    for (const std::uint32_t n : core) agent.cores.voxels[n] = 1;
+    agent.brightest_hu = std::max(agent.brightest_hu, inside_hu);
+  }
+  return agent;
+}
+
+// What is left of thinner vessels: parts that are nowhere much brighter than the agent.
+void remove_thin_vessels(Volume<std::uint8_t>& bone, const Volume<float>& hu, double brightest_hu) {
+  for (const VoxelSet& part : connected_parts(bone, 1)) {
+    std::vector<float> values;
+    values.reserve(part.size());
+    for (const std::uint32_t n : part) values.push_back(hu.voxels[n]);
+    const auto high = values.begin() + static_cast<std::ptrdiff_t>(values.size() * 19 / 20);
+    std::ranges::nth_element(values, high);
+    if (*high < kNoBrighter * brightest_hu)
+      for (const std::uint32_t n : part) bone.voxels[n] = 0;
+  }
+}
+
 }  // namespace
 
 PatientAndCouch patient_and_couch(const Volume<float>& hu) {
@@ -92,60 +166,16 @@ PatientAndCouch patient_and_couch(const Volume<float>& hu) {
 
 void remove_contrast_agent(Volume<std::uint8_t>& bone, const Volume<float>& hu,
                            const std::vector<Vertebra>& vertebrae) {
-  constexpr float kCoreMm = 5.0F, kSurelyMm = 4.0F, kGrownMm = 8.0F;
-  constexpr double kRimToCore = 1.05, kSurelyHu = 350.0, kNoBrighter = 1.25;
-  constexpr std::size_t kLeastCore = 40, kLeastVertebrae = 4;
+  constexpr float kSurelyMm = 4.0F, kGrownMm = 8.0F;
+  constexpr std::size_t kLeastVertebrae = 4;
   if (vertebrae.size() < kLeastVertebrae) return;  // no trunk: no vessel as thick as a bone
-  Volume<std::uint8_t> outside = bone;
-  for (std::uint8_t& value : outside.voxels) value = value == 0 ? 1 : 0;
-  const Volume<float> depth = distance_mm(outside);
-  Volume<std::uint8_t> core(bone.size, bone.patient_from_voxel);
-  for (std::size_t n = 0; n < core.voxels.size(); ++n) core.voxels[n] = depth.voxels[n] > kCoreMm ? 1 : 0;
-  for (const Vertebra& vertebra : vertebrae)  // their bodies stay
-    for_box(core, vertebra.center_patient_mm, 3.0 * vertebra.radius_mm, [&](int i, int j, int k) {
-      const PlaceAbout place = place_about(vertebra, core.patient_from_voxel * Eigen::Vector3d(i, j, k));
-      if (is_in_body(vertebra, place, 3.0) || (place.back > 0.0 && may_be_of(vertebra, place))) core.at(i, j, k) = 0;
-    });
-
-  double brightest = 0.0;
-  Volume<std::uint8_t> agent(bone.size, bone.patient_from_voxel);
-  for (const VoxelSet& part : connected_parts(core, kLeastCore)) {
-    // The rim: bone within 4 voxels of the core and near the surface.
-    Eigen::Vector3d center = Eigen::Vector3d::Zero();
-    double rim = 0.0, count = 1e-9;
-    for (const std::uint32_t n : part) {
-      const Eigen::Vector3i at = voxel_of(bone.size, n);
-      center += at.cast<double>() / static_cast<double>(part.size());
-      for (const Eigen::Vector3i& way : {Eigen::Vector3i(1, 0, 0), Eigen::Vector3i(0, 1, 0), Eigen::Vector3i(0, 0, 1)})
-        for (const int step : {-3, -2, 2, 3}) {
-          const Eigen::Vector3i to = at + step * way;
-          if ((to.array() < 0).any() || (to.array() >= bone.size.array()).any()) continue;
-          const std::size_t m = bone.index(to.x(), to.y(), to.z());
-          if (depth.voxels[m] < 1.0F || depth.voxels[m] > 4.5F) continue;
-          rim += hu.voxels[m];
-          ++count;
-        }
-    }
-    const double inside_hu = mean_of(hu, part);
-    if (rim / count > kRimToCore * inside_hu) continue;
-    if (inside_hu > kSurelyHu && is_behind_spine(bone.patient_from_voxel * center, vertebrae)) continue;
-    for (const std::uint32_t n : part) agent.voxels[n] = 1;
-    brightest = std::max(brightest, inside_hu);
-  }
-  if (brightest == 0.0) return;
-  const Volume<float> away = distance_mm(agent);
+  const ContrastAgent agent = contrast_agent_of(bone, hu, vertebrae);
+  if (agent.brightest_hu == 0.0) return;
+  const Volume<float> away = distance_mm(agent.cores);
   for (std::size_t n = 0; n < bone.voxels.size(); ++n)
-    if (away.voxels[n] < kSurelyMm || (away.voxels[n] < kGrownMm && hu.voxels[n] < kNoBrighter * brightest))
+    if (away.voxels[n] < kSurelyMm || (away.voxels[n] < kGrownMm && hu.voxels[n] < kNoBrighter * agent.brightest_hu))
       bone.voxels[n] = 0;
-  // What is left of thinner vessels: nowhere much brighter than the agent.
-  for (const VoxelSet& part : connected_parts(bone, 1)) {
-    std::vector<float> values;
-    for (const std::uint32_t n : part) values.push_back(hu.voxels[n]);
-    const auto high = values.begin() + static_cast<std::ptrdiff_t>(values.size() * 19 / 20);
-    std::ranges::nth_element(values, high);
-    if (*high < kNoBrighter * brightest)
-      for (const std::uint32_t n : part) bone.voxels[n] = 0;
-  }
+  remove_thin_vessels(bone, hu, agent.brightest_hu);
 }
 
 std::vector<VoxelSet> bone_of(const std::vector<Vertebra>& vertebrae, const Volume<std::uint8_t>& bone) {

@@ -91,6 +91,7 @@ std::vector<VoxelSet> parts_between_necks(const Volume<float>& depth_mm, double 
   for (std::uint32_t n = 0; n < part_of.size(); ++n)
     if (part_of[n] != kNone) parts[groups.of(part_of[n])].push_back(n);
   std::vector<VoxelSet> result;
+  result.reserve(parts.size());
   for (auto& [group, part] : parts) result.push_back(std::move(part));
   std::ranges::stable_sort(result, std::greater(), &VoxelSet::size);
   return result;

@@ -136,10 +136,12 @@ std::vector<CombTooth> find_discs(const LeaningProfiles& profiles, int first, in
   const std::vector<int>& teeth = is_dark ? dark.teeth : bright.teeth;
   constexpr float kLeastDipHu = 20.0F;  // of half of them; noise alone makes less, and the end of a bone is one step
   std::vector<float> dip_hu;
+  dip_hu.reserve(teeth.size());
   for (const int s : teeth) dip_hu.push_back(dips.hu[s]);
   std::ranges::sort(dip_hu);
   if (dip_hu.empty() || dip_hu[(dip_hu.size() - 1) / 2] < kLeastDipHu) return {};
   std::vector<CombTooth> result;
+  result.reserve(teeth.size());
   for (const int s : teeth) result.push_back({.at = s, .lean = dips.lean[s], .dip_hu = dips.hu[s], .is_dark = is_dark});
   return result;
 }

@@ -146,15 +146,28 @@ class Finder {
 
   Eigen::Vector3d patient_mm(std::uint32_t n) const {
     const auto columns = static_cast<std::uint32_t>(hu_.size.x()), rows = static_cast<std::uint32_t>(hu_.size.y());
-    return hu_.patient_from_voxel * Eigen::Vector3d(n % columns, n / columns % rows, n / (columns * rows));
+    const std::uint32_t column = n % columns, row = n / columns % rows, slice = n / (columns * rows);
+    return hu_.patient_from_voxel * Eigen::Vector3d(column, row, slice);
+  }
+
+  // Vertebrae first, the couch last.
+  void put_in_order() {
+    std::vector<Part> ordered;
+    ordered.reserve(parts_.size());
+    const auto take = [&](auto&& wanted) {
+      for (Part& part : parts_)
+        if (wanted(part.body.kind)) ordered.push_back(part);
+    };
+    take([](Body::Kind kind) { return kind == Body::Kind::kVertebra; });
+    take([](Body::Kind kind) { return kind != Body::Kind::kVertebra && kind != Body::Kind::kCouch; });
+    take([](Body::Kind kind) { return kind == Body::Kind::kCouch; });
+    parts_ = std::move(ordered);
   }
 
   BodyMap labeled(const std::vector<Vertebra>& vertebrae) {
     BodyMap map;
     map.labels = Volume<std::uint8_t>(hu_.size, hu_.patient_from_voxel);
-    std::ranges::stable_sort(parts_, {}, [](const Part& part) {
-      return part.body.kind == Body::Kind::kVertebra ? 0 : part.body.kind == Body::Kind::kCouch ? 2 : 1;
-    });
+    put_in_order();
     for (std::size_t p = 0; p < parts_.size(); ++p) {
       Part& part = parts_[p];
       Eigen::Vector3d sum = Eigen::Vector3d::Zero();
@@ -172,40 +185,45 @@ class Finder {
     return map;
   }
 
+  struct Contacts {
+    Eigen::Vector3d sum = Eigen::Vector3d::Zero();  // of places, in patient mm
+    int count = 0;
+  };
+  using ContactsByPair = std::map<std::pair<int, int>, Contacts>;
+
+  // From a voxel of a body along an axis to the first voxel of another one, within a reach.
+  static void add_contact(const BodyMap& map, const Eigen::Vector3i& from, int axis, int reach,
+                          ContactsByPair& contacts) {
+    const auto label_at = [&](const Eigen::Vector3i& at) { return map.labels.at(at.x(), at.y(), at.z()); };
+    const auto is_bone = [&](int label) {
+      return label > 0 && map.bodies[static_cast<std::size_t>(label) - 1].kind != Body::Kind::kCouch;
+    };
+    const int mine = label_at(from);
+    if (!is_bone(mine)) return;
+    Eigen::Vector3i to = from;
+    for (int step = 1; step <= reach; ++step) {
+      if (++to[axis] >= map.labels.size[axis]) return;
+      const int other = label_at(to);
+      if (other == mine) return;
+      if (!is_bone(other)) continue;
+      Contacts& there = contacts[std::minmax(mine - 1, other - 1)];
+      there.sum += map.labels.patient_from_voxel * Eigen::Vector3d(0.5 * (from + to).cast<double>());
+      ++there.count;
+      return;
+    }
+  }
+
   // Where bodies come within a few voxels of each other.
   std::vector<Joint> joints_of(const BodyMap& map, const std::vector<Vertebra>& vertebrae) const {
     constexpr double kReachMm = 8.0;
     constexpr int kLeastContacts = 3;
     const int reach = std::max(1, static_cast<int>(std::lround(kReachMm / edge_mm_)));
-    struct Contacts {
-      Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-      int count = 0;
-    };
-    std::map<std::pair<int, int>, Contacts> contacts;
+    ContactsByPair contacts;
     const Eigen::Vector3i& size = map.labels.size;
-    const auto is_bone = [&](int label) {
-      return label > 0 && map.bodies[static_cast<std::size_t>(label) - 1].kind != Body::Kind::kCouch;
-    };
     for (int axis = 0; axis < 3; ++axis)
       for (int k = 0; k < size.z(); ++k)
         for (int j = 0; j < size.y(); ++j)
-          for (int i = 0; i < size.x(); ++i) {
-            const int mine = map.labels.at(i, j, k);
-            if (!is_bone(mine)) continue;
-            Eigen::Vector3i to(i, j, k);
-            for (int step = 1; step <= reach; ++step) {
-              if (++to[axis] >= size[axis]) break;
-              const int other = map.labels.at(to.x(), to.y(), to.z());
-              if (other == mine) break;
-              if (!is_bone(other)) continue;
-              Contacts& there = contacts[std::minmax(mine - 1, other - 1)];
-              Eigen::Vector3d middle(i, j, k);
-              middle[axis] += 0.5 * step;
-              there.sum += map.labels.patient_from_voxel * middle;
-              ++there.count;
-              break;
-            }
-          }
+          for (int i = 0; i < size.x(); ++i) add_contact(map, {i, j, k}, axis, reach, contacts);
     for (std::size_t v = 0; v + 1 < vertebrae.size(); ++v) {  // neighbors always have a disc
       const int a = static_cast<int>(v);
       contacts[{a, a + 1}] = {vertebrae[v].upper.center_patient_mm * kLeastContacts, kLeastContacts};

@@ -52,7 +52,8 @@ std::vector<VoxelSet> pieces_of(const VoxelSet& voxels, const Eigen::Vector3i& l
              rows = static_cast<std::uint32_t>(lattice_size.y());
   std::vector<Eigen::Vector3f> points(voxels.size());
   std::ranges::transform(voxels, points.begin(), [&](std::uint32_t n) -> Eigen::Vector3f {
-    return static_cast<float>(edge_mm) * Eigen::Vector3f(n % columns, n / columns % rows, n / (columns * rows));
+    const std::uint32_t column = n % columns, row = n / columns % rows, slice = n / (columns * rows);
+    return static_cast<float>(edge_mm) * Eigen::Vector3f(column, row, slice);
   });
   Clusters clusters;
   clusters.centers = {Eigen::Vector3f::Zero()};

@@ -93,6 +93,7 @@ SoftMasks soft_masks(const BodyMap& map, int block, double transition_mm) {
   if (present.empty()) return result;
 
   std::vector<Volume<float>> distances;
+  distances.reserve(present.size());
   for (const int label : present) distances.push_back(distance_mm(where(labels, label)));
   std::vector<Volume<std::uint8_t>> weights(present.size(),
                                             Volume<std::uint8_t>(labels.size, labels.patient_from_voxel));

@@ -37,9 +37,9 @@ SpineCurve::SpineCurve(const std::vector<Eigen::Vector3d>& points_patient_mm, do
   double rest = 0.0;
   for (std::size_t n = 0; n + 1 < smooth.size(); ++n) {
     const Eigen::Vector3d way = smooth[n + 1] - smooth[n];
-    double t = rest;
-    for (; t < way.norm(); t += 1.0) points_.emplace_back(smooth[n] + t * way.normalized());
-    rest = t - way.norm();
+    const int points = std::max(0, static_cast<int>(std::ceil(way.norm() - rest)));
+    for (int p = 0; p < points; ++p) points_.emplace_back(smooth[n] + (rest + p) * way.normalized());
+    rest += points - way.norm();
   }
 }
 

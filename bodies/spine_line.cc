@@ -154,7 +154,9 @@ std::vector<Eigen::Vector3i> best_path(const Volume<float>& score) {
   Eigen::Vector3i at(static_cast<int>(n % size.x()), static_cast<int>(n % slice / size.x()),
                      static_cast<int>(n / slice));
   std::vector<Eigen::Vector3i> path = {at};
-  for (int step = from.at(at.x(), at.y(), at.z()); step >= 0; step = from.at(at.x(), at.y(), at.z())) {
+  for (;;) {
+    const std::int8_t step = from.at(at.x(), at.y(), at.z());
+    if (step < 0) break;
     at += Eigen::Vector3i(step % 3 - 1, step / 3 - 1, -1);
     path.push_back(at);
   }

@@ -19,17 +19,17 @@ namespace {
 constexpr float kOutsideHu = -1000.0F;
 
 // Planes through a point of the curve, leaning to the front or back and to the sides.
-constexpr std::array kLeans_deg = {-16.0, -8.0, 0.0, 8.0, 16.0};
+constexpr std::array kLeanDegrees = {-16.0, -8.0, 0.0, 8.0, 16.0};
 
 Eigen::Vector3d leaning(const CurveFrame& frame, int lean) {
   const double rad = std::numbers::pi / 180.0;
-  const int n = static_cast<int>(kLeans_deg.size());
-  return (frame.up + std::tan(kLeans_deg[lean % n] * rad) * frame.left +
-          std::tan(kLeans_deg[lean / n] * rad) * frame.back)
+  const int n = static_cast<int>(kLeanDegrees.size());
+  return (frame.up + std::tan(kLeanDegrees[lean % n] * rad) * frame.left +
+          std::tan(kLeanDegrees[lean / n] * rad) * frame.back)
       .normalized();
 }
 
-constexpr int kLeans = static_cast<int>(kLeans_deg.size() * kLeans_deg.size());
+constexpr int kLeans = static_cast<int>(kLeanDegrees.size() * kLeanDegrees.size());
 
 // Mean HU over a disc about a point, air and metal limited.
 class DiscMean {
@@ -42,8 +42,10 @@ class DiscMean {
     const Eigen::Vector3d left = Eigen::Vector3d::UnitY().cross(up).normalized(), back = up.cross(left);
     float sum = 0.0F;
     int count = 0, all = 0;
-    for (double y = -radius_mm; y <= radius_mm; y += kSpacingMm)
-      for (double x = -radius_mm; x <= radius_mm; x += kSpacingMm) {
+    const int steps = static_cast<int>(2.0 * radius_mm / kSpacingMm);
+    for (int row = 0; row <= steps; ++row)
+      for (int column = 0; column <= steps; ++column) {
+        const double x = kSpacingMm * column - radius_mm, y = kSpacingMm * row - radius_mm;
         if (x * x + y * y > radius_mm * radius_mm) continue;
         ++all;
         const float hu = at(center_mm + x * left + y * back);
@@ -138,6 +140,7 @@ std::vector<Offset> agreed(const std::vector<Offset>& offsets, int reach) {
     if (near.empty()) continue;
     const auto median = [&](double Offset::* member) {
       std::vector<double> values;
+      values.reserve(near.size());
       for (const Offset& offset : near) values.push_back(offset.*member);
       std::ranges::sort(values);
       return 0.5 * (values[(values.size() - 1) / 2] + values[values.size() / 2]);

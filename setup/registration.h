@@ -35,6 +35,13 @@ struct LeftOutView {
   double angle_rad = 0.0;
 };
 
+// How far one view alone would want the anatomy from where all views together put it, as root mean square over 100 mm
+// about the isocenter, in this view; and how far it would be expected to, if the views agreed.
+struct Contradiction {
+  double mm = 0.0;
+  double sigma_mm = 0.0;
+};
+
 // How well one view matches: gradient correlation over all compared pixels, twice as large as those of the last stage.
 struct ViewMatch {
   std::string label;  // of the X-ray
@@ -43,10 +50,8 @@ struct ViewMatch {
   bool has_all_excluded = true;  // false: what should be excluded covers nearly all of the view, and was compared
   IrradiatedField field;         // in which it was compared
   ViewConsistency consistency;   // of its parts with the pose found
-  std::optional<LeftOutView> left_out;  // with three or more views
-  // With two or more views: how far this view alone would want the anatomy from where all views put it, as root mean
-  // square over 100 mm about the isocenter, in this view.
-  std::optional<double> contradiction_mm;
+  std::optional<LeftOutView> left_out;         // with three or more views
+  std::optional<Contradiction> contradiction;  // with two or more views
 };
 
 // How well the images would match if they were not what they say they are.

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <numbers>
 #include <regex>
+#include <utility>
 
 #include "base/error.h"
 #include "io/dicom/structure_mask.h"
@@ -55,7 +56,7 @@ Image<Rgb> seen_along(const Volume<std::uint8_t>& labels, int axis, bool from_en
 }  // namespace
 
 std::vector<DrawnBone> drawn_bones(const RtStructures& structures, const CtSeries& ct) {
-  static const std::regex kBone(
+  static const std::regex bone(
       "([CTL](\\d|1[0-2])|vert(ebra)?[ _-]?[CTL]?\\d+|skull|cranium|mandible|jaw|sacrum|sternum|"
       "(femur|femoral[ _]?head|humerus|scapula|clavicle|pelvis|ilium|hip)([ _-].*)?)",
       std::regex::icase);
@@ -63,7 +64,7 @@ std::vector<DrawnBone> drawn_bones(const RtStructures& structures, const CtSerie
   for (const Structure& structure : structures.structures) {
     const bool is_here =
         !structure.frame_of_reference_uid || *structure.frame_of_reference_uid == ct.frame_of_reference_uid;
-    if (is_here && !structure.contours.empty() && std::regex_match(structure.name, kBone))
+    if (is_here && !structure.contours.empty() && std::regex_match(structure.name, bone))
       result.push_back({structure.name, mask_of(structure, ct.hu.size, ct.hu.patient_from_voxel)});
   }
   return result;

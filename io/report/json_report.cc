@@ -194,6 +194,7 @@ Json irradiated_field_json(const IrradiatedField& field) {
 
 Json view_json(const SetupResult::View& view) {
   const std::optional<LeftOutView>& left_out = view.match.left_out;
+  const std::optional<Contradiction>& contradiction = view.match.contradiction;
   return {{"label", view.label},
           {"sop_instance_uid", view.sop_instance_uid},
           {"sop_class_uid", view.sop_class_uid},
@@ -211,7 +212,8 @@ Json view_json(const SetupResult::View& view) {
           {"similarity_final", view.match.similarity_final},
           {"left_out_mm", left_out ? Json(left_out->distance_mm) : Json(nullptr)},
           {"left_out_deg", left_out ? Json(deg_from_rad(left_out->angle_rad)) : Json(nullptr)},
-          {"contradiction_mm", or_null(view.match.contradiction_mm)},
+          {"contradiction_mm", contradiction ? Json(contradiction->mm) : Json(nullptr)},
+          {"contradiction_sigma_mm", contradiction ? Json(contradiction->sigma_mm) : Json(nullptr)},
           {"irradiated_field", irradiated_field_json(view.match.field)},
           {"parts", parts_json(view)},
           {"picture", picture_json(view.picture)}};

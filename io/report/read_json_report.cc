@@ -65,7 +65,8 @@ ViewMatch match_from(const Json& json) {
   if (const auto distance_mm = number_from(json.at("left_out_mm")))
     match.left_out = {.distance_mm = *distance_mm, .angle_rad = rad_from_deg(json.at("left_out_deg"))};
   // Results of before 2026-11-23 do not say.
-  if (json.contains("contradiction_mm")) match.contradiction_mm = number_from(json.at("contradiction_mm"));
+  if (json.contains("contradiction_mm") && !json.at("contradiction_mm").is_null())
+    match.contradiction = {.mm = json.at("contradiction_mm"), .sigma_mm = json.at("contradiction_sigma_mm")};
   if (json.contains("irradiated_field")) match.field = irradiated_field_from(json.at("irradiated_field"));
   for (const Json& part : json.at("parts"))
     match.consistency.parts.push_back({.center_px = vector_from<2>(part.at("center_px")),

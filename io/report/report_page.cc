@@ -353,8 +353,9 @@ ReportPage::Section checks_section(const SetupResult& report) {
     if (const auto& left_out = view.match.left_out)
       words += fmt::format("; without it the pose moves {:.2f} mm, {:.2f} deg", left_out->distance_mm,
                            deg_from_rad(left_out->angle_rad));
-    if (const auto& contradiction_mm = view.match.contradiction_mm)
-      words += fmt::format("; alone it would want the anatomy {:.2f} mm elsewhere", *contradiction_mm);
+    if (const auto& contradiction = view.match.contradiction)
+      words += fmt::format("; alone it would want the anatomy {:.2f} mm elsewhere (sigma {:.2f} mm)", contradiction->mm,
+                           contradiction->sigma_mm);
     section.rows.push_back({printable(view.label), words});
     if (!view.match.field.corners_px.empty())
       section.rows.push_back({"Field of " + printable(view.label), field_words(view)});

@@ -158,12 +158,14 @@ std::string doubt_about(const Sides& sides) {
   return {};
 }
 
-// Whether a rectangle with one side or two can be a rod, a couch or the patient: these are bright again beyond.
-bool may_be_rod(const Sides& sides) {
-  return sides_found(sides) < 3 &&
-         std::ranges::any_of(
-             sides, [](const Side& side) { return !side.is_open() && side.brightness_beyond > kRodBrightness; });
+// Rods, couches and patients are bright again beyond; a field is dark there.
+bool is_bright_beyond(const Sides& sides) {
+  return std::ranges::any_of(
+      sides, [](const Side& side) { return !side.is_open() && side.brightness_beyond > kRodBrightness; });
 }
+
+// Whether a rectangle with one side or two can be a rod, a couch or the patient.
+bool may_be_rod(const Sides& sides) { return sides_found(sides) < 3 && is_bright_beyond(sides); }
 
 // The field as the image alone shows it.
 struct Finding {
@@ -181,7 +183,7 @@ Finding find_in(const Upright& upright, const FieldEdges& edges) {
   // No field. Edges that are not clear enough, straight and dark beyond all the same, are a reason to ask.
   const auto side = std::ranges::find(sides, false, &Side::is_open);
   const auto number = static_cast<std::size_t>(side - sides.begin());
-  if (sides_found(sides) > 1)
+  if (sides_found(sides) > 1 && !is_bright_beyond(sides))
     finding.doubt = "edges are seen that make no clear rectangle";
   else if (sides_found(sides) == 1 && side->edge.evidence >= kFaint && side->is_straight() && !may_be_rod(sides))
     finding.doubt = fmt::format("a faint edge may be its {} side", kNames[number]);

@@ -6,6 +6,7 @@
 #include "geometry/target_error.h"
 #include "registration/objective.h"
 #include "registration/pose_parameters.h"
+#include "registration/quality/uncertainty.h"
 
 namespace isoshift {
 namespace {
@@ -51,10 +52,8 @@ class HeldObjective {
   const Eigen::Isometry3d& pose_;
 };
 
-// The pose that one view wants.
-Eigen::Isometry3d wanted_alone(Renderer& renderer, const FixedImage& image, const Eigen::Isometry3d& pose, Dof dof) {
-  Objective objective(renderer, std::span(&image, 1), pose,
-                      {.similarity = SimilarityKind::kGradientCorrelation, .pixel_fraction = 0.5, .min_pixels = 6000});
+// The setup error that one view wants, on top of a pose: the best parameters.
+std::vector<double> wanted_alone(Objective& objective, bool has_derivatives, const Eigen::Isometry3d& pose, Dof dof) {
   HeldObjective held(objective, pose);
   const std::size_t axes = dof == Dof::kRigid ? 6 : 3;
   OptimizerOptions options{.start = std::vector<double>(axes, 0.0),
@@ -64,44 +63,57 @@ Eigen::Isometry3d wanted_alone(Renderer& renderer, const FixedImage& image, cons
                            .relative_tolerance = 0.02,
                            .max_evaluations = 100};
   using Points = std::span<const std::vector<double>>;
-  std::vector<OptimizerResult> found;
-  if (renderer.has_derivatives()) {
-    options.kind = OptimizerKind::kLevenbergMarquardt;
-    found = maximize([&](Points points) { return held.models(points); }, std::span(&options, 1));
-  } else {
-    found = maximize([&](Points points) { return held.values(points); }, std::span(&options, 1));
-  }
-  return setup_error_from_parameters(found.front().best) * pose;
+  if (!has_derivatives)
+    return maximize([&](Points points) { return held.values(points); }, std::span(&options, 1)).front().best;
+  options.kind = OptimizerKind::kLevenbergMarquardt;
+  return maximize([&](Points points) { return held.models(points); }, std::span(&options, 1)).front().best;
 }
 
-// Root mean square over the standard targets of how far they move in a view, mm at the isocenter.
-double seen_distance_mm(const XrayView& view, const Eigen::Isometry3d& setup_error, const Eigen::Isometry3d& other) {
-  double squares = 0.0, count = 0.0;
-  for (const Eigen::Vector3d& target : standard_targets_mm()) {
-    const auto here = view.project(setup_error * target), there = view.project(other * target);
-    if (!here || !there) continue;
-    squares += (*here - *there).squaredNorm();
-    count += 1.0;
+// How the standard targets move in a view with every parameter: two rows per target, mm at the isocenter.
+Eigen::MatrixXd seen_motions(const XrayView& view, const Eigen::Isometry3d& setup_error, std::size_t axes) {
+  constexpr double kStepMm = 0.1;
+  const std::vector<Eigen::Vector3d> targets = standard_targets_mm();
+  Eigen::MatrixXd motions =
+      Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(2 * targets.size()), static_cast<Eigen::Index>(axes));
+  for (std::size_t axis = 0; axis < axes; ++axis) {
+    std::vector<double> step(axes);
+    step[axis] = kStepMm;
+    const Eigen::Isometry3d moved = setup_error_from_parameters(step) * setup_error;
+    for (std::size_t n = 0; n < targets.size(); ++n) {
+      const auto here = view.project(setup_error * targets[n]), there = view.project(moved * targets[n]);
+      if (here && there)
+        motions.block<2, 1>(static_cast<Eigen::Index>(2 * n), static_cast<Eigen::Index>(axis)) =
+            (*there - *here) / (kStepMm * pixels_per_mm(view));
+    }
   }
-  return count > 0.0 ? std::sqrt(squares / count) / pixels_per_mm(view) : 0.0;
+  return motions;
 }
 
 }  // namespace
 
-std::vector<double> contradictions(const RendererPyramid& renderers, const FixedViews& views,
-                                   const Eigen::Isometry3d& planned_room_from_patient,
-                                   const Eigen::Isometry3d& room_from_patient, const Stage& last_stage, Dof dof) {
+std::vector<Contradiction> contradictions(const RendererPyramid& renderers, const FixedViews& views,
+                                          const Eigen::Isometry3d& planned_room_from_patient,
+                                          const Eigen::Isometry3d& room_from_patient, const Stage& last_stage,
+                                          Dof dof) {
   if (views.images.size() < 2) return {};
   constexpr double kPixelMm = 2.0;
   const double pixel_mm = std::max(kPixelMm, last_stage.pixel_mm);
   Renderer& renderer = renderers.with_voxels_up_to(std::max(kPixelMm, last_stage.voxel_mm));
   const Eigen::Isometry3d error = room_from_patient * planned_room_from_patient.inverse();
-  std::vector<double> distances_mm;
+  const auto targets = static_cast<double>(standard_targets_mm().size());
+  std::vector<Contradiction> result;
   for (const FixedImage& image : views.reduced_to(pixel_mm, room_from_patient, 0.0)) {
-    const Eigen::Isometry3d alone = wanted_alone(renderer, image, room_from_patient, dof);
-    distances_mm.push_back(seen_distance_mm(image.view, alone * planned_room_from_patient.inverse(), error));
+    Objective objective(
+        renderer, std::span(&image, 1), room_from_patient,
+        {.similarity = SimilarityKind::kGradientCorrelation, .pixel_fraction = 0.5, .min_pixels = 6000});
+    const std::vector<double> alone = wanted_alone(objective, renderer.has_derivatives(), room_from_patient, dof);
+    const Eigen::MatrixXd motions = seen_motions(image.view, error, alone.size());
+    const Eigen::MatrixXd covariance = pose_covariance(objective, room_from_patient, dof == Dof::kTranslation, kSpring);
+    const Eigen::Map<const Eigen::VectorXd> wanted(alone.data(), static_cast<Eigen::Index>(alone.size()));
+    result.push_back({.mm = (motions * wanted).norm() / std::sqrt(targets),
+                      .sigma_mm = std::sqrt((motions * covariance * motions.transpose()).trace() / targets)});
   }
-  return distances_mm;
+  return result;
 }
 
 }  // namespace isoshift

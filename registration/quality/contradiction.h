@@ -11,9 +11,10 @@ namespace isoshift {
 // For each view: how far it alone would want anatomy from where all views together put it. The pose that the view alone
 // wants is searched from the pose found, by gradient correlation; depth, which it hardly sees, is held by a weak
 // spring. The distance is the root mean square over the 27 points {-50, 0, 50}^3 mm about the isocenter, as the view
-// sees it: in mm at the isocenter. Empty for a single view.
-std::vector<double> contradictions(const RendererPyramid& renderers, const FixedViews& views,
-                                   const Eigen::Isometry3d& planned_room_from_patient,
-                                   const Eigen::Isometry3d& room_from_patient, const Stage& last_stage, Dof dof);
+// sees it: in mm at the isocenter. Its sigma is what the residuals of that view let expect of views that agree
+// (uncertainty.h). Empty for a single view.
+std::vector<Contradiction> contradictions(const RendererPyramid& renderers, const FixedViews& views,
+                                          const Eigen::Isometry3d& planned_room_from_patient,
+                                          const Eigen::Isometry3d& room_from_patient, const Stage& last_stage, Dof dof);
 
 }  // namespace isoshift

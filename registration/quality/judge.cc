@@ -25,7 +25,7 @@ constexpr double kMaxSpreadMm = 1.0, kMaxSpreadRad = rad_from_deg(1.0);
 // Root mean square over the views. Undisturbed studies reached 0.05 to 0.22 mm (plastic head and chest, four kinds of
 // views); a patient turned 2 degrees between the views, a gantry 2 or a receptor 1.5 degrees, a panel 3 mm or a
 // distance 2 % off in one of them 0.68 mm and more (docs/evaluation.md).
-constexpr double kMaxContradictionMm = 0.5;
+constexpr double kMaxContradictionMm = 0.5, kMaxContradictionSigmas = 3.0;
 constexpr double kMaxTwoSigmaMm = 1.0, kMaxTwoSigmaRad = rad_from_deg(1.0);
 // An alternative must leave this much more unexplained (1 - gradient correlation) than the images as they are. On head
 // phantoms, which are nearly symmetric, a mirrored AP view leaves 1.2 to 4 times as much.
@@ -93,10 +93,14 @@ void judge_views(bool is_volume_chosen, RegistrationResult& result) {
 }
 
 void judge_contradiction(RegistrationResult& result) {
-  double squares = 0.0;
-  for (const ViewMatch& view : result.views)
-    squares += std::pow(view.contradiction_mm.value_or(0.0), 2) / static_cast<double>(result.views.size());
-  if (!(std::sqrt(squares) <= kMaxContradictionMm))
+  double squares = 0.0, variances = 0.0;
+  for (const ViewMatch& view : result.views) {
+    const Contradiction contradiction = view.contradiction.value_or(Contradiction());
+    squares += contradiction.mm * contradiction.mm / static_cast<double>(result.views.size());
+    variances += contradiction.sigma_mm * contradiction.sigma_mm / static_cast<double>(result.views.size());
+  }
+  const double limit_mm = std::max(kMaxContradictionMm, kMaxContradictionSigmas * std::sqrt(variances));
+  if (!(std::sqrt(squares) <= limit_mm))
     review(result, fmt::format("the views contradict each other: each of them alone would want the anatomy elsewhere, "
                                "{:.1f} mm in the mean. The patient or anatomy may have moved between them or against "
                                "the rest, or an angle, a distance or a position in a file may be wrong",

@@ -91,7 +91,23 @@ Sandwich sandwich_at(Objective& objective, const Eigen::Isometry3d& pose, int ax
   return sandwich;
 }
 
+// Sandwiches of few tiles are too thin.
+double small_sample(const Sandwich& sandwich, int axes) {
+  return sandwich.tiles > axes ? static_cast<double>(sandwich.tiles) / (sandwich.tiles - axes) : 1e6;
+}
+
 }  // namespace
+
+Eigen::MatrixXd pose_covariance(Objective& objective, const Eigen::Isometry3d& room_from_patient, bool translation_only,
+                                double spring) {
+  const int axes = translation_only ? 3 : 6;
+  Sandwich sandwich = sandwich_at(objective, room_from_patient, axes);
+  // Gradient correlation is the mean over the views and both directions, the curvature their sum.
+  const double lists = 2.0 * static_cast<double>(objective.views().size());
+  sandwich.curvature += lists * spring * Eigen::MatrixXd::Identity(axes, axes);
+  const Eigen::MatrixXd bread = sandwich.curvature.inverse();
+  return small_sample(sandwich, axes) * bread * sandwich.scatter * bread;
+}
 
 std::optional<Uncertainty> estimated_uncertainty(Objective& objective, const Eigen::Isometry3d& room_from_patient,
                                                  const UncertaintyOptions& options) {
@@ -101,9 +117,7 @@ std::optional<Uncertainty> estimated_uncertainty(Objective& objective, const Eig
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(sandwich.curvature);
   if (!(eigen.eigenvalues().minCoeff() > kSingular * eigen.eigenvalues().maxCoeff())) return std::nullopt;
   const Eigen::MatrixXd bread = sandwich.curvature.inverse();
-  const double small_sample =
-      sandwich.tiles > axes ? static_cast<double>(sandwich.tiles) / (sandwich.tiles - axes) : 1e6;
-  const Eigen::MatrixXd covariance = small_sample * bread * sandwich.scatter * bread;
+  const Eigen::MatrixXd covariance = small_sample(sandwich, axes) * bread * sandwich.scatter * bread;
   const double overlap = options.has_volume_of_interest ? kOverlap : 1.0;
   const auto sigma_mm = [&](int axis) {
     return overlap * std::hypot(kCalibration * std::sqrt(covariance(axis, axis)),

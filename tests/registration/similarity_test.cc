@@ -248,7 +248,7 @@ TEST(Similarity, InformationChangesSmoothlyWithTheDrr) {
 }
 
 constexpr int kImages =
-    800;  // of 5 x 5 pixels, one after the other: enough that no cell of a histogram is nearly empty
+    3000;  // of 5 x 5 pixels, one after the other: enough that no cell of a histogram is nearly empty
 
 // A DRR that depends on three parameters, smoothly and not only linearly, and an X-ray like it at 0.
 struct Parametric {

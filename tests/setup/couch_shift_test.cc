@@ -65,7 +65,7 @@ TEST(CouchShift, SmallerCouchesLeaveWhatDicomMd51Says) {
 // Where the couch cannot rotate, its translation brings the target's center right, and no longer the isocenter: 2
 // degrees and 80 mm would leave 2.8 mm there.
 TEST(CouchShift, SmallerCouchesBringTheTargetRight) {
-  const Eigen::Isometry3d error = setup_error({3, -2, 1.5}, 0, 2, 0);
+  const Eigen::Isometry3d error = setup_error({3, -2, 1.5}, 0, 0, 2);
   const TableAngles table{.support_rad = rad_from_deg(25), .pitch_rad = rad_from_deg(1), .roll_rad = rad_from_deg(-2)};
   const Vector3d target(80, 0, 0);
   for (const CouchDof dof : {CouchDof::kThree, CouchDof::kFour}) {
