@@ -48,7 +48,7 @@ std::vector<Stage> setup_stages() {
            .reach_rad = rad_from_deg(1.5),
            .initial_step_mm = 1.0,
            .initial_step_rad = rad_from_deg(0.6),
-           .relative_tolerance = 0.05},
+           .relative_tolerance = 0.02},
           {.name = "fine",
            .similarity = SimilarityKind::kGradientCorrelation,
            .optimizer = OptimizerKind::kLevenbergMarquardt,
@@ -58,7 +58,7 @@ std::vector<Stage> setup_stages() {
            .min_pixels = 8000,
            .initial_step_mm = 0.4,
            .initial_step_rad = rad_from_deg(0.25),
-           .relative_tolerance = 0.03}};
+           .relative_tolerance = 0.01}};
 }
 
 // As setup from one start, without the candidates of a far search, and ending on pixels of 2 mm.
@@ -73,7 +73,7 @@ std::vector<Stage> fast_stages() {
   fine.pixel_mm = 2.0;
   fine.voxel_mm = 2.0;
   fine.min_pixels = 3000;
-  fine.relative_tolerance = 0.05;
+  fine.relative_tolerance = 0.02;
   return stages;
 }
 

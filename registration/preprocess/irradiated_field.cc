@@ -159,13 +159,23 @@ std::string doubt_about(const Sides& sides) {
 }
 
 // Rods, couches and patients are bright again beyond; a field is dark there.
-bool is_bright_beyond(const Sides& sides) {
-  return std::ranges::any_of(
-      sides, [](const Side& side) { return !side.is_open() && side.brightness_beyond > kRodBrightness; });
+int sides_bright_beyond(const Sides& sides) {
+  return static_cast<int>(std::ranges::count_if(
+      sides, [](const Side& side) { return !side.is_open() && side.brightness_beyond > kRodBrightness; }));
 }
 
 // Whether a rectangle with one side or two can be a rod, a couch or the patient.
-bool may_be_rod(const Sides& sides) { return sides_found(sides) < 3 && is_bright_beyond(sides); }
+bool may_be_rod(const Sides& sides) { return sides_found(sides) < 3 && sides_bright_beyond(sides) > 0; }
+
+// Whether a rectangle with one side or two leaves the isocenter out, as a strip of air beside the patient does.
+bool is_beside(const Sides& sides, const Eigen::Vector2d& isocenter_upright_px, double mm) {
+  constexpr double kToleranceMm = 5.0;
+  const auto beyond_mm = [&](std::size_t low, double at) {
+    return std::max(sides[low].line.at - at, at - sides[low + 1].line.at) * mm;
+  };
+  return sides_found(sides) < 3 &&
+         std::max(beyond_mm(0, isocenter_upright_px.x()), beyond_mm(2, isocenter_upright_px.y())) > kToleranceMm;
+}
 
 // The field as the image alone shows it.
 struct Finding {
@@ -173,19 +183,20 @@ struct Finding {
   std::string doubt = {};
 };
 
-Finding find_in(const Upright& upright, const FieldEdges& edges) {
+Finding find_in(const Upright& upright, const FieldEdges& edges, const Eigen::Vector2d& isocenter_upright_px) {
   Finding finding{.sides = measured(upright, edges.best())};
   const Sides& sides = finding.sides;
-  if (sides_clear(sides) > 0 && !may_be_rod(sides)) {
+  const bool is_anatomy = may_be_rod(sides) || is_beside(sides, isocenter_upright_px, upright.xray.mm);
+  if (sides_clear(sides) > 0 && !is_anatomy) {
     finding.doubt = doubt_about(sides);
     return finding;
   }
   // No field. Edges that are not clear enough, straight and dark beyond all the same, are a reason to ask.
   const auto side = std::ranges::find(sides, false, &Side::is_open);
   const auto number = static_cast<std::size_t>(side - sides.begin());
-  if (sides_found(sides) > 1 && !is_bright_beyond(sides))
+  if (!is_anatomy && sides_found(sides) > 1 && sides_bright_beyond(sides) < 2)
     finding.doubt = "edges are seen that make no clear rectangle";
-  else if (sides_found(sides) == 1 && side->edge.evidence >= kFaint && side->is_straight() && !may_be_rod(sides))
+  else if (sides_found(sides) == 1 && side->edge.evidence >= kFaint && side->is_straight() && !is_anatomy)
     finding.doubt = fmt::format("a faint edge may be its {} side", kNames[number]);
   finding.sides = measured(upright, edges.whole());
   return finding;
@@ -306,7 +317,9 @@ IrradiatedField find_irradiated_field(const XrayImage& xray, double pixels_per_m
   using Origin = IrradiatedField::Origin;
   const Upright upright(upright_xray(xray, pixels_per_mm));
   const FieldEdges edges(upright.xray);
-  Finding finding = innermost(upright, find_in(upright, edges));
+  const Eigen::Vector2d isocenter_px =
+      Mapping(upright.xray).upright(xray.view.project(Eigen::Vector3d::Zero()).value());
+  Finding finding = innermost(upright, find_in(upright, edges, isocenter_px));
   IrradiatedField field{.origin = sides_found(finding.sides) > 0 ? Origin::kFound : Origin::kWholeReceptor};
   if (xray.declared_aperture)
     finding = reconciled(std::move(finding), *xray.declared_aperture, upright, edges, field.origin);
