@@ -123,6 +123,7 @@ std::vector<OptimizerResult> climb(const BatchModel& models, std::span<const Opt
     for (std::size_t n = 0; n < running.size(); ++n) running[n]->take(std::move(at_points[n]));
   }
   std::vector<OptimizerResult> results;
+  results.reserve(climbs.size());
   for (const Climb& one : climbs) results.push_back(one.result());
   return results;
 }

@@ -51,16 +51,17 @@ std::vector<std::uint32_t> drawn_pixels(const std::vector<std::uint32_t>& pixels
 // the strongest gradients of the DRR first. Where it has none, there is only noise to compare.
 std::vector<std::uint32_t> strongest_pixels(const std::vector<std::uint32_t>& pixels, const Image<float>& drr,
                                             const ObjectiveOptions& options) {
-  constexpr int kPatchEdge = 8;
   struct Patch {
     double strength = 0.0;
     std::vector<std::uint32_t> pixels;
   };
-  const int patches_per_row = drr.columns / kPatchEdge + 1;
-  std::vector<Patch> patches(static_cast<std::size_t>(patches_per_row) * (drr.rows / kPatchEdge + 1));
+  constexpr std::size_t kPatchEdge = 8;
+  const std::size_t patches_per_row = static_cast<std::size_t>(drr.columns) / kPatchEdge + 1;
+  std::vector<Patch> patches(patches_per_row * (static_cast<std::size_t>(drr.rows) / kPatchEdge + 1));
   for (const std::uint32_t pixel : pixels) {
     const int column = static_cast<int>(pixel) % drr.columns, row = static_cast<int>(pixel) / drr.columns;
-    Patch& patch = patches[static_cast<std::size_t>(row / kPatchEdge * patches_per_row + column / kPatchEdge)];
+    Patch& patch = patches[static_cast<std::size_t>(row) / kPatchEdge * patches_per_row +
+                           static_cast<std::size_t>(column) / kPatchEdge];
     const float along_row = drr.at(column + 1, row) - drr.at(column - 1, row);
     const float along_column = drr.at(column, row + 1) - drr.at(column, row - 1);
     patch.strength += along_row * along_row + along_column * along_column;
@@ -119,6 +120,7 @@ void Objective::add_view(const FixedImage& image, std::vector<std::uint32_t> com
       neighbors.push_back({place(pixel - 1), place(pixel + 1), place(pixel - columns), place(pixel + columns)});
   }
   std::vector<float> xray;
+  xray.reserve(rendered.size());
   for (const std::uint32_t pixel : rendered) xray.push_back(image.line_integral.pixels[pixel]);
   Range drr_range;
   if (has_histogram(similarity_)) {

@@ -208,6 +208,7 @@ std::vector<OptimizerResult> maximize_all(const Batch& objective, std::span<cons
   std::vector<std::exception_ptr> failures(searches.size());
   LockStep<Answer> lock_step(searches.size());
   std::vector<std::jthread> threads;  // joined before what they refer to ends
+  threads.reserve(searches.size());
   for (std::size_t n = 0; n < searches.size(); ++n)
     threads.emplace_back([&, n] {
       try {

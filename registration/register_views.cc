@@ -53,6 +53,25 @@ void report_views(const RendererPyramid& renderers, const FixedViews& views, con
   }
 }
 
+void report_uncertainty(const RendererPyramid& renderers, const FixedViews& views, const RegistrationOptions& options,
+                        RegistrationResult& result) {
+  const Stage& last = options.stages.back();
+  const Eigen::Isometry3d& found = result.actual_room_from_patient;
+  Objective gradient_correlation(renderers.with_voxels_up_to(last.voxel_mm),
+                                 views.reduced_to(last.pixel_mm, found, 0.0), found,
+                                 {.similarity = SimilarityKind::kGradientCorrelation,
+                                  .pixel_fraction = last.pixel_fraction,
+                                  .min_pixels = static_cast<std::size_t>(last.min_pixels),
+                                  .seed = options.seed});
+  result.uncertainty = estimated_uncertainty(gradient_correlation, found,
+                                             {.translation_only = options.dof == Dof::kTranslation,
+                                              .voxel_mm = renderers.voxel_mm(),
+                                              .has_volume_of_interest = views.region.has_volume()});
+  for (const StageReport& stage : result.stages)
+    if (result.uncertainty && stage.spread_mm)
+      result.uncertainty = widened_to_spread(*result.uncertainty, *stage.spread_mm, *stage.spread_rad);
+}
+
 }  // namespace
 
 void RegistrationOptions::check() const {
@@ -93,20 +112,7 @@ RegistrationResult register_views(const RendererPyramid& renderers, std::span<co
   result.seconds_similarity = found.seconds_similarity;
   const Stage& last = options.stages.back();
   report_views(renderers, fixed, start_room_from_patient, last, result);
-  Objective gradient_correlation(renderers.with_voxels_up_to(last.voxel_mm),
-                                 fixed.reduced_to(last.pixel_mm, result.actual_room_from_patient, 0.0),
-                                 result.actual_room_from_patient,
-                                 {.similarity = SimilarityKind::kGradientCorrelation,
-                                  .pixel_fraction = last.pixel_fraction,
-                                  .min_pixels = static_cast<std::size_t>(last.min_pixels),
-                                  .seed = options.seed});
-  result.uncertainty = estimated_uncertainty(gradient_correlation, result.actual_room_from_patient,
-                                             {.translation_only = options.dof == Dof::kTranslation,
-                                              .voxel_mm = renderers.voxel_mm(),
-                                              .has_volume_of_interest = fixed.region.has_volume()});
-  for (const StageReport& stage : result.stages)
-    if (result.uncertainty && stage.spread_mm)
-      result.uncertainty = widened_to_spread(*result.uncertainty, *stage.spread_mm, *stage.spread_rad);
+  report_uncertainty(renderers, fixed, options, result);
   if (options.check_alternatives)
     result.alternatives = compare_alternatives(renderers, fixed, start_room_from_patient, search_options, found);
   if (options.check_vertebrae)

@@ -151,6 +151,7 @@ std::vector<Parameters> best_of(std::vector<Parameters> poses, std::size_t count
   std::iota(order.begin(), order.end(), 0);
   std::ranges::stable_sort(order, std::greater(), [&](std::size_t n) { return values[n]; });
   std::vector<Parameters> best;
+  best.reserve(count);
   for (std::size_t n = 0; n < count; ++n) best.push_back(poses[order[n]]);
   return best;
 }
@@ -185,6 +186,7 @@ void report_spread(const std::vector<OptimizerResult>& found, StageReport& repor
 std::vector<FixedImage> FixedViews::reduced_to(double pixel_mm, const Eigen::Isometry3d& room_from_patient,
                                                double slack_mm) const {
   std::vector<FixedImage> level;
+  level.reserve(images.size());
   for (const FixedImage& image : images)
     level.push_back(compared_part(image, region, pixel_mm, room_from_patient, slack_mm));
   return level;

@@ -78,6 +78,7 @@ ShownShift shown_shift(const SetupResult& result) {
   }
   shown.withheld = result.verdict == Verdict::kRejected;
   std::vector<Eigen::Vector3d> unobservable_table;
+  unobservable_table.reserve(result.unobservable_room.size());
   for (const Eigen::Vector3d& direction : result.unobservable_room)
     unobservable_table.push_back(rotation_z(-result.table.yaw_rad()) * direction);
   shown.couch_mm = determined(shift.translation_mm, unobservable_table);

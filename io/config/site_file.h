@@ -26,7 +26,7 @@ struct SiteFile {
   std::string name;
   std::string sha256;                                             // of the file, hexadecimal
   std::map<std::string, ActionLevel, std::less<>> action_levels;  // by anatomy; "default" where none is named
-  std::map<std::string, std::string, std::less<>> targets;  // by anatomy: the name of a structure, or "isocenter"
+  std::map<std::string, std::string, std::less<>> targets;        // by anatomy: the name of a structure, or "isocenter"
   CouchDof couch_dof = CouchDof::kSix;
   std::optional<ValidatedScale> couch_scale;  // shown beside IEC 61217
   LengthUnit length_unit = LengthUnit::kMm;
@@ -38,8 +38,8 @@ struct SiteFile {
 SiteFile read_site_file(const std::filesystem::path& path);
 
 // The action level of an anatomy. If `anatomy` is empty: the level "default", or nothing if the file has no such level.
-// Throws UsageError, with the names in the file, for any other anatomy of which the file has neither an action level nor
-// a target.
+// Throws UsageError, with the names in the file, for any other anatomy of which the file has neither an action level
+// nor a target.
 std::optional<ActionLevel> action_level(const SiteFile& site, std::string_view anatomy);
 
 // The target of an anatomy, or else that of "default"; empty if the file names none.

@@ -8,13 +8,13 @@
 
 #include "geometry/rotation.h"
 #include "io/report/canvas.h"
+#include "io/report/report_sections.h"
 #include "io/report/rounding.h"
 #include "setup/shown_shift.h"
 
 namespace isoshift {
 namespace {
 
-constexpr const char* kNotDetermined = "not determined";
 constexpr std::array<std::size_t, 3> kRotationAxis = {2, 0, 1};  // of yaw, pitch and roll
 
 // The two senses of an axis in words, for positive and negative values.
@@ -184,6 +184,7 @@ std::string target_words(const ShownShift& shown, const TableAngles& table) {
   const std::array at_imaging_deg = {deg_from_rad(wrapped_rad(table.yaw_rad())), deg_from_rad(table.pitch_rad),
                                      deg_from_rad(table.roll_rad)};
   std::vector<std::string> parts;
+  parts.reserve(names.size());
   for (std::size_t n = 0; n < 3; ++n)
     parts.push_back(fmt::format("{} {}", names[n],
                                 shown.can_rotate[n]
@@ -262,145 +263,6 @@ void put_shift(const SetupResult& report, const ShownShift& shown, LengthUnit un
   }
 }
 
-std::string vector_words(const Eigen::Vector3d& mm, int decimals = 1) {
-  return fmt::format("({:.{}f}, {:.{}f}, {:.{}f}) mm", mm.x(), decimals, mm.y(), decimals, mm.z(), decimals);
-}
-
-ReportPage::Section geometry_section(const SetupResult& report) {
-  ReportPage::Section section{.title = "Geometry as understood"};
-  section.rows.push_back(
-      {"Isocenter", vector_words(report.isocenter_patient_mm, 2) + ", patient coordinates of the CT"});
-  section.rows.push_back({"Table angles at imaging",
-                          fmt::format("support {:.2f}, eccentric {:.2f}, pitch {:.2f}, roll {:.2f} deg",
-                                      deg_from_rad(report.table.support_rad), deg_from_rad(report.table.eccentric_rad),
-                                      deg_from_rad(report.table.pitch_rad), deg_from_rad(report.table.roll_rad))});
-  if (report.table_position_mm)
-    section.rows.push_back({"Table position at imaging",
-                            vector_words(*report.table_position_mm) + " lateral, longitudinal, vertical, IEC 61217"});
-  for (const SetupResult::View& view : report.views)
-    section.rows.push_back({printable(view.label),
-                            fmt::format("source at {} IEC fixed; {} x {} pixels of {:.3f} mm at the isocenter",
-                                        vector_words(view.source_room_mm), view.columns, view.rows, view.pixel_mm)});
-  return section;
-}
-
-// Where the target lies, as planned and as found.
-ReportPage::Section target_section(const SetupResult& report, const ShownShift& shown, LengthUnit unit) {
-  const auto words = [&](const std::array<std::optional<double>, 3>& mm) {
-    std::vector<std::string> components;
-    for (const auto& component : mm)
-      components.push_back(component ? rounded_length(*component, unit) : std::string(kNotDetermined));
-    return fmt::format("({}) {}", fmt::join(components, ", "), name_of(unit));
-  };
-  ReportPage::Section section{.title = "Target"};
-  section.rows.push_back({"Name", printable(report.target->name)});
-  section.rows.push_back({"Chosen by", report.target->chosen_by});
-  section.rows.push_back(
-      {"Center as planned", vector_words(report.target->center_room_mm) + " from the isocenter, IEC 61217 fixed"});
-  if (!shown.withheld) section.rows.push_back({"Center lies off plan by", words(shown.target_mm)});
-  if (!shown.withheld && report.uncertainty)
-    section.rows.push_back({"One sigma of that", words(shown.target_sigma_mm)});
-  return section;
-}
-
-ReportPage::Section left_over_section(const ReportPage& page) {
-  ReportPage::Section section{.title = page.left_over_words, .rows = {}};
-  for (const ReportPage::LeftOver& left : page.left_over)
-    section.rows.push_back({left.at, fmt::format("({}) {}, length {} {}", fmt::join(left.components, ", "), left.unit,
-                                                 left.length, left.unit)});
-  return section;
-}
-
-ReportPage::Section search_section(const SetupResult& report) {
-  ReportPage::Section section{.title = "Search"};
-  section.rows.push_back({"Preset", fmt::format("{}, seed {}, {}", report.preset, report.seed,
-                                                report.translation_only ? "translations only: rotations were taken as 0"
-                                                                        : "six degrees of freedom")});
-  section.rows.push_back({"Region", report.region.empty() ? "everything" : printable(joined(report.region, "; "))});
-  for (const StageReport& stage : report.stages)
-    section.rows.push_back(
-        {"Stage " + stage.name,
-         fmt::format("{} by {}: {:.4f} after {} evaluations in {:.2f} s, {}{}", stage.similarity, stage.optimizer,
-                     stage.value, stage.evaluations, stage.seconds, stage.termination,
-                     stage.spread_mm ? fmt::format("; ends of its starts within {:.2f} mm, {:.2f} deg",
-                                                   *stage.spread_mm, deg_from_rad(stage.spread_rad.value_or(0.0)))
-                                     : "")});
-  return section;
-}
-
-// The field's size, as the lengths of two sides at the isocenter.
-std::string field_words(const SetupResult::View& view) {
-  const IrradiatedField& field = view.match.field;
-  std::string words = field.origin == IrradiatedField::Origin::kWholeReceptor ? "the whole receptor"
-                      : field.origin == IrradiatedField::Origin::kFound       ? "found in the image"
-                      : field.origin == IrradiatedField::Origin::kDeclared ? "declared by the file, seen in the image"
-                                                                           : "drawn by hand";
-  if (field.corners_px.size() == 4 && field.origin != IrradiatedField::Origin::kWholeReceptor)
-    words += fmt::format(": {:.1f} x {:.1f} mm at the isocenter",
-                         view.pixel_mm * (field.corners_px[1] - field.corners_px[0]).norm(),
-                         view.pixel_mm * (field.corners_px[2] - field.corners_px[1]).norm());
-  if (field.sigma_mm > 0.0 && field.sigma_mm < 100.0) words += fmt::format(", +/- {:.1f} mm", 2.0 * field.sigma_mm);
-  return field.is_sure() ? words : words + "; not sure: " + printable(field.doubt);
-}
-
-ReportPage::Section checks_section(const SetupResult& report) {
-  ReportPage::Section section{.title = "Checks"};
-  for (const SetupResult::View& view : report.views) {
-    std::string words =
-        fmt::format("similarity {:.4f} as planned, {:.4f} as found; {} of {} parts with signal match elsewhere",
-                    view.match.similarity_start, view.match.similarity_final, view.match.consistency.disagreeing(),
-                    view.match.consistency.with_signal());
-    if (const auto& left_out = view.match.left_out)
-      words += fmt::format("; without it the pose moves {:.2f} mm, {:.2f} deg", left_out->distance_mm,
-                           deg_from_rad(left_out->angle_rad));
-    if (const auto& contradiction = view.match.contradiction)
-      words += fmt::format("; alone it would want the anatomy {:.2f} mm elsewhere (sigma {:.2f} mm)", contradiction->mm,
-                           contradiction->sigma_mm);
-    section.rows.push_back({printable(view.label), words});
-    if (!view.match.field.corners_px.empty())
-      section.rows.push_back({"Field of " + printable(view.label), field_words(view)});
-  }
-  for (const Alternative& alternative : report.alternatives)
-    section.rows.push_back(
-        {"If " + printable(alternative.description),
-         fmt::format("similarity {:.4f}, as it is {:.4f}", alternative.similarity, alternative.as_is)});
-  return section;
-}
-
-ReportPage::Section provenance_section(const SetupResult& report) {
-  ReportPage::Section section{.title = "Provenance"};
-  std::string settings;
-  for (const auto& [name, value] : report.renderer_settings) settings += fmt::format(", {} {}", name, value);
-  section.rows = {
-      {"Program", fmt::format("isoshift {} ({})", report.version, report.commit)},
-      {"Renderer", fmt::format("{} on {}{}; attenuation {}, threshold {:.0f} HU", report.renderer,
-                               printable(report.device), settings, report.attenuation, report.threshold_hu)},
-      {"Time", fmt::format("{:.1f} s, of which registration {:.1f} s", report.seconds_total, report.seconds)},
-      {"CT series", fmt::format("{}; SHA-256 {}", printable(report.ct_series_uid), report.ct_sha256)}};
-  if (!report.plan_uid.empty())
-    section.rows.push_back({"Plan", fmt::format("{}; SHA-256 {}", printable(report.plan_uid), report.plan_sha256)});
-  for (const SetupResult::View& view : report.views)
-    section.rows.push_back(
-        {printable(view.label),
-         fmt::format("{} frame {}; SHA-256 {}", printable(view.sop_instance_uid), view.frame, view.sha256)});
-  if (report.machine)
-    section.rows.push_back({"Machine profile", fmt::format("\"{}\"; SHA-256 {}", printable(report.machine->name),
-                                                           report.machine->sha256)});
-  if (report.site)
-    section.rows.push_back(
-        {"Site file", fmt::format("\"{}\"; SHA-256 {}", printable(report.site->name), report.site->sha256)});
-  if (report.site)
-    section.rows.push_back({"Release", report.site->automatic_release
-                                           ? fmt::format("automatic for accepted results, allowed by {} on {}",
-                                                         printable(report.site->automatic_release->by),
-                                                         printable(report.site->automatic_release->on))
-                                           : "by a person"});
-  section.rows.push_back({"Registration object", report.spatial_registration_uid.empty()
-                                                     ? "none was written"
-                                                     : report.spatial_registration_uid});
-  return section;
-}
-
 const char* meaning(Verdict verdict) {
   switch (verdict) {
     case Verdict::kAccepted: return "the checks of isoshift found nothing wrong";
@@ -465,9 +327,7 @@ ReportPage report_page(const SetupResult& report) {
   page.warnings = all_printable(report.warnings);
   page.overrides = all_printable(report.overrides);
   page.left_aside = all_printable(report.left_aside);
-  page.details = {geometry_section(report), search_section(report), checks_section(report), provenance_section(report)};
-  if (!page.left_over.empty()) page.details.insert(page.details.begin() + 1, left_over_section(page));
-  if (report.target) page.details.insert(page.details.begin(), target_section(report, shown, unit));
+  page.details = report_sections(report, shown, unit, page);
   return page;
 }
 

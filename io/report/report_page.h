@@ -11,6 +11,8 @@
 
 namespace isoshift {
 
+inline constexpr const char* kNotDetermined = "not determined";
+
 // One rounded number with its name. `value` is "not determined" if the number is not determined.
 struct Quantity {
   std::string name;        // "Lateral"

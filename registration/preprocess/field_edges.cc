@@ -261,6 +261,7 @@ FieldRectangle FieldEdges::best() const {
       if (right - left < least) continue;
       const Span columns{left, right, left == 0, right == across_.size};
       std::vector<std::optional<double>> of_bottoms;
+      of_bottoms.reserve(down_.highs.size());
       for (const int bottom : down_.highs)
         of_bottoms.push_back(score_of(down_.high, bottom, bottom == down_.size, columns));
       for (const int top : down_.lows) {

@@ -94,8 +94,9 @@ BlurFit fit_with(const std::vector<Block>& blocks, int count, double pixel_mm, d
                  int sign) {
   std::vector<EdgeModel> models;
   std::vector<double> places;
-  for (double off = -kPlacesMm; off <= kPlacesMm + 1e-9; off += kPlaceStepMm) {
-    places.push_back(middle_mm + off);
+  const int steps = static_cast<int>(std::lround(2.0 * kPlacesMm / kPlaceStepMm));
+  for (int n = 0; n <= steps; ++n) {
+    places.push_back(middle_mm - kPlacesMm + n * kPlaceStepMm);
     models.emplace_back(count, pixel_mm, middle_mm, places.back(), blur_mm, sign);
   }
   BlurFit fit;

@@ -1,5 +1,7 @@
 #include "registration/similarity/histogram.h"
 
+#include <cmath>
+
 namespace isoshift {
 
 Range range_of(std::span<const float> values) {
@@ -24,7 +26,7 @@ Place place_of(float value, const Range& range, int bins) {
   const float beyond = place - static_cast<float>(lower);
   return {.lower = static_cast<std::size_t>(lower),
           .beyond = beyond,
-          .shares = static_cast<std::uint32_t>(beyond * static_cast<float>(kSharesPerPixel) + 0.5F)};
+          .shares = static_cast<std::uint32_t>(std::lround(beyond * static_cast<float>(kSharesPerPixel)))};
 }
 
 float bins_per_unit(float value, const Range& range, int bins) {

@@ -50,6 +50,33 @@ std::vector<SetupResult::Point> centroids_of(const std::vector<MarkedStructure>&
   return points;
 }
 
+// The X-rays as they were compared: within the rectangles that a person drew.
+std::vector<FixedImage> compared_images(std::span<const FixedImage> images, const RegistrationOptions& options) {
+  std::vector<FixedImage> compared(images.begin(), images.end());
+  for (FixedImage& image : compared)
+    if (const auto drawn = options.rectangles.find(image.label); drawn != options.rectangles.end())
+      restrict_to(drawn->second, image);
+  return compared;
+}
+
+SetupResult::View view_of(const RtImage& image, const XrayView& view, ViewMatch match, ViewPicture picture) {
+  return {.label = image.label,
+          .sop_class_uid = image.sop_class_uid,
+          .sop_instance_uid = image.sop_instance_uid,
+          .sha256 = image.sha256,
+          .frame = image.frame + 1,
+          .acquired = acquired(image),
+          .origin = image.reported_values_origin.value_or(""),
+          .gantry_deg = image.pixel_from_room ? std::nullopt : image.gantry_angle_deg,
+          .source_room_mm = view.source_room_mm,
+          .pixel_mm = 1.0 / pixels_per_mm(view),
+          .columns = view.columns,
+          .rows = view.rows,
+          .is_megavoltage = view.beam == Beam::kMegavoltage,
+          .match = std::move(match),
+          .picture = std::move(picture)};
+}
+
 }  // namespace
 
 std::optional<SiteFile> named_site(const std::filesystem::path& file) {
@@ -79,12 +106,9 @@ SetupResult setup_result_of(const Study& study, std::span<const FixedImage> imag
   Renderer& renderer = setup.renderers().finest();
   const RegistrationOptions& registration = setup.options();
   const std::vector<MarkedStructure> structures = marked_structures(study, request.region);
-  std::vector<FixedImage> compared(images.begin(), images.end());
-  for (FixedImage& image : compared)
-    if (const auto drawn = registration.rectangles.find(image.label); drawn != registration.rectangles.end())
-      restrict_to(drawn->second, image);
   std::vector<ViewPicture> pictures =
-      view_pictures(study, compared, renderer, structures, found.actual_room_from_patient);
+      view_pictures(study, compared_images(images, registration), renderer, structures, found.actual_room_from_patient);
+  std::vector<ViewMatch> matches = std::move(found.views);
   SetupResult result;
   static_cast<Registration&>(result) = std::move(found);
   result.made_on = local_time();
@@ -97,27 +121,11 @@ SetupResult setup_result_of(const Study& study, std::span<const FixedImage> imag
   result.isocenter_patient_mm = study.isocenter_patient_mm;
   result.table = study.table;
   result.table_position_mm = table_position(study);
-  result.setup_error = setup_error_from_poses(study.planned_room_from_patient, found.actual_room_from_patient);
+  result.setup_error = setup_error_from_poses(study.planned_room_from_patient, result.actual_room_from_patient);
   result.translation_only = registration.dof == Dof::kTranslation;
-  for (std::size_t n = 0; n < study.rt_images.size(); ++n) {
-    const XrayView& view = study.xrays[n].view;
+  for (std::size_t n = 0; n < study.rt_images.size(); ++n)
     result.views.push_back(
-        {.label = study.rt_images[n].label,
-         .sop_class_uid = study.rt_images[n].sop_class_uid,
-         .sop_instance_uid = study.rt_images[n].sop_instance_uid,
-         .sha256 = study.rt_images[n].sha256,
-         .frame = study.rt_images[n].frame + 1,
-         .acquired = acquired(study.rt_images[n]),
-         .origin = study.rt_images[n].reported_values_origin.value_or(""),
-         .gantry_deg = study.rt_images[n].pixel_from_room ? std::nullopt : study.rt_images[n].gantry_angle_deg,
-         .source_room_mm = view.source_room_mm,
-         .pixel_mm = 1.0 / pixels_per_mm(view),
-         .columns = view.columns,
-         .rows = view.rows,
-         .is_megavoltage = view.beam == Beam::kMegavoltage,
-         .match = std::move(found.views[n]),
-         .picture = std::move(pictures[n])});
-  }
+        view_of(study.rt_images[n], study.xrays[n].view, std::move(matches[n]), std::move(pictures[n])));
   result.preset = registration.preset;
   result.region = request.region.in_words();
   result.seed = registration.seed;

@@ -19,8 +19,10 @@ constexpr double kSurroundingsMm = 30.0;
 // The six neighbors of a cube's center, its edges and its corners.
 std::vector<Eigen::Vector3d> directions_all_around() {
   std::vector<Eigen::Vector3d> directions;
-  for (int n = 0; n < 27; ++n)
-    if (n != 13) directions.push_back(Eigen::Vector3d(n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1).normalized());
+  for (int n = 0; n < 27; ++n) {
+    const Eigen::Vector3i step(n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1);
+    if (!step.isZero()) directions.push_back(step.cast<double>().normalized());
+  }
   return directions;
 }
 
@@ -93,6 +95,7 @@ TargetChoice chosen_among(std::vector<Candidate> candidates, const Study& study,
   TargetChoice choice{.target = target_from(smallest, study, why), .doubts = {}};
   if (candidates.size() == 1) return choice;
   std::vector<std::string> names;
+  names.reserve(candidates.size());
   for (const Candidate& candidate : candidates) names.push_back(candidate.structure->name);
   choice.doubts.push_back(fmt::format("several structures may be the target ({}); {} was taken. Name it: --target NAME",
                                       fmt::join(names, ", "), choice.target.name));
