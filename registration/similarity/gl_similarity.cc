@@ -79,10 +79,9 @@ void upload(std::vector<T> values, Buffer& to) {
   to.upload(std::as_bytes(std::span(values)));
 }
 
-// NOLINTNEXTLINE(bugprone-return-const-ref-from-parameter): GlSimilarity says that it borrows the context
 const GlContext& made_current(const GlContext& context) {
   context.make_current();
-  return context;
+  return context;  // NOLINT(bugprone-return-const-ref-from-parameter): GlSimilarity says that it borrows the context
 }
 
 SimilarityKind common_kind(std::span<const Comparison> comparisons) {
