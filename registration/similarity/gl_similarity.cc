@@ -79,9 +79,10 @@ void upload(std::vector<T> values, Buffer& to) {
   to.upload(std::as_bytes(std::span(values)));
 }
 
-const GlContext& made_current(const GlContext& context) {
+// The program, made where it is to run.
+Program program_in(const GlContext& context, SimilarityKind kind) {
   context.make_current();
-  return context;  // NOLINT(bugprone-return-const-ref-from-parameter): GlSimilarity says that it borrows the context
+  return Program(shader(kind));
 }
 
 SimilarityKind common_kind(std::span<const Comparison> comparisons) {
@@ -94,7 +95,7 @@ SimilarityKind common_kind(std::span<const Comparison> comparisons) {
 }  // namespace
 
 GlSimilarity::GlSimilarity(const GlContext& context, std::span<const Comparison> comparisons)
-    : context_(made_current(context)), program_(shader(common_kind(comparisons))), view_count_(comparisons.size()) {
+    : context_(context), program_(program_in(context, common_kind(comparisons))), view_count_(comparisons.size()) {
   std::vector<GlView> views;
   XraySide xray;
   for (const Comparison& comparison : comparisons) {
