@@ -3,9 +3,11 @@
 // equivalent DRRs: the time, divided by that of one evaluation without derivatives of the same pixels.
 
 #include <benchmark/benchmark.h>
+#include <fmt/format.h>
 
 #include <chrono>
 #include <random>
+#include <vector>
 
 #include "bench/scene.h"
 #include "geometry/rotation.h"
@@ -103,38 +105,26 @@ void climb_stage(benchmark::State& state, const char* name, OptimizerKind optimi
   state.counters["equivalent_drrs"] = seconds / plain;
   state.counters["error_mm"] = error_mm / runs;
 }
-BENCHMARK_CAPTURE(climb_stage, fine_bobyqa, "fine", OptimizerKind::kBobyqa)
-    ->Arg(4)
-    ->Arg(10)
-    ->Arg(20)
-    ->UseRealTime()
-    ->Unit(benchmark::kMillisecond)
-    ->Iterations(1);
-BENCHMARK_CAPTURE(climb_stage, fine_levenberg_marquardt, "fine", OptimizerKind::kLevenbergMarquardt)
-    ->Arg(4)
-    ->Arg(10)
-    ->Arg(20)
-    ->UseRealTime()
-    ->Unit(benchmark::kMillisecond)
-    ->Iterations(1);
-BENCHMARK_CAPTURE(climb_stage, medium_bobyqa, "medium", OptimizerKind::kBobyqa)
-    ->Arg(10)
-    ->Arg(40)
-    ->UseRealTime()
-    ->Unit(benchmark::kMillisecond)
-    ->Iterations(1);
-BENCHMARK_CAPTURE(climb_stage, medium_levenberg_marquardt, "medium", OptimizerKind::kLevenbergMarquardt)
-    ->Arg(10)
-    ->Arg(40)
-    ->UseRealTime()
-    ->Unit(benchmark::kMillisecond)
-    ->Iterations(1);
-BENCHMARK_CAPTURE(climb_stage, medium_l_bfgs, "medium", OptimizerKind::kLbfgs)
-    ->Arg(10)
-    ->Arg(40)
-    ->UseRealTime()
-    ->Unit(benchmark::kMillisecond)
-    ->Iterations(1);
+const bool kRegistered = [] {
+  struct Climbed {
+    const char* stage;
+    std::vector<OptimizerKind> optimizers;
+    std::vector<std::int64_t> tenths_mm;
+  };
+  for (const auto& [stage, optimizers, tenths_mm] :
+       {Climbed{"fine", {OptimizerKind::kBobyqa, OptimizerKind::kLevenbergMarquardt}, {4, 10, 20}},
+        Climbed{
+            "medium", {OptimizerKind::kBobyqa, OptimizerKind::kLevenbergMarquardt, OptimizerKind::kLbfgs}, {10, 40}}})
+    for (const OptimizerKind optimizer : optimizers)
+      for (const std::int64_t distance : tenths_mm)
+        benchmark::RegisterBenchmark(fmt::format("climb_stage/{}/{}", stage, to_string(optimizer)).c_str(), climb_stage,
+                                     stage, optimizer)
+            ->Arg(distance)
+            ->UseRealTime()
+            ->Unit(benchmark::kMillisecond)
+            ->Iterations(1);
+  return true;
+}();
 
 }  // namespace
 }  // namespace isoshift

@@ -37,12 +37,6 @@ bool may_be_of(const Vertebra& vertebra, const PlaceAbout& place) {
          place.up > -2.6 * r - 0.6 * std::max(place.back - r, 0.0) && place.up < 1.8 * r;
 }
 
-Eigen::Vector3i voxel_of(const Eigen::Vector3i& size, std::uint32_t index) {
-  const auto columns = static_cast<std::uint32_t>(size.x()), rows = static_cast<std::uint32_t>(size.y());
-  return {static_cast<int>(index % columns), static_cast<int>(index / columns % rows),
-          static_cast<int>(index / (columns * rows))};
-}
-
 // Calls work(i, j, k) for the voxels of a box about a point.
 template <class T, class Work>
 void for_box(const Volume<T>& volume, const Eigen::Vector3d& center_mm, double reach_mm, Work&& work) {
@@ -62,21 +56,14 @@ double mean_of(const Volume<float>& hu, const VoxelSet& voxels) {
   return sum / static_cast<double>(std::max<std::size_t>(voxels.size(), 1));
 }
 
-// Whether the center of a part lies behind the middle of the nearest vertebra: no large vessel does.
-bool is_behind_spine(const Eigen::Vector3d& at_mm, const std::vector<Vertebra>& vertebrae) {
-  const auto nearest = std::ranges::min_element(
-      vertebrae, {}, [&](const Vertebra& v) { return std::abs(v.center_patient_mm.z() - at_mm.z()); });
-  return nearest == vertebrae.end() || at_mm.y() > nearest->center_patient_mm.y();
-}
-
 constexpr double kNoBrighter = 1.25;  // than the brightest agent, in thin vessels and where it fades
 
 // Bone more than 5 mm below its surface, without the vertebral bodies and what may belong to them.
-Volume<std::uint8_t> deep_cores(const Volume<std::uint8_t>& bone, const Volume<float>& depth_mm,
+Volume<std::uint8_t> deep_cores(const Volume<std::uint8_t>& bone, const Volume<float>& depths,
                                 const std::vector<Vertebra>& vertebrae) {
   constexpr float kCoreMm = 5.0F;
   Volume<std::uint8_t> core(bone.size, bone.patient_from_voxel);
-  for (std::size_t n = 0; n < core.voxels.size(); ++n) core.voxels[n] = depth_mm.voxels[n] > kCoreMm ? 1 : 0;
+  for (std::size_t n = 0; n < core.voxels.size(); ++n) core.voxels[n] = depths.voxels[n] > kCoreMm ? 1 : 0;
   for (const Vertebra& vertebra : vertebrae)
     for_box(core, vertebra.center_patient_mm, 3.0 * vertebra.radius_mm, [&](int i, int j, int k) {
       const PlaceAbout place = place_about(vertebra, core.patient_from_voxel * Eigen::Vector3d(i, j, k));
@@ -86,7 +73,7 @@ Volume<std::uint8_t> deep_cores(const Volume<std::uint8_t>& bone, const Volume<f
 }
 
 // The mean HU of the rim of a core: bone near its surface, within 3 voxels of the core along the axes.
-double rim_hu(const VoxelSet& core, const Volume<float>& hu, const Volume<float>& depth_mm) {
+double rim_hu(const VoxelSet& core, const Volume<float>& hu, const Volume<float>& depths) {
   double sum = 0.0, count = 1e-9;
   for (const std::uint32_t n : core) {
     const Eigen::Vector3i at = voxel_of(hu.size, n);
@@ -95,7 +82,7 @@ double rim_hu(const VoxelSet& core, const Volume<float>& hu, const Volume<float>
         const Eigen::Vector3i to = at + step * Eigen::Vector3i::Unit(axis);
         if ((to.array() < 0).any() || (to.array() >= hu.size.array()).any()) continue;
         const std::size_t m = hu.index(to.x(), to.y(), to.z());
-        if (depth_mm.voxels[m] < 1.0F || depth_mm.voxels[m] > 4.5F) continue;
+        if (depths.voxels[m] < 1.0F || depths.voxels[m] > 4.5F) continue;
         sum += hu.voxels[m];
         ++count;
       }
@@ -113,17 +100,17 @@ ContrastAgent contrast_agent_of(const Volume<std::uint8_t>& bone, const Volume<f
                                 const std::vector<Vertebra>& vertebrae) {
   constexpr double kRimToCore = 1.05, kSurelyHu = 350.0;
   constexpr std::size_t kLeastCore = 40;
-  Volume<std::uint8_t> outside = bone;
-  for (std::uint8_t& value : outside.voxels) value = value == 0 ? 1 : 0;
-  const Volume<float> depth_mm = distance_mm(outside);
+  const Volume<float> depths = depth_mm(bone);
   ContrastAgent agent{.cores = Volume<std::uint8_t>(bone.size, bone.patient_from_voxel)};
-  for (const VoxelSet& core : connected_parts(deep_cores(bone, depth_mm, vertebrae), kLeastCore)) {
+  for (const VoxelSet& core : connected_parts(deep_cores(bone, depths, vertebrae), kLeastCore)) {
     Eigen::Vector3d center = Eigen::Vector3d::Zero();
     for (const std::uint32_t n : core)
       center += voxel_of(bone.size, n).cast<double>() / static_cast<double>(core.size());
     const double inside_hu = mean_of(hu, core);
-    if (rim_hu(core, hu, depth_mm) > kRimToCore * inside_hu) continue;
-    if (inside_hu > kSurelyHu && is_behind_spine(bone.patient_from_voxel * center, vertebrae)) continue;
+    if (rim_hu(core, hu, depths) > kRimToCore * inside_hu) continue;
+    // No large vessel lies behind the middle of a vertebra.
+    const Eigen::Vector3d at_mm = bone.patient_from_voxel * center;
+    if (inside_hu > kSurelyHu && at_mm.y() > level_of(at_mm, vertebrae).center_patient_mm.y()) continue;
     for (const std::uint32_t n : core) agent.cores.voxels[n] = 1;
     agent.brightest_hu = std::max(agent.brightest_hu, inside_hu);
   }

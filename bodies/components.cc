@@ -25,13 +25,12 @@ class Groups {
 // Calls work(index of a neighbor) for the neighbors of a voxel by face, edge or corner.
 template <class T, class Work>
 void for_neighbors(const Volume<T>& volume, std::uint32_t index, Work&& work) {
-  const auto columns = static_cast<std::uint32_t>(volume.size.x()), rows = static_cast<std::uint32_t>(volume.size.y());
-  const int i = static_cast<int>(index % columns), j = static_cast<int>(index / columns % rows),
-            k = static_cast<int>(index / (columns * rows));
-  for (int z = std::max(0, k - 1); z <= std::min(volume.size.z() - 1, k + 1); ++z)
-    for (int y = std::max(0, j - 1); y <= std::min(volume.size.y() - 1, j + 1); ++y)
-      for (int x = std::max(0, i - 1); x <= std::min(volume.size.x() - 1, i + 1); ++x)
-        if (x != i || y != j || z != k) work(static_cast<std::uint32_t>(volume.index(x, y, z)));
+  const Eigen::Vector3i at = voxel_of(volume.size, index);
+  const Eigen::Vector3i low = (at.array() - 1).max(0), high = (at.array() + 1).min(volume.size.array() - 1);
+  for (int z = low.z(); z <= high.z(); ++z)
+    for (int y = low.y(); y <= high.y(); ++y)
+      for (int x = low.x(); x <= high.x(); ++x)
+        if (const auto n = static_cast<std::uint32_t>(volume.index(x, y, z)); n != index) work(n);
 }
 
 }  // namespace

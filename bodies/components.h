@@ -11,6 +11,13 @@ namespace isoshift {
 // A part: indices of its voxels, ascending.
 using VoxelSet = std::vector<std::uint32_t>;
 
+// The voxel of an index, in the order of Volume.
+inline Eigen::Vector3i voxel_of(const Eigen::Vector3i& size, std::uint32_t index) {
+  const auto columns = static_cast<std::uint32_t>(size.x()), rows = static_cast<std::uint32_t>(size.y());
+  return {static_cast<int>(index % columns), static_cast<int>(index / columns % rows),
+          static_cast<int>(index / (columns * rows))};
+}
+
 // Voxels that are not 0 and touch by a face, an edge or a corner; the largest part first. Parts with fewer than
 // `least_voxels` are left out.
 std::vector<VoxelSet> connected_parts(const Volume<std::uint8_t>& mask, std::size_t least_voxels);

@@ -54,14 +54,9 @@ Dips dips_of(const LeaningProfiles& profiles, std::span<const int> half_thicknes
   return dips;
 }
 
-struct Comb {
-  std::vector<int> teeth;
-  double score = 0.0;
-};
-
 // The best teeth: a sum of what each is worth, less for spacings that change. Dynamic programming over the place of a
 // tooth and its distance from the one before.
-Comb best_comb(const std::vector<double>& worth, const std::vector<double>& expected_mm) {
+std::vector<int> best_comb(const std::vector<double>& worth, const std::vector<double>& expected_mm) {
   const int size = static_cast<int>(worth.size()), spacings = kMost - kLeast + 1;
   constexpr double kChangeMm = 2.5;  // from one vertebra to the next, that costs as much as a tooth brings
   const double none = -1e9;
@@ -85,16 +80,15 @@ Comb best_comb(const std::vector<double>& worth, const std::vector<double>& expe
       best[s][p] = value + worth[s];
       if (best[s][p] > most) most = best[s][p], at = s, with = p;
     }
-  Comb comb;
-  comb.score = most;
+  std::vector<int> teeth;
   while (at >= 0 && with >= 0) {
-    comb.teeth.push_back(at);
+    teeth.push_back(at);
     const int next = at - (with + kLeast), q = from[at][with];
     at = next, with = q;
-    if (q < 0) comb.teeth.push_back(at);
+    if (q < 0) teeth.push_back(at);
   }
-  std::ranges::reverse(comb.teeth);
-  return comb;
+  std::ranges::reverse(teeth);
+  return teeth;
 }
 
 // The share of the spine between the teeth that is darker than half-way from what is darkest to what is brightest
@@ -127,13 +121,13 @@ std::vector<CombTooth> find_discs(const LeaningProfiles& profiles, int first, in
     return best_comb(worth, expected_mm);
   };
   const Dips thin = dips_of(profiles, std::array{3, 4}), thick = dips_of(profiles, std::array{3, 4, 5, 7});
-  const Comb bright = comb_with(thin, 1.0), dark = comb_with(thick, -1.0);
+  const std::vector<int> bright = comb_with(thin, 1.0), dark = comb_with(thick, -1.0);
   // Discs are thinner than vertebrae. Where the dark stretches are the longer ones, they are brittle vertebrae between
   // bright end plates.
   constexpr double kThinShare = 0.45;
-  const bool is_dark = dark_share(straight, dark.teeth) < kThinShare;
+  const bool is_dark = dark_share(straight, dark) < kThinShare;
   const Dips& dips = is_dark ? thick : thin;
-  const std::vector<int>& teeth = is_dark ? dark.teeth : bright.teeth;
+  const std::vector<int>& teeth = is_dark ? dark : bright;
   constexpr float kLeastDipHu = 20.0F;  // of half of them; noise alone makes less, and the end of a bone is one step
   std::vector<float> dip_hu;
   dip_hu.reserve(teeth.size());

@@ -74,4 +74,10 @@ Volume<float> distance_mm(const Volume<std::uint8_t>& is_target) {
   return squared;
 }
 
+Volume<float> depth_mm(const Volume<std::uint8_t>& mask) {
+  Volume<std::uint8_t> outside = mask;
+  for (std::uint8_t& value : outside.voxels) value = value == 0 ? 1 : 0;
+  return distance_mm(outside);
+}
+
 }  // namespace isoshift

@@ -77,14 +77,8 @@ class Finder {
     }
   }
 
-  // The vertebra at the level of a point.
-  static const Vertebra& level_of(const Eigen::Vector3d& at_mm, const std::vector<Vertebra>& vertebrae) {
-    return *std::ranges::min_element(vertebrae, {},
-                                     [&](const Vertebra& v) { return std::abs(v.center_patient_mm.z() - at_mm.z()); });
-  }
-
   // Thin bones beside the spine, from 60 mm below the lowest vertebra to the highest: ribs, and shoulder blades.
-  bool is_rib(const VoxelSet& voxels, const Volume<float>& depth_mm, const std::vector<Vertebra>& vertebrae) const {
+  bool is_rib(const VoxelSet& voxels, const Volume<float>& depth, const std::vector<Vertebra>& vertebrae) const {
     constexpr std::size_t kLeastVertebrae = 4;
     constexpr float kThickMm = 9.0F;
     constexpr double kAsideMm = 25.0, kBelowMm = 60.0;
@@ -94,7 +88,7 @@ class Finder {
     std::size_t among = 0;
     for (const std::uint32_t n : voxels) {
       const Eigen::Vector3d at = patient_mm(n);
-      deepest = std::max(deepest, depth_mm.voxels[n]);
+      deepest = std::max(deepest, depth.voxels[n]);
       aside += std::abs(at.x() - level_of(at, vertebrae).center_patient_mm.x()) / static_cast<double>(voxels.size());
       const bool is_among = at.z() > vertebrae.front().center_patient_mm.z() - kBelowMm &&
                             at.z() < vertebrae.back().center_patient_mm.z();
@@ -106,9 +100,7 @@ class Finder {
   void take_other_bones(const std::vector<Vertebra>& vertebrae) {
     constexpr double kLeastMm3 = 1500.0, kNeckMm = 3.0;
     const auto least = static_cast<std::size_t>(kLeastMm3 / (edge_mm_ * edge_mm_ * edge_mm_));
-    Volume<std::uint8_t> outside = bone_;
-    for (std::uint8_t& value : outside.voxels) value = value == 0 ? 1 : 0;
-    Volume<float> depth = distance_mm(outside);
+    const Volume<float> depth = depth_mm(bone_);
     const std::vector<VoxelSet> wholes = connected_parts(bone_, least);
     Volume<float> kept(depth.size, depth.patient_from_voxel);
     for (const VoxelSet& whole : wholes)
@@ -145,9 +137,7 @@ class Finder {
   }
 
   Eigen::Vector3d patient_mm(std::uint32_t n) const {
-    const auto columns = static_cast<std::uint32_t>(hu_.size.x()), rows = static_cast<std::uint32_t>(hu_.size.y());
-    const std::uint32_t column = n % columns, row = n / columns % rows, slice = n / (columns * rows);
-    return hu_.patient_from_voxel * Eigen::Vector3d(column, row, slice);
+    return hu_.patient_from_voxel * voxel_of(hu_.size, n).cast<double>();
   }
 
   // Vertebrae first, the couch last.

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "base/parallel.h"
+#include "geometry/voxel_box.h"
 
 namespace isoshift {
 namespace {
@@ -13,11 +14,8 @@ constexpr float kAirHu = -1000.0F;
 
 // Averages of whole blocks; what does not fill a block at the far faces is left out.
 Volume<float> in_blocks(const Volume<float>& ct_hu, const Eigen::Vector3i& block) {
-  Eigen::Affine3d fine_from_coarse = Eigen::Affine3d::Identity();
-  fine_from_coarse.linear() = block.cast<double>().asDiagonal();
-  fine_from_coarse.translation() = 0.5 * (block.array() - 1).cast<double>();
   const Eigen::Vector3i size = ct_hu.size.array() / block.array();
-  Volume<float> coarse(size, ct_hu.patient_from_voxel * fine_from_coarse);
+  Volume<float> coarse(size, ct_hu.patient_from_voxel * voxel_from_block(block));
   const float share = 1.0F / static_cast<float>(block.prod());
   parallel_for(0, size.z(), [&](int k) {
     for (int z = 0; z < block.z(); ++z)
@@ -56,9 +54,7 @@ Eigen::AlignedBox3d dense_box(const Volume<float>& hu) {
 }  // namespace
 
 Volume<float> on_patient_axes(const Volume<float>& ct_hu, double edge_mm, double max_voxels) {
-  constexpr double kRounding = 1.01;
-  const Eigen::Vector3i block =
-      (kRounding * edge_mm / ct_hu.spacing_mm().array()).cast<int>().max(1).min(ct_hu.size.array());
+  const Eigen::Vector3i block = block_of(ct_hu.spacing_mm(), ct_hu.size, edge_mm);
   const Volume<float> blocks = block == Eigen::Vector3i::Ones() ? ct_hu : in_blocks(ct_hu, block);
   const Eigen::AlignedBox3d box = dense_box(blocks);
   if (box.isEmpty()) return {};

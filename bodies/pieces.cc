@@ -48,12 +48,9 @@ void move_to_means(const std::vector<Eigen::Vector3f>& points, Clusters& cluster
 // k-means: a center more, where a point lies farthest from all of them, until all points are near enough.
 std::vector<VoxelSet> pieces_of(const VoxelSet& voxels, const Eigen::Vector3i& lattice_size, double edge_mm,
                                 double most_mm) {
-  const auto columns = static_cast<std::uint32_t>(lattice_size.x()),
-             rows = static_cast<std::uint32_t>(lattice_size.y());
   std::vector<Eigen::Vector3f> points(voxels.size());
   std::ranges::transform(voxels, points.begin(), [&](std::uint32_t n) -> Eigen::Vector3f {
-    const std::uint32_t column = n % columns, row = n / columns % rows, slice = n / (columns * rows);
-    return static_cast<float>(edge_mm) * Eigen::Vector3f(column, row, slice);
+    return static_cast<float>(edge_mm) * voxel_of(lattice_size, n).cast<float>();
   });
   Clusters clusters;
   clusters.centers = {Eigen::Vector3f::Zero()};

@@ -5,15 +5,14 @@
 
 #include "base/parallel.h"
 #include "bodies/distance.h"
+#include "geometry/voxel_box.h"
 
 namespace isoshift {
 namespace {
 
 // Labels of blocks of voxels: the label that most of a block's bone has, if a quarter of the block is bone.
 Volume<std::uint8_t> in_label_blocks(const Volume<std::uint8_t>& labels, int block, int couch) {
-  Eigen::Affine3d fine_from_coarse = Eigen::Affine3d::Identity();
-  fine_from_coarse.linear() *= block;
-  fine_from_coarse.translation().setConstant(0.5 * (block - 1));
+  const Eigen::Affine3d fine_from_coarse = voxel_from_block(Eigen::Vector3i::Constant(block));
   const Eigen::Vector3i size = (labels.size.array() + block - 1) / block;
   Volume<std::uint8_t> coarse(size, labels.patient_from_voxel * fine_from_coarse);
   parallel_for(0, size.z(), [&](int k) {
@@ -59,16 +58,11 @@ void share_out(std::vector<double>& weights, std::vector<std::uint8_t>& parts) {
 
 // The smallest box that holds what is not 0.
 SoftMask cropped(const Volume<std::uint8_t>& weight, int body) {
-  Eigen::Array3i low = weight.size, high(-1, -1, -1);
-  for (int k = 0; k < weight.size.z(); ++k)
-    for (int j = 0; j < weight.size.y(); ++j)
-      for (int i = 0; i < weight.size.x(); ++i)
-        if (weight.at(i, j, k) != 0) {
-          low = low.min(Eigen::Array3i(i, j, k));
-          high = high.max(Eigen::Array3i(i, j, k));
-        }
-  SoftMask mask{.body = body, .first = low.min(high.max(0)), .weight = {}};
-  const Eigen::Vector3i size = (high - low + 1).max(0);
+  SoftMask mask{.body = body, .weight = {}};
+  const VoxelBox box = occupied_voxels(weight.voxels.data(), weight.size);
+  if (box.is_empty()) return mask;
+  mask.first = box.first;
+  const Eigen::Vector3i size = box.size();
   mask.weight = Volume<std::uint8_t>(size, weight.patient_from_voxel * Eigen::Translation3d(mask.first.cast<double>()));
   for (int k = 0; k < size.z(); ++k)
     for (int j = 0; j < size.y(); ++j)

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numbers>
 #include <optional>
 #include <utility>
 
@@ -12,6 +11,7 @@
 #include "bodies/lattice.h"
 #include "bodies/spine_curve.h"
 #include "bodies/spine_line.h"
+#include "geometry/rotation.h"
 
 namespace isoshift {
 namespace {
@@ -22,10 +22,9 @@ constexpr float kOutsideHu = -1000.0F;
 constexpr std::array kLeanDegrees = {-16.0, -8.0, 0.0, 8.0, 16.0};
 
 Eigen::Vector3d leaning(const CurveFrame& frame, int lean) {
-  const double rad = std::numbers::pi / 180.0;
   const int n = static_cast<int>(kLeanDegrees.size());
-  return (frame.up + std::tan(kLeanDegrees[lean % n] * rad) * frame.left +
-          std::tan(kLeanDegrees[lean / n] * rad) * frame.back)
+  return (frame.up + std::tan(rad_from_deg(kLeanDegrees[lean % n])) * frame.left +
+          std::tan(rad_from_deg(kLeanDegrees[lean / n])) * frame.back)
       .normalized();
 }
 
@@ -325,6 +324,11 @@ std::ptrdiff_t with_edges(const std::vector<Vertebra>& vertebrae) {
 }
 
 }  // namespace
+
+const Vertebra& level_of(const Eigen::Vector3d& at_patient_mm, const std::vector<Vertebra>& vertebrae) {
+  return *std::ranges::min_element(
+      vertebrae, {}, [&](const Vertebra& v) { return std::abs(v.center_patient_mm.z() - at_patient_mm.z()); });
+}
 
 std::vector<Vertebra> find_vertebrae(const Volume<float>& ct_hu, const Volume<float>& hu_on_patient_axes) {
   constexpr std::ptrdiff_t kSurely = 4, kLeast = 2;

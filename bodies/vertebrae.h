@@ -22,6 +22,9 @@ struct Vertebra {
   bool is_cut = false;     // by the end of the CT or of the visible spine: its center is told from its neighbors
 };
 
+// The vertebra at the level of a point. Precondition: there is one.
+const Vertebra& level_of(const Eigen::Vector3d& at_patient_mm, const std::vector<Vertebra>& vertebrae);
+
 // From the feet to the head; empty if the CT shows fewer than two. `hu_on_patient_axes` is the CT on a lattice of about
 // 2 mm (on_patient_axes()).
 std::vector<Vertebra> find_vertebrae(const Volume<float>& ct_hu, const Volume<float>& hu_on_patient_axes);

@@ -2,9 +2,10 @@
 
 #include <algorithm>
 #include <array>
-#include <limits>
 
 #include "base/parallel.h"
+#include "drr/interpolation.h"
+#include "geometry/voxel_box.h"
 
 namespace isoshift {
 namespace {
@@ -12,48 +13,28 @@ namespace {
 // A body's share at a place, 0 to 1.
 float share_at(const BodyShare& share, const Eigen::Vector3d& voxel) {
   const Eigen::Vector3i lower = voxel.array().floor().cast<int>();
-  const Eigen::Vector3f beyond = (voxel - lower.cast<double>()).cast<float>();
   if ((lower.array() < -1).any() || (lower.array() >= share.size.array()).any()) return 0.0F;
-  float sum = 0.0F;
-  for (int n = 0; n < 8; ++n) {
-    const Eigen::Vector3i step(n & 1, (n >> 1) & 1, n >> 2), at = lower + step;
-    if ((at.array() < 0).any() || (at.array() >= share.size.array()).any()) continue;
-    float weight = 1.0F;
-    for (int axis = 0; axis < 3; ++axis) weight *= step[axis] != 0 ? beyond[axis] : 1.0F - beyond[axis];
-    sum += weight * static_cast<float>(share.at(at.x(), at.y(), at.z()));
-  }
-  return sum / 255.0F;
+  return static_cast<float>(interpolate(share, lower, voxel - lower.cast<double>()) / 255.0);
 }
 
-// A box of voxels, bounds included; empty if first lies above last.
-struct Box {
-  Eigen::Vector3i first, last;
-  bool is_empty() const { return (first.array() > last.array()).any(); }
-};
+// The corners of a box of voxels, `wider` voxels beyond their centers.
+std::array<Eigen::Vector3d, 8> corners_of(const VoxelBox& box, double wider) {
+  std::array<Eigen::Vector3d, 8> corners;
+  for (int n = 0; n < 8; ++n)
+    for (int axis = 0; axis < 3; ++axis)
+      corners[n][axis] = ((n >> axis) & 1) != 0 ? box.last[axis] + wider : box.first[axis] - wider;
+  return corners;
+}
 
-// The voxels of a CT that lie in the box of a share's lattice, one voxel wider, where the share is not 0.
-Box box_in(const Volume<float>& ct, const BodyShare& share) {
-  Eigen::Vector3i first = share.size, last = Eigen::Vector3i::Constant(-1);
-  for (int k = 0; k < share.size.z(); ++k)
-    for (int j = 0; j < share.size.y(); ++j)
-      for (int i = 0; i < share.size.x(); ++i)
-        if (share.at(i, j, k) != 0) {
-          first = first.cwiseMin(Eigen::Vector3i(i, j, k));
-          last = last.cwiseMax(Eigen::Vector3i(i, j, k));
-        }
-  Box box{.first = ct.size, .last = Eigen::Vector3i::Constant(-1)};
-  if (last.x() < 0) return box;
+// The voxels of a CT where a share is not 0, or becomes so within a voxel of its own lattice.
+VoxelBox box_in(const Volume<float>& ct, const BodyShare& share) {
+  const VoxelBox occupied = occupied_voxels(share.voxels.data(), share.size);
+  if (occupied.is_empty()) return occupied;
   const Eigen::Affine3d ct_from_share = ct.patient_from_voxel.inverse() * share.patient_from_voxel;
-  Eigen::Vector3d low = Eigen::Vector3d::Constant(std::numeric_limits<double>::max()), high = -low;
-  for (int n = 0; n < 8; ++n) {
-    const auto end = [&](int axis, int bit) { return (n & bit) != 0 ? last[axis] + 1.0 : first[axis] - 1.0; };
-    const Eigen::Vector3d corner = ct_from_share * Eigen::Vector3d(end(0, 1), end(1, 2), end(2, 4));
-    low = low.cwiseMin(corner);
-    high = high.cwiseMax(corner);
-  }
-  box.first = low.array().floor().max(0.0).cast<int>();
-  box.last = high.array().ceil().min(ct.size.array().cast<double>() - 1.0).cast<int>();
-  return box;
+  Eigen::AlignedBox3d reached;
+  for (const Eigen::Vector3d& corner : corners_of(occupied, 1.0)) reached.extend(ct_from_share * corner);
+  return {.first = reached.min().array().floor().max(0.0).cast<int>(),
+          .last = reached.max().array().ceil().min(ct.size.array().cast<double>() - 1.0).cast<int>()};
 }
 
 Eigen::Vector3d center_of_mass(const Volume<float>& volume) {
@@ -88,17 +69,16 @@ std::vector<std::uint32_t> covered(std::span<const std::uint32_t> pixels, const 
   return places;
 }
 
-}  // namespace
-
+// The attenuation of a body: that of the CT times its share, in the box where the share is not 0. Empty for a body of
+// nothing.
 AttenuationByBeam attenuation_of_body(const Volume<float>& ct_hu, const AttenuationModel& model,
                                       std::span<const Beam> beams, const BodyShare& share) {
   AttenuationByBeam result;
-  const Box box = box_in(ct_hu, share);
+  const VoxelBox box = box_in(ct_hu, share);
   if (box.is_empty()) return result;
   const Eigen::Affine3d lattice = ct_hu.patient_from_voxel * Eigen::Translation3d(box.first.cast<double>());
   const Eigen::Affine3d share_from_voxel = share.patient_from_voxel.inverse() * lattice;
-  for (const Beam beam : beams)
-    result.emplace(beam, Volume<float>(box.last - box.first + Eigen::Vector3i::Ones(), lattice));
+  for (const Beam beam : beams) result.emplace(beam, Volume<float>(box.size(), lattice));
   const Eigen::Vector3i& size = result.begin()->second.size;
   parallel_for(0, size.z(), [&](int k) {
     for (int j = 0; j < size.y(); ++j)
@@ -112,6 +92,8 @@ AttenuationByBeam attenuation_of_body(const Volume<float>& ct_hu, const Attenuat
   return result;
 }
 
+}  // namespace
+
 BodyRenderers::BodyRenderers(RendererKind kind, const Volume<float>& ct_hu, const AttenuationModel& model,
                              std::span<const Beam> beams, std::span<const BodyShare> shares) {
   for (const BodyShare& share : shares) {
@@ -119,10 +101,9 @@ BodyRenderers::BodyRenderers(RendererKind kind, const Volume<float>& ct_hu, cons
     AttenuationByBeam attenuation = attenuation_of_body(ct_hu, model, beams, share);
     if (attenuation.empty()) continue;
     const Volume<float>& volume = attenuation.begin()->second;
-    for (int n = 0; n < 8; ++n) {
-      const auto end = [&](int axis, int bit) { return (n & bit) != 0 ? volume.size[axis] : -1; };
-      body.corners_patient_mm.push_back(volume.patient_from_voxel * Eigen::Vector3d(end(0, 1), end(1, 2), end(2, 4)));
-    }
+    const VoxelBox all{.first = Eigen::Vector3i::Zero(), .last = volume.size.array() - 1};
+    for (const Eigen::Vector3d& corner : corners_of(all, 1.0))
+      body.corners_patient_mm.push_back(volume.patient_from_voxel * corner);
     body.center_patient_mm = center_of_mass(volume);
     body.renderer = make_renderer(kind, std::move(attenuation));
   }

@@ -15,10 +15,6 @@ namespace isoshift {
 // interpolated, outside it is 0. Shares of all bodies of a CT that add up to 255 everywhere divide the CT without rest.
 using BodyShare = Volume<std::uint8_t>;
 
-// The attenuation of a body: that of the CT times its share, in the box where the share is not 0.
-AttenuationByBeam attenuation_of_body(const Volume<float>& ct_hu, const AttenuationModel& model,
-                                      std::span<const Beam> beams, const BodyShare& share);
-
 class BodyRenderers {
  public:
   // Renders on the CPU, with kind `cpu` or, as the oracle, `trilinear`. Bodies may be empty.

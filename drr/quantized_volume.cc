@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <mutex>
 #include <type_traits>
 
 #include "base/parallel.h"
@@ -87,30 +86,7 @@ QuantizedVolume quantized(const Volume<float>& attenuation_per_mm, VolumePrecisi
 }
 
 VoxelBox occupied_voxels(const QuantizedVolume& volume) {
-  const Eigen::Vector3i& size = volume.size;
-  VoxelBox box{.first = size, .last = Eigen::Vector3i::Constant(-1)};
-  std::mutex mutex;
-  std::visit(
-      [&]<class T>(const std::vector<T>& voxels) {
-        parallel_for(0, size.z(), [&](int k) {
-          VoxelBox of_slice{.first = size, .last = Eigen::Vector3i::Constant(-1)};
-          for (int j = 0; j < size.y(); ++j) {
-            const T* row = voxels.data() + (static_cast<std::size_t>(k) * size.y() + j) * size.x();
-            const T* const end = row + size.x();
-            const T* const first = std::find_if(row, end, [](T value) { return value != T{}; });
-            if (first == end) continue;
-            const T* last = end - 1;
-            while (*last == T{}) --last;
-            of_slice.first = of_slice.first.cwiseMin(Eigen::Vector3i(static_cast<int>(first - row), j, k));
-            of_slice.last = of_slice.last.cwiseMax(Eigen::Vector3i(static_cast<int>(last - row), j, k));
-          }
-          const std::scoped_lock lock(mutex);
-          box.first = box.first.cwiseMin(of_slice.first);
-          box.last = box.last.cwiseMax(of_slice.last);
-        });
-      },
-      volume.voxels);
-  return box;
+  return std::visit([&](const auto& voxels) { return occupied_voxels(voxels.data(), volume.size); }, volume.voxels);
 }
 
 }  // namespace isoshift

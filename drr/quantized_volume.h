@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "drr/attenuation.h"
+#include "geometry/voxel_box.h"
 
 namespace isoshift {
 
@@ -46,12 +47,7 @@ QuantizedVolume quantized_attenuation(const Volume<float>& ct_hu, const Attenuat
 // The same of attenuation that is known already, 1/mm; integers span 0 to its largest value.
 QuantizedVolume quantized(const Volume<float>& attenuation_per_mm, VolumePrecision precision);
 
-// The box of voxels that are not 0, bounds included. Empty (first above last) for a volume of nothing.
-struct VoxelBox {
-  Eigen::Vector3i first, last;
-  Eigen::Vector3i size() const { return last.array() - first.array() + 1; }
-  bool is_empty() const { return (first.array() > last.array()).any(); }
-};
+// The box of the voxels that are not 0.
 VoxelBox occupied_voxels(const QuantizedVolume& volume);
 
 }  // namespace isoshift

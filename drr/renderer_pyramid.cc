@@ -5,18 +5,9 @@
 #include <limits>
 
 #include "base/parallel.h"
+#include "geometry/voxel_box.h"
 
 namespace isoshift {
-namespace {
-
-// Blocks as large as fit into an edge, per axis.
-Eigen::Vector3i block_of(const Volume<float>& ct_hu, double edge_mm) {
-  constexpr double kRounding = 1.01;
-  return (kRounding * edge_mm / ct_hu.spacing_mm().array()).cast<int>().max(1).min(ct_hu.size.array());
-}
-
-}  // namespace
-
 CoarserCt coarser_ct(const Volume<float>& ct_hu, const AttenuationModel& model, const Eigen::Vector3i& block) {
   const bool windowed = model.kind == AttenuationModel::Kind::kWindowed;
   const auto nothing_hu = static_cast<float>(windowed ? model.window_low_hu : -1000.0);
@@ -25,12 +16,9 @@ CoarserCt coarser_ct(const Volume<float>& ct_hu, const AttenuationModel& model, 
     return hu < static_cast<float>(model.threshold_hu) ? nothing_hu : std::clamp(hu, nothing_hu, most_hu);
   };
 
-  // Voxel 0 of the coarser lattice lies in the middle of the first block. The last blocks may reach beyond the CT.
-  Eigen::Affine3d fine_from_coarse = Eigen::Affine3d::Identity();
-  fine_from_coarse.linear() = block.cast<double>().asDiagonal();
-  fine_from_coarse.translation() = 0.5 * (block.array() - 1).cast<double>();
+  // The last blocks may reach beyond the CT.
   const Eigen::Vector3i size = (ct_hu.size.array() + block.array() - 1) / block.array();
-  CoarserCt coarser{.hu = Volume<float>(size, ct_hu.patient_from_voxel * fine_from_coarse), .model = model};
+  CoarserCt coarser{.hu = Volume<float>(size, ct_hu.patient_from_voxel * voxel_from_block(block)), .model = model};
   coarser.model.threshold_hu = nothing_hu;
   parallel_for(0, size.z(), [&](int k) {
     for (int j = 0; j < size.y(); ++j)
@@ -56,7 +44,7 @@ RendererPyramid::RendererPyramid(RendererKind kind, const Volume<float>& ct_hu, 
       {.edge_mm = ct_hu.spacing_mm().maxCoeff(), .renderer = make_renderer(kind, ct_hu, model, beams, options)});
   Eigen::Vector3i last = Eigen::Vector3i::Ones();
   for (const double edge_mm : {1.0, 2.0, 4.0}) {
-    const Eigen::Vector3i block = block_of(ct_hu, edge_mm);
+    const Eigen::Vector3i block = block_of(ct_hu.spacing_mm(), ct_hu.size, edge_mm);
     if (block == last) continue;
     last = block;
     const CoarserCt coarser = coarser_ct(ct_hu, model, block);

@@ -11,6 +11,10 @@ double wrapped_rad(double angle_rad) {
   return wrapped <= -std::numbers::pi ? std::numbers::pi : wrapped;
 }
 
+Eigen::Matrix3d cross_matrix(const Eigen::Vector3d& v) {
+  return (Eigen::Matrix3d() << 0.0, -v.z(), v.y(), v.z(), 0.0, -v.x(), -v.y(), v.x(), 0.0).finished();
+}
+
 Eigen::Matrix3d rotation_x(double angle_rad) {
   return Eigen::AngleAxisd(angle_rad, Eigen::Vector3d::UnitX()).toRotationMatrix();
 }

@@ -12,6 +12,9 @@ constexpr double deg_from_rad(double rad) { return rad * 180.0 / std::numbers::p
 // The same angle in (-pi, pi].
 double wrapped_rad(double angle_rad);
 
+// The matrix of the cross product: cross_matrix(v) * x is v x x.
+Eigen::Matrix3d cross_matrix(const Eigen::Vector3d& v);
+
 Eigen::Matrix3d rotation_x(double angle_rad);
 Eigen::Matrix3d rotation_y(double angle_rad);
 Eigen::Matrix3d rotation_z(double angle_rad);

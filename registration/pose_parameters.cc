@@ -2,12 +2,10 @@
 
 #include <cmath>
 
+#include "geometry/rotation.h"
+
 namespace isoshift {
 namespace {
-
-Eigen::Matrix3d cross_matrix(const Eigen::Vector3d& v) {
-  return (Eigen::Matrix3d() << 0.0, -v.z(), v.y(), v.z(), 0.0, -v.x(), -v.y(), v.x(), 0.0).finished();
-}
 
 // How a rotation vector's change turns what it has turned already.
 Eigen::Matrix3d left_jacobian(const Eigen::Vector3d& rotation_vector) {

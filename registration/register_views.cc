@@ -91,8 +91,7 @@ RegistrationResult register_views(const RendererPyramid& renderers, std::span<co
   std::vector<XrayView> views;
   for (FixedImage& image : fixed.images) {
     views.push_back(image.view);
-    if (const auto rectangle = options.rectangles.find(image.label); rectangle != options.rectangles.end())
-      restrict_to(rectangle->second, image);
+    restrict_to(options.rectangles, image);
     if (options.eight_bit_xrays) round_to_eight_bit(image);
   }
   require_visible(renderers, fixed, start_room_from_patient);

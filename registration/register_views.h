@@ -33,9 +33,9 @@ struct RegistrationOptions {
   std::uint64_t seed = 1;        // the only source of randomness: same seed, same pose
   bool eight_bit_xrays = false;  // line integrals of the field in 256 steps, as the founding paper's
   bool check_alternatives = true;
-  bool check_vertebrae = false;  // along the spine; on request, for it takes as long as the registration
-  std::map<std::string, PixelRectangle> rectangles;  // of the views with these labels: nothing else of them is compared
-  const ProjectedRegion* region = nullptr;           // borrowed; what of the views is compared. nullptr: all
+  bool check_vertebrae = false;             // along the spine; on request, for it takes as long as the registration
+  RectanglesByLabel rectangles;             // of the views with these labels: nothing else of them is compared
+  const ProjectedRegion* region = nullptr;  // borrowed; what of the views is compared. nullptr: all
 
   // Throws UsageError naming the field and its value.
   void check() const;

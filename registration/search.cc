@@ -9,6 +9,7 @@
 
 #include "base/error.h"
 #include "registration/objective.h"
+#include "registration/pose_objective.h"
 #include "registration/pose_parameters.h"
 
 namespace isoshift {
@@ -97,46 +98,30 @@ StageReport report_of(const Stage& stage, OptimizerKind optimizer) {
                          {"max_evaluations", stage.max_evaluations}}};
 }
 
-// Derivatives need a renderer that has them, and Levenberg-Marquardt a similarity with a curvature: without them the
-// stage is climbed by BOBYQA.
-OptimizerKind optimizer_of(const Stage& stage, const Renderer& renderer) {
-  const bool can_climb = renderer.has_derivatives() && has_curvature(stage.similarity);
-  return stage.optimizer == OptimizerKind::kLevenbergMarquardt && !can_climb ? OptimizerKind::kBobyqa : stage.optimizer;
-}
-
-// A stage's similarity as a function of parameters, on top of a start pose; notes its best values.
+// A stage's similarity, which notes its best values.
 class StageObjective {
  public:
   StageObjective(Objective& objective, const Eigen::Isometry3d& start_room_from_patient, StageReport& report)
-      : objective_(objective), start_(start_room_from_patient), report_(report) {}
+      : poses_(objective, start_room_from_patient), report_(report) {}
 
   std::vector<double> values(std::span<const Parameters> points) {
-    std::vector<double> values = objective_.values(poses_of(points));
+    std::vector<double> values = poses_.values(points);
     for (const double value : values) note(value);
     return values;
   }
 
   std::vector<QuadraticModel> models(std::span<const Parameters> points) {
-    std::vector<QuadraticModel> models = objective_.models(poses_of(points));
-    for (std::size_t n = 0; n < models.size(); ++n) {
-      note(models[n].value);
-      models[n] = models[n].by(motions_per_parameter(points[n]));
-    }
+    std::vector<QuadraticModel> models = poses_.models(points);
+    for (const QuadraticModel& model : models) note(model.value);
     return models;
   }
 
  private:
-  std::vector<Eigen::Isometry3d> poses_of(std::span<const Parameters> points) const {
-    std::vector<Eigen::Isometry3d> poses;
-    for (const Parameters& point : points) poses.push_back(setup_error_from_parameters(point) * start_);
-    return poses;
-  }
   void note(double value) {
     report_.best.push_back(report_.best.empty() ? value : std::max(value, report_.best.back()));
   }
 
-  Objective& objective_;
-  const Eigen::Isometry3d& start_;
+  PoseObjective poses_;
   StageReport& report_;
 };
 
@@ -154,17 +139,6 @@ std::vector<Parameters> best_of(std::vector<Parameters> poses, std::size_t count
   best.reserve(count);
   for (std::size_t n = 0; n < count; ++n) best.push_back(poses[order[n]]);
   return best;
-}
-
-// All searches of a stage, which have one optimizer.
-std::vector<OptimizerResult> maximize_stage(StageObjective& objective, const Renderer& renderer,
-                                            std::span<const OptimizerOptions> searches) {
-  const OptimizerKind kind = searches.front().kind;
-  const bool on_models =
-      kind == OptimizerKind::kLevenbergMarquardt || (kind == OptimizerKind::kLbfgs && renderer.has_derivatives());
-  if (!on_models)
-    return maximize([&](std::span<const Parameters> points) { return objective.values(points); }, searches);
-  return maximize([&](std::span<const Parameters> points) { return objective.models(points); }, searches);
 }
 
 // `found` is sorted, best first.
@@ -209,7 +183,7 @@ SearchResult search(const RendererPyramid& renderers, const FixedViews& views,
                          .pixel_fraction = stage.pixel_fraction,
                          .min_pixels = static_cast<std::size_t>(stage.min_pixels),
                          .seed = options.seed});
-    const OptimizerKind optimizer = optimizer_of(stage, renderer);
+    const OptimizerKind optimizer = possible_optimizer(stage.optimizer, renderer, stage.similarity);
     StageReport report = report_of(stage, optimizer);
     StageObjective similarity(objective, start_room_from_patient, report);
 
@@ -220,7 +194,7 @@ SearchResult search(const RendererPyramid& renderers, const FixedViews& views,
     std::vector<OptimizerOptions> searches;
     searches.reserve(kept.size());
     for (const Parameters& start : kept) searches.push_back(optimizer_options(stage, optimizer, options, start));
-    std::vector<OptimizerResult> found = maximize_stage(similarity, renderer, searches);
+    std::vector<OptimizerResult> found = maximize_poses(similarity, renderer, searches);
     std::ranges::stable_sort(found, std::greater(), &OptimizerResult::value);
     kept.clear();
     for (const OptimizerResult& end : found) {

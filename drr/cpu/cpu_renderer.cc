@@ -8,7 +8,6 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
-#include <stdexcept>
 
 #include "base/parallel.h"
 #include "drr/camera.h"
@@ -85,11 +84,6 @@ std::string CpuRenderer::device() const {
   return fmt::format("CPU, {} threads", tbb::this_task_arena::max_concurrency());
 }
 
-void CpuRenderer::integrate_with_gradients(std::span<const VoxelRay>, Beam, std::span<float>,
-                                           std::span<RayGradient>) const {
-  throw std::logic_error(fmt::format("the renderer {} has no derivatives", to_string(kind())));
-}
-
 RenderResult CpuRenderer::render(std::span<const XrayView> views, std::span<const Eigen::Isometry3d> room_from_patient,
                                  const PixelSet& pixels) {
   return render_all(views, room_from_patient, pixels, false);
@@ -98,6 +92,7 @@ RenderResult CpuRenderer::render(std::span<const XrayView> views, std::span<cons
 RenderResult CpuRenderer::render_with_derivatives(std::span<const XrayView> views,
                                                   std::span<const Eigen::Isometry3d> room_from_patient,
                                                   const PixelSet& pixels) {
+  if (!has_derivatives()) return Renderer::render_with_derivatives(views, room_from_patient, pixels);
   return render_all(views, room_from_patient, pixels, true);
 }
 
@@ -172,15 +167,11 @@ void CpuRenderer::render_group(const XrayView& view, const Camera& camera, std::
   const auto values = std::span(value_places).first(group.size());
   for (std::size_t n = 0; n < group.size(); ++n)
     rays[n] = ray_to(group[n].column, group[n].row, camera, mm_from_voxel_axes_);
-  if (derivatives.empty()) {
-    integrate(rays, view.beam, values);
-  } else {
-    std::vector<RayGradient> gradients(group.size());
-    integrate_with_gradients(rays, view.beam, values, gradients);
-    for (std::size_t n = 0; n < group.size(); ++n)
-      if (group[n].place != kNowhere)
-        derivatives[group[n].place] = motion_derivatives(gradients[n], group[n].column, group[n].row, camera);
-  }
+  std::vector<RayGradient> gradients(derivatives.empty() ? 0 : group.size());
+  integrate(rays, view.beam, values, gradients);
+  for (std::size_t n = 0; n < gradients.size(); ++n)
+    if (group[n].place != kNowhere)
+      derivatives[group[n].place] = motion_derivatives(gradients[n], group[n].column, group[n].row, camera);
   for (std::size_t n = 0; n < group.size(); ++n)
     if (group[n].place != kNowhere) drr[group[n].place] = values[n];
 }

@@ -36,11 +36,9 @@ class CpuRenderer : public Renderer {
       : voxel_from_patient_(patient_from_voxel.inverse()), mm_from_voxel_axes_(patient_from_voxel.linear()) {}
 
   // Line integral of attenuation along each ray; called from many threads. Rays come in groups that lie close together.
-  virtual void integrate(std::span<const VoxelRay> rays, Beam beam, std::span<float> line_integrals) const = 0;
-
-  // The same with gradients, by the renderers that have derivatives.
-  virtual void integrate_with_gradients(std::span<const VoxelRay> rays, Beam beam, std::span<float> line_integrals,
-                                        std::span<RayGradient> gradients) const;
+  // `gradients` is empty if none are wanted, and always if the renderer has no derivatives.
+  virtual void integrate(std::span<const VoxelRay> rays, Beam beam, std::span<float> line_integrals,
+                         std::span<RayGradient> gradients) const = 0;
 
  private:
   // A pixel of a view, and where its value goes among the view's.

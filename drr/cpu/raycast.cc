@@ -224,18 +224,8 @@ PlaneLattice<T> RaycastCpuRenderer::PackedVolume::lattice(int main_axis) const {
           .row_block_stride = block_strides[axes.row]};
 }
 
-void RaycastCpuRenderer::integrate(std::span<const VoxelRay> rays, Beam beam, std::span<float> line_integrals) const {
-  integrate_all(rays, beam, line_integrals, {});
-}
-
-void RaycastCpuRenderer::integrate_with_gradients(std::span<const VoxelRay> rays, Beam beam,
-                                                  std::span<float> line_integrals,
-                                                  std::span<RayGradient> gradients) const {
-  integrate_all(rays, beam, line_integrals, gradients);
-}
-
-void RaycastCpuRenderer::integrate_all(std::span<const VoxelRay> rays, Beam beam, std::span<float> line_integrals,
-                                       std::span<RayGradient> gradients) const {
+void RaycastCpuRenderer::integrate(std::span<const VoxelRay> rays, Beam beam, std::span<float> line_integrals,
+                                   std::span<RayGradient> gradients) const {
   const PackedVolume& volume = volumes_.at(beam);
   std::ranges::fill(line_integrals, 0.0F);
   std::ranges::fill(gradients, RayGradient());

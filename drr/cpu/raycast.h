@@ -37,12 +37,8 @@ class RaycastCpuRenderer final : public CpuRenderer {
   };
   static PackedVolume pack(QuantizedVolume attenuation);
 
-  void integrate(std::span<const VoxelRay> rays, Beam beam, std::span<float> line_integrals) const override;
-  void integrate_with_gradients(std::span<const VoxelRay> rays, Beam beam, std::span<float> line_integrals,
-                                std::span<RayGradient> gradients) const override;
-  // `gradients` is empty if none are wanted.
-  void integrate_all(std::span<const VoxelRay> rays, Beam beam, std::span<float> line_integrals,
-                     std::span<RayGradient> gradients) const;
+  void integrate(std::span<const VoxelRay> rays, Beam beam, std::span<float> line_integrals,
+                 std::span<RayGradient> gradients) const override;
 
   std::map<Beam, PackedVolume> volumes_;
 };

@@ -25,7 +25,8 @@ SiddonRenderer::SiddonRenderer(const Volume<float>& ct_hu, const AttenuationMode
   for (const Beam beam : beams) attenuation_per_mm_.emplace(beam, attenuation_volume(ct_hu, model, beam));
 }
 
-void SiddonRenderer::integrate(std::span<const VoxelRay> rays, Beam beam, std::span<float> line_integrals) const {
+void SiddonRenderer::integrate(std::span<const VoxelRay> rays, Beam beam, std::span<float> line_integrals,
+                               std::span<RayGradient>) const {
   const Volume<float>& volume = attenuation_per_mm_.at(beam);
   std::ranges::transform(rays, line_integrals.begin(),
                          [&](const VoxelRay& ray) { return static_cast<float>(line_integral(ray, volume)); });

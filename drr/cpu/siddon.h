@@ -13,7 +13,8 @@ class SiddonRenderer final : public CpuRenderer {
   RendererKind kind() const override { return RendererKind::kSiddon; }
 
  private:
-  void integrate(std::span<const VoxelRay> rays, Beam beam, std::span<float> line_integrals) const override;
+  void integrate(std::span<const VoxelRay> rays, Beam beam, std::span<float> line_integrals,
+                 std::span<RayGradient> gradients) const override;
 
   std::map<Beam, Volume<float>> attenuation_per_mm_;
 };

@@ -3,28 +3,12 @@
 #include <algorithm>
 
 #include "drr/cpu/cell_walk.h"
+#include "drr/interpolation.h"
 
 namespace isoshift {
 namespace {
 
-double voxel_or_zero(const Volume<float>& volume, int i, int j, int k) {
-  const bool inside = i >= 0 && j >= 0 && k >= 0 && i < volume.size.x() && j < volume.size.y() && k < volume.size.z();
-  return inside ? volume.at(i, j, k) : 0.0;
-}
-
-// Trilinear value at `fraction` of the way from voxel `corner` to the next one along each axis.
-double interpolate(const Volume<float>& volume, const Eigen::Vector3i& corner, const Eigen::Vector3d& fraction) {
-  double value = 0.0;
-  for (int n = 0; n < 8; ++n) {
-    const Eigen::Vector3i offset(n & 1, (n >> 1) & 1, n >> 2);
-    const Eigen::Vector3d distance = (fraction - offset.cast<double>()).cwiseAbs();
-    const Eigen::Vector3i voxel = corner + offset;
-    value += (1.0 - distance.array()).prod() * voxel_or_zero(volume, voxel.x(), voxel.y(), voxel.z());
-  }
-  return value;
-}
-
-// The gradient there, per voxel.
+// The gradient of interpolate() there, per voxel.
 Eigen::Vector3d interpolated_gradient(const Volume<float>& volume, const Eigen::Vector3i& corner,
                                       const Eigen::Vector3d& fraction) {
   Eigen::Vector3d gradient = Eigen::Vector3d::Zero();
@@ -32,10 +16,9 @@ Eigen::Vector3d interpolated_gradient(const Volume<float>& volume, const Eigen::
     const Eigen::Vector3i offset(n & 1, (n >> 1) & 1, n >> 2);
     const Eigen::Vector3d weight = 1.0 - (fraction - offset.cast<double>()).cwiseAbs().array();
     const Eigen::Vector3d sign = 2.0 * offset.cast<double>().array() - 1.0;
-    const Eigen::Vector3i voxel = corner + offset;
-    gradient += voxel_or_zero(volume, voxel.x(), voxel.y(), voxel.z()) *
-                Eigen::Vector3d(sign.x() * weight.y() * weight.z(), sign.y() * weight.x() * weight.z(),
-                                sign.z() * weight.x() * weight.y());
+    gradient += voxel_or_zero(volume, corner + offset) * Eigen::Vector3d(sign.x() * weight.y() * weight.z(),
+                                                                         sign.y() * weight.x() * weight.z(),
+                                                                         sign.z() * weight.x() * weight.y());
   }
   return gradient;
 }
@@ -90,18 +73,12 @@ TrilinearRenderer::TrilinearRenderer(const Volume<float>& ct_hu, const Attenuati
 TrilinearRenderer::TrilinearRenderer(AttenuationByBeam attenuation_per_mm)
     : CpuRenderer(lattice_of(attenuation_per_mm)), attenuation_per_mm_(std::move(attenuation_per_mm)) {}
 
-void TrilinearRenderer::integrate(std::span<const VoxelRay> rays, Beam beam, std::span<float> line_integrals) const {
+void TrilinearRenderer::integrate(std::span<const VoxelRay> rays, Beam beam, std::span<float> line_integrals,
+                                  std::span<RayGradient> gradients) const {
   const Volume<float>& volume = attenuation_per_mm_.at(beam);
   std::ranges::transform(rays, line_integrals.begin(),
                          [&](const VoxelRay& ray) { return static_cast<float>(line_integral(ray, volume)); });
-}
-
-void TrilinearRenderer::integrate_with_gradients(std::span<const VoxelRay> rays, Beam beam,
-                                                 std::span<float> line_integrals,
-                                                 std::span<RayGradient> gradients) const {
-  const Volume<float>& volume = attenuation_per_mm_.at(beam);
-  integrate(rays, beam, line_integrals);
-  std::ranges::transform(rays, gradients.begin(), [&](const VoxelRay& ray) { return gradient_of(ray, volume); });
+  for (std::size_t n = 0; n < gradients.size(); ++n) gradients[n] = gradient_of(rays[n], volume);
 }
 
 }  // namespace isoshift

@@ -18,9 +18,8 @@ class TrilinearRenderer final : public CpuRenderer {
   bool has_derivatives() const override { return true; }
 
  private:
-  void integrate(std::span<const VoxelRay> rays, Beam beam, std::span<float> line_integrals) const override;
-  void integrate_with_gradients(std::span<const VoxelRay> rays, Beam beam, std::span<float> line_integrals,
-                                std::span<RayGradient> gradients) const override;
+  void integrate(std::span<const VoxelRay> rays, Beam beam, std::span<float> line_integrals,
+                 std::span<RayGradient> gradients) const override;
 
   AttenuationByBeam attenuation_per_mm_;
 };

@@ -5,7 +5,9 @@
 #include <map>
 
 #include "base/parallel.h"
+#include "geometry/rotation.h"
 #include "registration/preprocess/preprocess.h"
+#include "registration/similarity/correlation_model.h"
 
 namespace isoshift {
 namespace {
@@ -15,11 +17,6 @@ using Eigen::Index;
 constexpr double kTileMm = 25.0;     // residuals are alike over about this distance, at the isocenter
 constexpr double kOutlying = 1.5;    // a tile this many times as badly explained as the median begins to lose weight
 constexpr double kLeastRest = 1e-4;  // of 1 - rho: DRRs of a phantom can match without rest
-constexpr double kLeastCorrelation = 0.2;
-
-Eigen::Matrix3d cross_matrix(const Eigen::Vector3d& v) {
-  return (Eigen::Matrix3d() << 0.0, -v.z(), v.y(), v.z(), 0.0, -v.x(), -v.y(), v.x(), 0.0).finished();
-}
 
 // A spring's stretch in sigmas, and how motions of its two bodies (about the isocenter, in the room) change it.
 struct Stretch {
@@ -114,21 +111,12 @@ QuadraticModel BodyObjective::list_model(const List& list, const Drr& drr) const
     y[n] = root * (drr.line_integrals[to] - drr.line_integrals[from]);
     of_y.row(n) = root * (drr.jacobian.row(to) - drr.jacobian.row(from));
   }
-  const float x_norm = x.norm(), y_norm = y.norm();
-  if (!(x_norm > 0.0F && y_norm > 0.0F)) return no_model(static_cast<std::size_t>(drr.jacobian.cols()));
-  x /= x_norm;
-  y /= y_norm;
-  of_y /= y_norm;
-  const double rho = x.dot(y), rest = std::max(kLeastRest, 1.0 - rho);
-  const Eigen::VectorXd along_y = (of_y.transpose() * y).cast<double>();
-  Eigen::MatrixXf squares = Eigen::MatrixXf::Zero(of_y.cols(), of_y.cols());
-  squares.selfadjointView<Eigen::Lower>().rankUpdate(of_y.transpose());
-  const Eigen::MatrixXd curvature =
-      Eigen::MatrixXf(squares.selfadjointView<Eigen::Lower>()).cast<double>() - along_y * along_y.transpose();
+  const QuadraticModel correlation = correlation_model(std::move(x), std::move(y), std::move(of_y));
   const double tiles = 0.25 * tiles_counted(list.view);  // half of n/2
+  const double rest = std::max(kLeastRest, 1.0 - correlation.value);
   return {.value = -tiles * std::log(rest),
-          .gradient = tiles / rest * ((of_y.transpose() * x).cast<double>() - rho * along_y),
-          .curvature = tiles / rest * std::max(kLeastCorrelation, rho) * curvature};
+          .gradient = tiles / rest * correlation.gradient,
+          .curvature = tiles / rest * correlation.curvature};
 }
 
 QuadraticModel BodyObjective::image_model(const PoseSlots& slots, std::span<const double> parameters) const {
@@ -166,12 +154,13 @@ QuadraticModel BodyObjective::spring_model(const PoseSlots& slots, std::span<con
   return sum;
 }
 
-QuadraticModel BodyObjective::model(const PoseSlots& slots, std::span<const double> parameters) const {
-  return weighted_sum(1.0, image_model(slots, parameters), 1.0, spring_model(slots, parameters));
+BodyObjective::Parts BodyObjective::parts(const PoseSlots& slots, std::span<const double> parameters) const {
+  return {.images = image_model(slots, parameters), .springs = spring_model(slots, parameters)};
 }
 
-Eigen::MatrixXd BodyObjective::image_curvature(const PoseSlots& slots, std::span<const double> parameters) const {
-  return image_model(slots, parameters).curvature;
+QuadraticModel BodyObjective::model(const PoseSlots& slots, std::span<const double> parameters) const {
+  const Parts both = parts(slots, parameters);
+  return weighted_sum(1.0, both.images, 1.0, both.springs);
 }
 
 void BodyObjective::reweight(const BodyPoses& poses) {

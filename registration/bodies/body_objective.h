@@ -25,8 +25,11 @@ class BodyObjective {
   // The model at some parameters of the slots. All tiles weigh the same until reweight().
   QuadraticModel model(const PoseSlots& slots, std::span<const double> parameters) const;
 
-  // The part of the curvature that comes from the images.
-  Eigen::MatrixXd image_curvature(const PoseSlots& slots, std::span<const double> parameters) const;
+  // The same, taken apart.
+  struct Parts {
+    QuadraticModel images, springs;
+  };
+  Parts parts(const PoseSlots& slots, std::span<const double> parameters) const;
 
   // What does not fit must not pull: tiles whose unexplained share is k times as large as the median's, k > 1.5, weigh
   // (1.5 / k)^2 from now on.

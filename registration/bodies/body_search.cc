@@ -6,6 +6,7 @@
 #include <chrono>
 #include <set>
 
+#include "geometry/voxel_box.h"
 #include "registration/bodies/body_objective.h"
 #include "registration/levenberg_marquardt.h"
 
@@ -52,8 +53,9 @@ double least_share(const Eigen::Matrix<double, 6, 6>& part, const Eigen::Matrix<
 
 std::vector<FoundBody> found_at_base(const BodyObjective& objective, const PoseSlots& slots, const BodyPoses& poses) {
   const std::vector<double> at_base(kParameters * slots.count(), 0.0);
-  const Eigen::MatrixXd whole = objective.model(slots, at_base).curvature;
-  const Eigen::MatrixXd images = objective.image_curvature(slots, at_base);
+  const BodyObjective::Parts parts = objective.parts(slots, at_base);
+  const Eigen::MatrixXd& images = parts.images.curvature;
+  const Eigen::MatrixXd whole = images + parts.springs.curvature;
   const Eigen::MatrixXd covariance = whole.ldlt().solve(Eigen::MatrixXd::Identity(whole.rows(), whole.cols()));
   std::vector<FoundBody> found;
   for (std::size_t body = 0; body < poses.size(); ++body) {
@@ -74,8 +76,7 @@ BodySearchResult search_bodies(const JointedBodies& bodies, const Volume<float>&
                                const BodySearchOptions& options) {
   const auto begin = std::chrono::steady_clock::now();
   const std::vector<Beam> beams = beams_of(views.images);
-  const Eigen::Vector3i block = (1.01 * options.voxel_mm / ct_hu.spacing_mm().array()).cast<int>().max(1);
-  const CoarserCt coarser = coarser_ct(ct_hu, model, block);
+  const CoarserCt coarser = coarser_ct(ct_hu, model, block_of(ct_hu.spacing_mm(), ct_hu.size, options.voxel_mm));
   const BodyRenderers renderers(RendererKind::kCpu, coarser.hu, coarser.model, beams, bodies.shares);
   const auto whole = make_renderer(RendererKind::kCpu, coarser.hu, coarser.model, beams);
 

@@ -1,5 +1,6 @@
 #include "registration/bodies/pose_slots.h"
 
+#include "geometry/rotation.h"
 #include "registration/pose_parameters.h"
 
 namespace isoshift {
@@ -34,9 +35,8 @@ BodyPoses PoseSlots::poses(std::span<const double> parameters) const {
 
 Eigen::Matrix<double, 6, 6> PoseSlots::motions(std::size_t slot, std::span<const double> parameters) const {
   // Turning about a center c is turning about the isocenter and moving by c x rotation.
-  const Eigen::Vector3d& c = center_room_mm_[slot];
   Eigen::Matrix<double, 6, 6> about_isocenter = Eigen::Matrix<double, 6, 6>::Identity();
-  about_isocenter.topRightCorner<3, 3>() << 0.0, -c.z(), c.y(), c.z(), 0.0, -c.x(), -c.y(), c.x(), 0.0;
+  about_isocenter.topRightCorner<3, 3>() = cross_matrix(center_room_mm_[slot]);
   return about_isocenter * motions_per_parameter(parameters.subspan(kParameters * slot, kParameters));
 }
 

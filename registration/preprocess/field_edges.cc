@@ -207,14 +207,6 @@ std::vector<int> EdgeMap::candidates(int least_apart, double least_score, int mo
   return found;
 }
 
-bool FieldRectangle::is_whole() const { return found() == 0; }
-
-int FieldRectangle::found() const { return static_cast<int>(std::ranges::count(sides, false, &FieldSide::is_open)); }
-
-cv::Rect FieldRectangle::rect() const {
-  return {sides[0].at, sides[2].at, sides[1].at - sides[0].at, sides[3].at - sides[2].at};
-}
-
 FieldEdges::Axis FieldEdges::axis_of(const UprightXray& xray) {
   const cv::Mat steps = steps_of(xray), compared = compared_of(xray);
   Axis axis{.low = EdgeMap(steps, compared, 1),

@@ -56,9 +56,6 @@ struct FieldSide {
 struct FieldRectangle {
   std::array<FieldSide, 4> sides;
   double score = 0.0;  // mm of side with an edge, less those without; 0: no side has one
-  bool is_whole() const;
-  int found() const;  // sides that are not open
-  cv::Rect rect() const;
 };
 
 // All edges of an image.

@@ -128,6 +128,10 @@ void restrict_to(const PixelRectangle& rectangle, FixedImage& image) {
                       .corners_px = {{left, top}, {right, top}, {right, bottom}, {left, bottom}}};
 }
 
+void restrict_to(const RectanglesByLabel& rectangles, FixedImage& image) {
+  if (const auto drawn = rectangles.find(image.label); drawn != rectangles.end()) restrict_to(drawn->second, image);
+}
+
 FixedImage prepare(const XrayImage& xray) {
   const auto [darkest, brightest] = std::ranges::minmax(xray.values.pixels);
   const bool is_intensity = xray.meaning == XrayImage::Meaning::kIntensity;

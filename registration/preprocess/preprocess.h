@@ -2,6 +2,7 @@
 // From X-ray pixels to what a DRR can be compared with. The only part of isoshift that uses OpenCV.
 
 #include <cstdint>
+#include <map>
 #include <span>
 #include <string>
 #include <string_view>
@@ -44,6 +45,9 @@ struct PixelRectangle {
 // Takes out of the field, at full resolution, what lies outside a rectangle drawn by a person. A field that is not sure
 // does not count: all of the receptor inside the rectangle is compared.
 void restrict_to(const PixelRectangle& rectangle, FixedImage& image);
+// The same with the rectangle of the image's label, if there is one.
+using RectanglesByLabel = std::map<std::string, PixelRectangle>;
+void restrict_to(const RectanglesByLabel& rectangles, FixedImage& image);
 
 // The whole way for one X-ray, at full resolution. Throws Error for a blank one.
 FixedImage prepare(const XrayImage& xray);

@@ -5,6 +5,7 @@
 
 #include "geometry/target_error.h"
 #include "registration/objective.h"
+#include "registration/pose_objective.h"
 #include "registration/pose_parameters.h"
 #include "registration/quality/uncertainty.h"
 
@@ -18,55 +19,46 @@ constexpr double kReachMm = 15.0, kFirstStepMm = 1.0;
 // Gradient correlation less the spring, on top of a pose.
 class HeldObjective {
  public:
-  HeldObjective(Objective& objective, const Eigen::Isometry3d& pose) : objective_(objective), pose_(pose) {}
+  HeldObjective(Objective& objective, const Eigen::Isometry3d& pose) : poses_(objective, pose) {}
 
   std::vector<double> values(std::span<const std::vector<double>> points) {
-    std::vector<double> values = objective_.values(poses_of(points));
-    for (std::size_t n = 0; n < points.size(); ++n) values[n] -= 0.5 * kSpring * vector_of(points[n]).squaredNorm();
+    std::vector<double> values = poses_.values(points);
+    for (std::size_t n = 0; n < points.size(); ++n) values[n] += kSpring * spring_at(points[n]).value;
     return values;
   }
 
   std::vector<QuadraticModel> models(std::span<const std::vector<double>> points) {
-    std::vector<QuadraticModel> models = objective_.models(poses_of(points));
-    for (std::size_t n = 0; n < points.size(); ++n) {
-      const Eigen::VectorXd at = vector_of(points[n]);
-      const QuadraticModel spring{.value = -0.5 * at.squaredNorm(),
-                                  .gradient = -at,
-                                  .curvature = Eigen::MatrixXd::Identity(at.size(), at.size())};
-      models[n] = weighted_sum(1.0, models[n].by(motions_per_parameter(points[n])), kSpring, spring);
-    }
+    std::vector<QuadraticModel> models = poses_.models(points);
+    for (std::size_t n = 0; n < points.size(); ++n)
+      models[n] = weighted_sum(1.0, models[n], kSpring, spring_at(points[n]));
     return models;
   }
 
  private:
-  std::vector<Eigen::Isometry3d> poses_of(std::span<const std::vector<double>> points) const {
-    std::vector<Eigen::Isometry3d> poses;
-    for (const std::vector<double>& point : points) poses.push_back(setup_error_from_parameters(point) * pose_);
-    return poses;
-  }
-  static Eigen::VectorXd vector_of(const std::vector<double>& point) {
-    return Eigen::Map<const Eigen::VectorXd>(point.data(), static_cast<Eigen::Index>(point.size()));
+  static QuadraticModel spring_at(const std::vector<double>& point) {
+    const Eigen::Map<const Eigen::VectorXd> at(point.data(), static_cast<Eigen::Index>(point.size()));
+    return {.value = -0.5 * at.squaredNorm(),
+            .gradient = -at,
+            .curvature = Eigen::MatrixXd::Identity(at.size(), at.size())};
   }
 
-  Objective& objective_;
-  const Eigen::Isometry3d& pose_;
+  PoseObjective poses_;
 };
 
 // The setup error that one view wants, on top of a pose: the best parameters.
-std::vector<double> wanted_alone(Objective& objective, bool has_derivatives, const Eigen::Isometry3d& pose, Dof dof) {
+std::vector<double> wanted_alone(Objective& objective, const Renderer& renderer, const Eigen::Isometry3d& pose,
+                                 Dof dof) {
   HeldObjective held(objective, pose);
   const std::size_t axes = dof == Dof::kRigid ? 6 : 3;
-  OptimizerOptions options{.start = std::vector<double>(axes, 0.0),
-                           .lower = std::vector<double>(axes, -kReachMm),
-                           .upper = std::vector<double>(axes, kReachMm),
-                           .initial_step = std::vector<double>(axes, kFirstStepMm),
-                           .relative_tolerance = 0.02,
-                           .max_evaluations = 100};
-  using Points = std::span<const std::vector<double>>;
-  if (!has_derivatives)
-    return maximize([&](Points points) { return held.values(points); }, std::span(&options, 1)).front().best;
-  options.kind = OptimizerKind::kLevenbergMarquardt;
-  return maximize([&](Points points) { return held.models(points); }, std::span(&options, 1)).front().best;
+  const OptimizerOptions options{
+      .kind = possible_optimizer(OptimizerKind::kLevenbergMarquardt, renderer, SimilarityKind::kGradientCorrelation),
+      .start = std::vector<double>(axes, 0.0),
+      .lower = std::vector<double>(axes, -kReachMm),
+      .upper = std::vector<double>(axes, kReachMm),
+      .initial_step = std::vector<double>(axes, kFirstStepMm),
+      .relative_tolerance = 0.02,
+      .max_evaluations = 100};
+  return maximize_poses(held, renderer, std::span(&options, 1)).front().best;
 }
 
 // How the standard targets move in a view with every parameter: two rows per target, mm at the isocenter.
@@ -106,7 +98,7 @@ std::vector<Contradiction> contradictions(const RendererPyramid& renderers, cons
     Objective objective(
         renderer, std::span(&image, 1), room_from_patient,
         {.similarity = SimilarityKind::kGradientCorrelation, .pixel_fraction = 0.5, .min_pixels = 6000});
-    const std::vector<double> alone = wanted_alone(objective, renderer.has_derivatives(), room_from_patient, dof);
+    const std::vector<double> alone = wanted_alone(objective, renderer, room_from_patient, dof);
     const Eigen::MatrixXd motions = seen_motions(image.view, error, alone.size());
     const Eigen::MatrixXd covariance = pose_covariance(objective, room_from_patient, dof == Dof::kTranslation, kSpring);
     const Eigen::Map<const Eigen::VectorXd> wanted(alone.data(), static_cast<Eigen::Index>(alone.size()));

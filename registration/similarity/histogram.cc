@@ -34,14 +34,29 @@ float bins_per_unit(float value, const Range& range, int bins) {
   return share > 0.0F && share < 1.0F ? range.per_unit * static_cast<float>(bins - 1) : 0.0F;
 }
 
-std::array<float, kRankBins> middle_ranks(const RankHistogram& histogram) {
-  std::array<float, kRankBins> ranks = {};
+RankedPlaces ranked_places(std::span<const float> values, const Range& range) {
+  RankedPlaces ranked;
+  ranked.places.reserve(values.size());
+  std::array<std::uint32_t, kRankBins> counts = {};
+  for (const float value : values) {
+    const Place& place = ranked.places.emplace_back(place_of(value, range, kRankBins));
+    counts[place.lower] += kSharesPerPixel - place.shares;
+    counts[place.lower + 1] += place.shares;
+  }
   double below = 0.0;  // in pixels
-  for (std::size_t bin = 0; bin < histogram.size(); ++bin) {
-    const double count = static_cast<double>(histogram[bin]) / kSharesPerPixel;
-    ranks[bin] = static_cast<float>(below + 0.5 * (count - 1.0));
+  for (std::size_t bin = 0; bin < counts.size(); ++bin) {
+    const double count = static_cast<double>(counts[bin]) / kSharesPerPixel;
+    ranked.of_middles[bin] = static_cast<float>(below + 0.5 * (count - 1.0));
     below += count;
   }
+  return ranked;
+}
+
+std::vector<float> RankedPlaces::ranks() const {
+  std::vector<float> ranks;
+  ranks.reserve(places.size());
+  for (const Place& place : places)
+    ranks.push_back(of_middles[place.lower] + place.beyond * (of_middles[place.lower + 1] - of_middles[place.lower]));
   return ranks;
 }
 

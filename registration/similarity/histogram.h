@@ -8,6 +8,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <vector>
 
 namespace isoshift {
 
@@ -32,10 +33,15 @@ Place place_of(float value, const Range& range, int bins);
 // How far a value moves among the bins, per unit; 0 beyond the range.
 float bins_per_unit(float value, const Range& range, int bins);
 
+// Where the values of a list lie among kRankBins bins, and the rank at the middle of every bin: that of half its
+// pixels; 0 is the first. Between the middles of two bins, ranks grow linearly.
 inline constexpr int kRankBins = 256;
-using RankHistogram = std::array<std::uint32_t, kRankBins>;
+struct RankedPlaces {
+  std::vector<Place> places;
+  std::array<float, kRankBins> of_middles = {};
 
-// The rank at the middle of every bin: that of half its pixels; 0 is the first.
-std::array<float, kRankBins> middle_ranks(const RankHistogram& histogram);
+  std::vector<float> ranks() const;
+};
+RankedPlaces ranked_places(std::span<const float> values, const Range& range);
 
 }  // namespace isoshift

@@ -101,21 +101,7 @@ double gradient_correlation(const Gradients& a, const Gradients& b) {
 }
 
 std::vector<float> histogram_ranks(std::span<const float> values, const Range& range) {
-  std::vector<Place> places;
-  places.reserve(values.size());
-  RankHistogram counts = {};
-  for (const float value : values) {
-    const Place& place = places.emplace_back(place_of(value, range, kRankBins));
-    counts[place.lower] += kSharesPerPixel - place.shares;
-    counts[place.lower + 1] += place.shares;
-  }
-  const std::array<float, kRankBins> rank_of_bin = middle_ranks(counts);
-  std::vector<float> ranks;
-  ranks.reserve(values.size());
-  for (const Place& place : places)
-    ranks.push_back(rank_of_bin[place.lower] +
-                    place.beyond * (rank_of_bin[place.lower + 1] - rank_of_bin[place.lower]));
-  return ranks;
+  return ranked_places(values, range).ranks();
 }
 
 std::vector<float> exact_ranks(std::span<const float> values) {

@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "registration/similarity/correlation_model.h"
 #include "registration/similarity/similarity.h"
 
 namespace isoshift {
@@ -10,34 +11,17 @@ namespace {
 using Eigen::Index;
 using JacobianRef = Eigen::Ref<const PixelJacobian>;
 
-// The correlation of an X-ray's values x with a DRR's y, whose derivatives are the rows of `jacobian`. With both of
-// mean 0 and norm 1, 1 - rho = |x - y|^2 / 2; its curvature at the optimum is rho J'J, with J the derivatives of the
-// normalized y.
-QuadraticModel correlation_model(std::span<const float> xray, std::span<const float> drr, const JacobianRef& jacobian) {
+// Pearson's correlation of an X-ray's values with a DRR's, whose derivatives are the rows of `jacobian`.
+QuadraticModel correlation_of(std::span<const float> xray, std::span<const float> drr, const JacobianRef& jacobian) {
   const auto centered = [](std::span<const float> values) {
     Eigen::VectorXd result =
         Eigen::Map<const Eigen::VectorXf>(values.data(), static_cast<Index>(values.size())).cast<double>();
     result.array() -= result.mean();
     return result;
   };
-  QuadraticModel model{.value = 0.0,
-                       .gradient = Eigen::VectorXd::Zero(jacobian.cols()),
-                       .curvature = Eigen::MatrixXd::Zero(jacobian.cols(), jacobian.cols())};
-  Eigen::VectorXd x = centered(xray), y = centered(drr);
-  const double x_norm = x.norm(), y_norm = y.norm();
-  if (!(x_norm > 0.0 && y_norm > 0.0)) return model;
-  x /= x_norm;
-  y /= y_norm;
-  Eigen::MatrixXd of_y = jacobian.cast<double>() / y_norm;
-  of_y.rowwise() -= of_y.colwise().mean().eval();
-  const Eigen::VectorXd along_y = of_y.transpose() * y;
-  model.value = x.dot(y);
-  model.gradient = of_y.transpose() * x - model.value * along_y;
-  // Far from the optimum rho says nothing about the curvature; a floor keeps steps finite there.
-  constexpr double kLeastCorrelation = 0.2;
-  model.curvature =
-      std::max(kLeastCorrelation, model.value) * (of_y.transpose() * of_y - along_y * along_y.transpose());
-  return model;
+  Eigen::MatrixXd of_drr = jacobian.cast<double>();
+  of_drr.rowwise() -= of_drr.colwise().mean().eval();
+  return correlation_model(centered(xray), centered(drr), std::move(of_drr));
 }
 
 // The differences of the Jacobian's rows that gradients() takes of pixels.
@@ -51,28 +35,22 @@ PixelJacobian differences(const JacobianRef& jacobian, std::span<const Neighbors
 
 // How histogram_ranks() change. A pixel that moves among the bins changes its own rank, and takes others with it: by
 // moving a share from bin b to the next it lowers the ranks at the middles of both by half of that.
-PixelJacobian jacobian_of_ranks(std::span<const float> drr, const Range& range, const JacobianRef& jacobian) {
-  std::vector<Place> places;
-  places.reserve(drr.size());
-  RankHistogram counts = {};
+PixelJacobian jacobian_of_ranks(const RankedPlaces& ranked, std::span<const float> drr, const Range& range,
+                                const JacobianRef& jacobian) {
   PixelJacobian moved = PixelJacobian::Zero(kRankBins, jacobian.cols());  // shares, from each bin to the next
   PixelJacobian result = jacobian;
   for (std::size_t n = 0; n < drr.size(); ++n) {
-    const Place& place = places.emplace_back(place_of(drr[n], range, kRankBins));
-    counts[place.lower] += kSharesPerPixel - place.shares;
-    counts[place.lower + 1] += place.shares;
     auto row = result.row(static_cast<Index>(n));
     row *= bins_per_unit(drr[n], range, kRankBins);
-    moved.row(static_cast<Index>(place.lower)) += row;
+    moved.row(static_cast<Index>(ranked.places[n].lower)) += row;
   }
   PixelJacobian of_middles = -0.5F * moved;
   of_middles.bottomRows(kRankBins - 1) -= 0.5F * moved.topRows(kRankBins - 1);
-  const std::array<float, kRankBins> ranks = middle_ranks(counts);
   for (std::size_t n = 0; n < drr.size(); ++n) {
-    const Place& place = places[n];
+    const Place& place = ranked.places[n];
     const auto lower = static_cast<Index>(place.lower);
     auto row = result.row(static_cast<Index>(n));
-    row *= ranks[place.lower + 1] - ranks[place.lower];
+    row *= ranked.of_middles[place.lower + 1] - ranked.of_middles[place.lower];
     row += (1.0F - place.beyond) * of_middles.row(lower) + place.beyond * of_middles.row(lower + 1);
   }
   return result;
@@ -103,10 +81,12 @@ class EntropyChanges {
 };
 
 // Mutual information, of which only the gradient is known: d H(B) and d H(A, B), each -sum log p dp.
-QuadraticModel information_model(SimilarityKind kind, double value, std::span<const std::uint32_t> xray_bins,
+QuadraticModel information_model(SimilarityKind kind, std::span<const std::uint32_t> xray_bins,
                                  std::span<const float> drr, const Range& range, const JacobianRef& jacobian) {
   const JointHistogram histogram = joint_histogram(xray_bins, drr, range);
   const EntropyChanges changes(histogram);
+  const bool is_normalized = kind == SimilarityKind::kNormalizedMutualInformation;
+  const double value = is_normalized ? normalized_mutual_information(histogram) : mutual_information(histogram);
   QuadraticModel model{.value = value, .gradient = Eigen::VectorXd::Zero(jacobian.cols()), .curvature = {}};
   if (drr.empty()) return model;
   const double joint = joint_entropy(histogram);
@@ -115,8 +95,7 @@ QuadraticModel information_model(SimilarityKind kind, double value, std::span<co
     const std::size_t lower = place_of(drr[n], range, kInformationBins).lower;
     const double of_drr = changes.of_drr(lower), of_both = changes.of_both(xray_bins[n], lower);
     double per_bin = of_drr - of_both;
-    if (kind == SimilarityKind::kNormalizedMutualInformation)
-      per_bin = joint > 0.0 ? (of_drr - value * of_both) / joint : 0.0;  // of (H(A) + H(B)) / H(A, B)
+    if (is_normalized) per_bin = joint > 0.0 ? (of_drr - value * of_both) / joint : 0.0;  // of (H(A) + H(B)) / H(A, B)
     model.gradient += per_bin * bins * jacobian.row(static_cast<Index>(n)).transpose().cast<double>();
   }
   return model;
@@ -126,21 +105,23 @@ QuadraticModel information_model(SimilarityKind kind, double value, std::span<co
 
 QuadraticModel Comparison::model(std::span<const float> drr, const Eigen::Ref<const PixelJacobian>& jacobian) const {
   switch (kind_) {
-    case SimilarityKind::kNcc: return correlation_model(values_, drr, jacobian);
+    case SimilarityKind::kNcc: return correlation_of(values_, drr, jacobian);
     case SimilarityKind::kGradientCorrelation: {
       const Gradients of_drr = gradients(drr, neighbors_);
       return weighted_sum(0.5,
-                          correlation_model(gradients_.along_row, of_drr.along_row,
-                                            differences(jacobian, neighbors_, &Neighbors::left, &Neighbors::right)),
+                          correlation_of(gradients_.along_row, of_drr.along_row,
+                                         differences(jacobian, neighbors_, &Neighbors::left, &Neighbors::right)),
                           0.5,
-                          correlation_model(gradients_.along_column, of_drr.along_column,
-                                            differences(jacobian, neighbors_, &Neighbors::above, &Neighbors::below)));
+                          correlation_of(gradients_.along_column, of_drr.along_column,
+                                         differences(jacobian, neighbors_, &Neighbors::above, &Neighbors::below)));
     }
-    case SimilarityKind::kStochasticRankCorrelation:
-      return correlation_model(values_, histogram_ranks(drr, drr_range_), jacobian_of_ranks(drr, drr_range_, jacobian));
+    case SimilarityKind::kStochasticRankCorrelation: {
+      const RankedPlaces ranked = ranked_places(drr, drr_range_);
+      return correlation_of(values_, ranked.ranks(), jacobian_of_ranks(ranked, drr, drr_range_, jacobian));
+    }
     case SimilarityKind::kMutualInformation:
     case SimilarityKind::kNormalizedMutualInformation:
-      return information_model(kind_, of(drr), bins_, drr, drr_range_, jacobian);
+      return information_model(kind_, bins_, drr, drr_range_, jacobian);
   }
   return {};
 }

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "base/error.h"
+#include "tests/support/batched.h"
 
 namespace isoshift {
 namespace {
@@ -26,15 +27,6 @@ QuadraticModel rosenbrock(const std::vector<double>& x) {
   return {.value = -0.5 * residual.squaredNorm(),
           .gradient = -jacobian.transpose() * residual,
           .curvature = jacobian.transpose() * jacobian};
-}
-
-template <class Function>
-BatchModel batched(Function&& function) {
-  return [function](std::span<const std::vector<double>> points) {
-    std::vector<QuadraticModel> models;
-    for (const std::vector<double>& point : points) models.push_back(function(point));
-    return models;
-  };
 }
 
 OptimizerResult climb_alone(const BatchModel& models, const OptimizerOptions& options) {

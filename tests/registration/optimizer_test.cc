@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "base/error.h"
+#include "tests/support/batched.h"
 
 namespace isoshift {
 namespace {
@@ -17,16 +18,6 @@ OptimizerOptions two_parameters(OptimizerKind kind = OptimizerKind::kBobyqa) {
           .upper = {10, 10},
           .initial_step = {1, 1},
           .relative_tolerance = 1e-6};
-}
-
-// A function of one point as one of batches.
-template <class Function>
-BatchObjective batched(Function&& function) {
-  return [function](std::span<const std::vector<double>> points) {
-    std::vector<double> values;
-    for (const std::vector<double>& point : points) values.push_back(function(point));
-    return values;
-  };
 }
 
 double parabola(const std::vector<double>& x) { return -(x[0] - 3) * (x[0] - 3) - 2 * (x[1] + 1.5) * (x[1] + 1.5) + 7; }

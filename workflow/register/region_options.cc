@@ -44,8 +44,8 @@ Volume<std::uint8_t> sphere(const Study& study, double radius_mm) {
 
 }  // namespace
 
-std::map<std::string, PixelRectangle> RegionOptions::rectangles_of(const Study& study) const {
-  std::map<std::string, PixelRectangle> by_label;
+RectanglesByLabel RegionOptions::rectangles_of(const Study& study) const {
+  RectanglesByLabel by_label;
   for (const std::string& text : rectangles) {
     const auto equals = text.rfind('=');
     PixelRectangle r;

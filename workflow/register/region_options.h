@@ -18,7 +18,7 @@ struct RegionOptions {
   double margin_mm = 5.0;
 
   // The rectangles by label. Throws UsageError for a rectangle that cannot be parsed, or whose label no X-ray has.
-  std::map<std::string, PixelRectangle> rectangles_of(const Study& study) const;
+  RectanglesByLabel rectangles_of(const Study& study) const;
 
   // The region in words; empty if everything is compared.
   std::vector<std::string> in_words() const;

@@ -53,9 +53,7 @@ std::vector<SetupResult::Point> centroids_of(const std::vector<MarkedStructure>&
 // The X-rays as they were compared: within the rectangles that a person drew.
 std::vector<FixedImage> compared_images(std::span<const FixedImage> images, const RegistrationOptions& options) {
   std::vector<FixedImage> compared(images.begin(), images.end());
-  for (FixedImage& image : compared)
-    if (const auto drawn = options.rectangles.find(image.label); drawn != options.rectangles.end())
-      restrict_to(drawn->second, image);
+  for (FixedImage& image : compared) restrict_to(options.rectangles, image);
   return compared;
 }
 

@@ -125,7 +125,7 @@ TEST(BodyObjective, GradientsAreDifferencesOfTheValue) {
     const double slope = model.gradient[static_cast<Eigen::Index>(n)];
     EXPECT_NEAR(slope, expected, 0.1 * std::abs(expected) + 0.3) << "parameter " << n;
   }
-  EXPECT_LE(objective.image_curvature(slots, at).trace(), model.curvature.trace());
+  EXPECT_LE(objective.parts(slots, at).images.curvature.trace(), model.curvature.trace());
 }
 
 }  // namespace

@@ -1,0 +1,26 @@
+#pragma once
+// Trilinear interpolation of volumes that fade to 0 over the voxel beyond their outermost voxel centers.
+
+#include "geometry/volume.h"
+
+namespace isoshift {
+
+template <class T>
+double voxel_or_zero(const Volume<T>& volume, const Eigen::Vector3i& at) {
+  const bool inside = (at.array() >= 0).all() && (at.array() < volume.size.array()).all();
+  return inside ? volume.at(at.x(), at.y(), at.z()) : 0.0;
+}
+
+// The value at `fraction` of the way from voxel `corner` to the next one along each axis.
+template <class T>
+double interpolate(const Volume<T>& volume, const Eigen::Vector3i& corner, const Eigen::Vector3d& fraction) {
+  double value = 0.0;
+  for (int n = 0; n < 8; ++n) {
+    const Eigen::Vector3i offset(n & 1, (n >> 1) & 1, n >> 2);
+    const Eigen::Vector3d distance = (fraction - offset.cast<double>()).cwiseAbs();
+    value += (1.0 - distance.array()).prod() * voxel_or_zero(volume, corner + offset);
+  }
+  return value;
+}
+
+}  // namespace isoshift
