@@ -78,7 +78,8 @@ SoftMasks soft_masks(const BodyMap& map, int block, double transition_mm) {
   for (std::size_t n = 0; n < map.bodies.size(); ++n)
     if (map.bodies[n].kind == Body::Kind::kCouch) couch = static_cast<int>(n) + 1;
   const Volume<std::uint8_t> labels = in_label_blocks(map.labels, block, couch);
-  SoftMasks result{.size = labels.size, .patient_from_voxel = labels.patient_from_voxel, .masks = {}};
+  SoftMasks result{.size = labels.size, .patient_from_voxel = labels.patient_from_voxel, .masks = {}, .to_bone_mm = {}};
+  result.to_bone_mm = Volume<float>(labels.size, labels.patient_from_voxel);
   std::vector<std::uint8_t> is_there(256, 0);
   for (const std::uint8_t label : labels.voxels) is_there[label] = 1;
   std::vector<int> present;
@@ -97,6 +98,7 @@ SoftMasks soft_masks(const BodyMap& map, int block, double transition_mm) {
     for (std::size_t n = labels.index(0, 0, k); n < labels.index(0, 0, k + 1); ++n) {
       double least = 1e30;
       for (const Volume<float>& distance : distances) least = std::min<double>(least, distance.voxels[n]);
+      result.to_bone_mm.voxels[n] = static_cast<float>(least);
       for (std::size_t b = 0; b < present.size(); ++b) {
         const double d = distances[b].voxels[n], within = std::max(0.0, least + transition_mm - d);
         // Within the body itself nothing else counts.

@@ -19,6 +19,7 @@ struct SoftMasks {
   Eigen::Vector3i size = Eigen::Vector3i::Zero();  // of the lattice on which all boxes lie
   Eigen::Affine3d patient_from_voxel = Eigen::Affine3d::Identity();
   std::vector<SoftMask> masks;  // of the bodies that have voxels, without the couch
+  Volume<float> to_bone_mm;     // on the lattice: distance from the nearest body, 0 in it
 };
 
 // The lattice is that of the labels in blocks of `block` voxels along every axis. In a body's own bone its weight is 1.

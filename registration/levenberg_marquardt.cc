@@ -94,7 +94,8 @@ class Climb {
     }
     step_length_ = step.norm();
     promised_ = gradient.dot(step) - 0.5 * step.dot(curvature * step);
-    if (step_length_ < options_.relative_tolerance || !(promised_ > 0.0)) end("step tolerance reached");
+    if (step_length_ < options_.relative_tolerance || !(promised_ > 0.0)) return end("step tolerance reached");
+    if (promised_ < options_.least_gain) end("nothing more to gain");
   }
 
   OptimizerOptions options_;

@@ -32,6 +32,7 @@ struct OptimizerOptions {
   std::vector<double> lower, upper;  // the box; start lies inside
   std::vector<double> initial_step;  // first trust-region radius per parameter
   double relative_tolerance = 1e-3;  // stop when steps fall below this share of the initial step
+  double least_gain = 0.0;           // kLevenbergMarquardt: stop when no more is to be gained by a step
   double difference_share = 0.05;    // kLbfgs: differences are taken over this share of the initial step, both ways
   int max_evaluations = 500;
 };

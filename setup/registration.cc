@@ -23,6 +23,11 @@ const char* to_string(IrradiatedField::Origin origin) {
   return "";
 }
 
+bool BodyMotion::is_determined() const {
+  constexpr double kMostSigmaMm = 2.0, kLeastShare = 0.1;
+  return sigma_mm.maxCoeff() <= kMostSigmaMm && image_share >= kLeastShare;
+}
+
 void Registration::demote(Verdict to, std::string reason) {
   verdict = std::max(verdict, to);
   reasons.push_back(std::move(reason));

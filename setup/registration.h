@@ -85,6 +85,22 @@ struct StageReport {
   std::vector<double> best;  // the similarity reached after each evaluation
 };
 
+// What a rigid part of the patient did against the target: how far its center lies off once the target is right, and
+// how it is turned there.
+struct BodyMotion {
+  std::string name;
+  Eigen::Vector3d center_room_mm = Eigen::Vector3d::Zero();  // as planned, mm from the isocenter, IEC 61217 fixed
+  Eigen::Vector3d displacement_mm = Eigen::Vector3d::Zero();
+  Eigen::Vector3d rotation_rad = Eigen::Vector3d::Zero();  // rotation vector
+  Eigen::Vector3d sigma_mm = Eigen::Vector3d::Zero();      // one standard deviation of the displacement
+  double carries_target = 0.0;                             // its share of the target; all shares add up to 1
+  double image_share = 0.0;  // of what is known about its place, in the direction known least; springs are the rest
+  bool breathes = false;     // it may lie elsewhere in every view: these numbers are of the first one
+
+  // Whether the images, and not only the springs to its neighbors, say where it lies.
+  bool is_determined() const;
+};
+
 struct Registration {
   Verdict verdict = Verdict::kRejected;
   std::vector<std::string> reasons = {"not run"};  // why the verdict is not `accepted`
@@ -93,7 +109,11 @@ struct Registration {
   std::vector<Eigen::Vector3d> unobservable_room;  // unit directions along which the views cannot tell
   std::optional<Uncertainty> uncertainty;          // nothing: the images do not determine the pose
   std::vector<StageReport> stages;
-  std::vector<Alternative> alternatives;                                    // empty: the preset does not check them
+  std::vector<Alternative> alternatives;  // empty: the preset does not check them
+  // Where the patient has bent: what bones did against the target. The pose is then the target's. Empty: the patient as
+  // a whole was registered.
+  std::vector<BodyMotion> bodies;
+  double target_deformation_mm = 0.0;  // how far the target's surface lies from where a rigid motion puts it, at most
   double seconds = 0.0, seconds_rendering = 0.0, seconds_similarity = 0.0;  // in all, and of that in the search
 
   // Makes the verdict `to`, if that is worse than what it was, and adds the reason.

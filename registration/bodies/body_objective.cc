@@ -1,6 +1,7 @@
 #include "registration/bodies/body_objective.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <map>
 
@@ -14,9 +15,18 @@ namespace {
 
 using Eigen::Index;
 
-constexpr double kTileMm = 25.0;     // residuals are alike over about this distance, at the isocenter
-constexpr double kOutlying = 1.5;    // a tile this many times as badly explained as the median begins to lose weight
-constexpr double kLeastRest = 1e-4;  // of 1 - rho: DRRs of a phantom can match without rest
+constexpr double kLeastCovered = 0.05;  // of a tile: fewer pixels fit anything
+constexpr double kLeastRest = 1e-4;     // of 1 - rho: DRRs of a phantom can match without rest
+constexpr std::size_t kTilesOfARun = 8;
+
+// One direction of the gradients.
+struct Direction {
+  std::vector<float> Gradients::* xray;
+  std::uint32_t Neighbors::* from;
+  std::uint32_t Neighbors::* to;
+};
+constexpr std::array kDirections = {Direction{&Gradients::along_row, &Neighbors::left, &Neighbors::right},
+                                    Direction{&Gradients::along_column, &Neighbors::above, &Neighbors::below}};
 
 // A spring's stretch in sigmas, and how motions of its two bodies (about the isocenter, in the room) change it.
 struct Stretch {
@@ -45,90 +55,106 @@ QuadraticModel no_model(std::size_t parameters) {
 
 }  // namespace
 
-BodyObjective::BodyObjective(const JointedBodies& bodies, const BodyRenderers& renderers, const Objective& pixels)
+BodyObjective::BodyObjective(const JointedBodies& bodies, const BodyRenderers& renderers, const Objective& pixels,
+                             double tile_mm)
     : bodies_(bodies), renderers_(renderers), pixels_(pixels) {
   for (std::size_t view = 0; view < pixels.views().size(); ++view) {
-    const Gradients& xray = pixels.comparison(view).xray_gradients();
-    lists_.push_back({view, xray.along_row, &Neighbors::left, &Neighbors::right});
-    lists_.push_back({view, xray.along_column, &Neighbors::above, &Neighbors::below});
     const XrayView& camera = pixels.views()[view];
-    const int tile_px = std::max(1, static_cast<int>(std::lround(kTileMm * pixels_per_mm(camera))));
-    std::map<int, std::size_t> numbers;
-    std::vector<std::size_t>& tiles = tile_of_.emplace_back();
-    for (const std::uint32_t pixel : pixels.compared_pixels(view)) {
-      const int column = static_cast<int>(pixel) % camera.columns, row = static_cast<int>(pixel) / camera.columns;
-      const int place = row / tile_px * camera.columns + column / tile_px;
-      tiles.push_back(numbers.try_emplace(place, numbers.size()).first->second);
+    const int edge = std::max(1, static_cast<int>(std::lround(tile_mm * pixels_per_mm(camera))));
+    std::map<int, std::vector<std::uint32_t>> tiles;  // by their places
+    const std::span<const std::uint32_t> compared = pixels.compared_pixels(view);
+    for (std::uint32_t n = 0; n < compared.size(); ++n) {
+      const int column = static_cast<int>(compared[n]) % camera.columns;
+      const int row = static_cast<int>(compared[n]) / camera.columns;
+      tiles[row / edge * camera.columns + column / edge].push_back(n);
     }
-    tile_weights_.emplace_back(numbers.size(), 1.0);
+    for (auto& [place, numbers] : tiles) {
+      const double covered = static_cast<double>(numbers.size()) / (edge * edge);
+      if (covered < kLeastCovered) continue;
+      if (runs_.empty() || runs_.back().front().view != view || runs_.back().size() == kTilesOfARun)
+        runs_.emplace_back();
+      runs_.back().push_back({.view = view, .compared = std::move(numbers), .residuals = covered});
+    }
   }
 }
 
 BodyObjective::Drr BodyObjective::drr_of(std::size_t view, const BodyPoses& poses) const {
   const std::span<const std::uint32_t> pixels = pixels_.rendered_pixels(view);
-  Drr drr{.line_integrals = std::vector<float>(pixels.size()), .jacobian = {}};
-  for (std::size_t body = 0; body < renderers_.count(); ++body)
-    renderers_.add(body, pixels_.views()[view], poses[body][view], pixels, drr.line_integrals);
-  return drr;
-}
-
-BodyObjective::Drr BodyObjective::drr_with_jacobian(std::size_t view, const PoseSlots& slots,
-                                                    std::span<const double> parameters) const {
-  constexpr int kParameters = PoseSlots::kParameters;
-  const BodyPoses poses = slots.poses(parameters);
-  const std::span<const std::uint32_t> pixels = pixels_.rendered_pixels(view);
-  const auto rows = static_cast<Index>(pixels.size());
   Drr drr{.line_integrals = std::vector<float>(pixels.size()),
-          .jacobian = PixelJacobian::Zero(rows, static_cast<Index>(parameters.size()))};
-  std::vector<MotionDerivatives> derivatives(pixels.size());
-  for (std::size_t body = 0; body < renderers_.count(); ++body) {
-    renderers_.add(body, pixels_.views()[view], poses[body][view], pixels, drr.line_integrals, derivatives);
-    const std::size_t slot = slots.of(body, view);
-    const Eigen::Map<const Eigen::Matrix<float, Eigen::Dynamic, 6, Eigen::RowMajor>> by_motion(
-        derivatives.front().data(), rows, 6);
-    drr.jacobian.middleCols<kParameters>(static_cast<Index>(kParameters * slot)) +=
-        by_motion * slots.motions(slot, parameters).cast<float>();
-  }
+          .derivatives = {renderers_.count(), std::vector<MotionDerivatives>(pixels.size())}};
+  for (std::size_t body = 0; body < renderers_.count(); ++body)
+    renderers_.add(body, pixels_.views()[view], poses[body][view], pixels, drr.line_integrals, drr.derivatives[body]);
   return drr;
 }
 
-double BodyObjective::tiles_counted(std::size_t view) const {
-  double sum = 0.0;
-  for (const double weight : tile_weights_[view]) sum += weight;
-  return sum;
-}
-
-QuadraticModel BodyObjective::list_model(const List& list, const Drr& drr) const {
-  const std::span<const Neighbors> neighbors = pixels_.comparison(list.view).neighbors();
-  const auto rows = static_cast<Index>(neighbors.size());
-  Eigen::VectorXf x(rows), y(rows);
-  Eigen::MatrixXf of_y(rows, drr.jacobian.cols());
-  for (Index n = 0; n < rows; ++n) {
-    const auto at = static_cast<std::size_t>(n);
-    const auto root = static_cast<float>(std::sqrt(tile_weights_[list.view][tile_of_[list.view][at]]));
-    const std::uint32_t from = neighbors[at].*list.from, to = neighbors[at].*list.to;
-    x[n] = root * list.xray[at];
-    y[n] = root * (drr.line_integrals[to] - drr.line_integrals[from]);
-    of_y.row(n) = root * (drr.jacobian.row(to) - drr.jacobian.row(from));
+// Adds what a tile says, by the motions of the slots.
+void BodyObjective::add_tile(const Tile& tile, const Drr& drr, const PoseSlots& slots,
+                             QuadraticModel& by_motions) const {
+  const Comparison& comparison = pixels_.comparison(tile.view);
+  const std::span<const Neighbors> neighbors = comparison.neighbors();
+  std::vector<std::size_t> present;  // bodies
+  for (std::size_t body = 0; body < drr.derivatives.size(); ++body)
+    if (std::ranges::any_of(tile.compared, [&](std::uint32_t n) {
+          const std::vector<MotionDerivatives>& of = drr.derivatives[body];
+          return !of[neighbors[n].left].isZero() || !of[neighbors[n].right].isZero() ||
+                 !of[neighbors[n].above].isZero() || !of[neighbors[n].below].isZero();
+        }))
+      present.push_back(body);
+  const auto rows = static_cast<Index>(tile.compared.size()), columns = static_cast<Index>(6 * present.size());
+  for (const Direction& direction : kDirections) {
+    Eigen::VectorXf x(rows), y(rows);
+    PixelJacobian of_y(rows, columns);
+    for (Index n = 0; n < rows; ++n) {
+      const std::uint32_t at = tile.compared[static_cast<std::size_t>(n)];
+      const std::uint32_t from = neighbors[at].*direction.from, to = neighbors[at].*direction.to;
+      x[n] = (comparison.xray_gradients().*direction.xray)[at];
+      y[n] = drr.line_integrals[to] - drr.line_integrals[from];
+      for (std::size_t b = 0; b < present.size(); ++b) {
+        const std::vector<MotionDerivatives>& of = drr.derivatives[present[b]];
+        of_y.row(n).segment<6>(static_cast<Index>(6 * b)) = (of[to] - of[from]).transpose();
+      }
+    }
+    const QuadraticModel correlation = correlation_model(std::move(x), std::move(y), std::move(of_y));
+    const double weight = 0.25 * tile.residuals;  // half of n/2
+    const double rest = std::max(kLeastRest, 1.0 - correlation.value);
+    by_motions.value -= weight * std::log(rest);
+    for (std::size_t a = 0; a < present.size(); ++a) {
+      const auto of_a = static_cast<Index>(6 * a), at_a = static_cast<Index>(6 * slots.of(present[a], tile.view));
+      by_motions.gradient.segment<6>(at_a) += weight / rest * correlation.gradient.segment<6>(of_a);
+      for (std::size_t b = 0; b < present.size(); ++b) {
+        const auto of_b = static_cast<Index>(6 * b), at_b = static_cast<Index>(6 * slots.of(present[b], tile.view));
+        by_motions.curvature.block<6, 6>(at_a, at_b) += weight / rest * correlation.curvature.block<6, 6>(of_a, of_b);
+      }
+    }
   }
-  const QuadraticModel correlation = correlation_model(std::move(x), std::move(y), std::move(of_y));
-  const double tiles = 0.25 * tiles_counted(list.view);  // half of n/2
-  const double rest = std::max(kLeastRest, 1.0 - correlation.value);
-  return {.value = -tiles * std::log(rest),
-          .gradient = tiles / rest * correlation.gradient,
-          .curvature = tiles / rest * correlation.curvature};
 }
 
-QuadraticModel BodyObjective::image_model(const PoseSlots& slots, std::span<const double> parameters) const {
-  std::vector<Drr> drrs;
-  for (std::size_t view = 0; view < pixels_.views().size(); ++view)
-    drrs.push_back(drr_with_jacobian(view, slots, parameters));
-  std::vector<QuadraticModel> parts(lists_.size());
-  parallel_for(std::size_t{0}, lists_.size(),
-               [&](std::size_t n) { parts[n] = list_model(lists_[n], drrs[lists_[n].view]); });
-  QuadraticModel sum = no_model(parameters.size());
-  for (const QuadraticModel& part : parts) sum = weighted_sum(1.0, sum, 1.0, part);
-  return sum;
+std::vector<QuadraticModel> BodyObjective::view_models(const PoseSlots& slots,
+                                                       std::span<const double> parameters) const {
+  const BodyPoses poses = slots.poses(parameters);
+  std::vector<Drr> drrs(pixels_.views().size());
+  parallel_for(std::size_t{0}, drrs.size(), [&](std::size_t view) { drrs[view] = drr_of(view, poses); });
+  // Sums of fixed runs of tiles of one view: rounding must not depend on how the work is spread.
+  std::vector<QuadraticModel> sums(runs_.size(), no_model(parameters.size()));
+  parallel_for(std::size_t{0}, runs_.size(), [&](std::size_t run) {
+    for (const Tile& tile : runs_[run]) add_tile(tile, drrs[tile.view], slots, sums[run]);
+  });
+  std::vector<QuadraticModel> views(drrs.size(), no_model(parameters.size()));
+  for (std::size_t run = 0; run < runs_.size(); ++run) {
+    QuadraticModel& view = views[runs_[run].front().view];
+    view = weighted_sum(1.0, view, 1.0, sums[run]);
+  }
+  // From motions to parameters, slot by slot.
+  for (std::size_t slot = 0; slot < slots.count(); ++slot) {
+    const auto at = static_cast<Index>(6 * slot);
+    const Eigen::Matrix<double, 6, 6> motions = slots.motions(slot, parameters);
+    for (QuadraticModel& view : views) {
+      view.gradient.segment<6>(at) = motions.transpose() * view.gradient.segment<6>(at);
+      view.curvature.middleRows<6>(at) = motions.transpose() * view.curvature.middleRows<6>(at);
+      view.curvature.middleCols<6>(at) = view.curvature.middleCols<6>(at) * motions;
+    }
+  }
+  return views;
 }
 
 QuadraticModel BodyObjective::spring_model(const PoseSlots& slots, std::span<const double> parameters) const {
@@ -154,47 +180,19 @@ QuadraticModel BodyObjective::spring_model(const PoseSlots& slots, std::span<con
   return sum;
 }
 
+QuadraticModel BodyObjective::Parts::of_all_views() const {
+  QuadraticModel sum = no_model(static_cast<std::size_t>(springs.gradient.size()));
+  for (const QuadraticModel& view : views) sum = weighted_sum(1.0, sum, 1.0, view);
+  return sum;
+}
+
 BodyObjective::Parts BodyObjective::parts(const PoseSlots& slots, std::span<const double> parameters) const {
-  return {.images = image_model(slots, parameters), .springs = spring_model(slots, parameters)};
+  return {.views = view_models(slots, parameters), .springs = spring_model(slots, parameters)};
 }
 
 QuadraticModel BodyObjective::model(const PoseSlots& slots, std::span<const double> parameters) const {
   const Parts both = parts(slots, parameters);
-  return weighted_sum(1.0, both.images, 1.0, both.springs);
-}
-
-void BodyObjective::reweight(const BodyPoses& poses) {
-  for (std::size_t view = 0; view < pixels_.views().size(); ++view) {
-    const Drr drr = drr_of(view, poses);
-    const std::span<const Neighbors> neighbors = pixels_.comparison(view).neighbors();
-    std::vector<double> unexplained(tile_weights_[view].size()), all(tile_weights_[view].size());
-    for (const List& list : lists_) {
-      if (list.view != view) continue;
-      std::vector<double> y;
-      double xy = 0.0, yy = 0.0;
-      for (std::size_t n = 0; n < neighbors.size(); ++n) {
-        y.push_back(drr.line_integrals[neighbors[n].*list.to] - drr.line_integrals[neighbors[n].*list.from]);
-        const double weight = tile_weights_[view][tile_of_[view][n]];
-        xy += weight * y[n] * list.xray[n];
-        yy += weight * y[n] * y[n];
-      }
-      const double scale = yy > 0.0 ? xy / yy : 0.0;
-      for (std::size_t n = 0; n < neighbors.size(); ++n) {
-        const double x = list.xray[n], found = scale * y[n];
-        unexplained[tile_of_[view][n]] += (x - found) * (x - found);
-        all[tile_of_[view][n]] += 0.5 * (x * x + found * found);
-      }
-    }
-    for (std::size_t tile = 0; tile < all.size(); ++tile)
-      unexplained[tile] = all[tile] > 0.0 ? unexplained[tile] / all[tile] : 0.0;
-    std::vector<double> sorted = unexplained;
-    const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
-    std::ranges::nth_element(sorted, middle);
-    for (std::size_t tile = 0; tile < all.size(); ++tile) {
-      const double times = *middle > 0.0 ? unexplained[tile] / (kOutlying * *middle) : 0.0;
-      tile_weights_[view][tile] = times > 1.0 ? 1.0 / (times * times) : 1.0;
-    }
-  }
+  return weighted_sum(1.0, both.of_all_views(), 1.0, both.springs);
 }
 
 }  // namespace isoshift

@@ -2,10 +2,11 @@
 // How well bodies at some poses match the X-rays, and how much that strains the springs between them: a logarithm of
 // probability, with its model.
 //
-// Gradient correlation rho of a list is least squares, 2 (1 - rho) = |x - y|^2 with both of unit norm. Residuals are
-// alike over about 25 mm, so that a view has as many independent ones as tiles of that size; with their variance not
-// known, the logarithm of the likelihood of n tiles is -n/2 ln(1 - rho). Half of n counts for the gradients along rows
-// and half for those along columns. Springs are Gaussian.
+// Gradient correlation rho of two lists is least squares, 2 (1 - rho) = |x - y|^2 with both of unit norm. A tile
+// counts as one independent residual. Its variance is the tile's own and
+// is not known: what the DRR cannot show (bowel, metal, a heart that beats) explains a tile badly whatever the pose is,
+// and must not pull. So the logarithm of the likelihood of n residuals is -n/2 ln(1 - rho), tile by tile; half of it
+// for the gradients along rows and half for those along columns. Springs are Gaussian.
 
 #include <Eigen/Core>
 #include <span>
@@ -19,48 +20,42 @@ namespace isoshift {
 
 class BodyObjective {
  public:
-  // Compares the pixels that `pixels` compares, by gradient correlation. Borrows all.
-  BodyObjective(const JointedBodies& bodies, const BodyRenderers& renderers, const Objective& pixels);
+  // Compares the pixels that `pixels` compares, by gradient correlation, in tiles with this edge at the isocenter.
+  // Borrows all.
+  BodyObjective(const JointedBodies& bodies, const BodyRenderers& renderers, const Objective& pixels, double tile_mm);
 
-  // The model at some parameters of the slots. All tiles weigh the same until reweight().
+  // The model at some parameters of the slots.
   QuadraticModel model(const PoseSlots& slots, std::span<const double> parameters) const;
 
   // The same, taken apart.
   struct Parts {
-    QuadraticModel images, springs;
+    std::vector<QuadraticModel> views;
+    QuadraticModel springs;
+    QuadraticModel of_all_views() const;
   };
   Parts parts(const PoseSlots& slots, std::span<const double> parameters) const;
 
-  // What does not fit must not pull: tiles whose unexplained share is k times as large as the median's, k > 1.5, weigh
-  // (1.5 / k)^2 from now on.
-  void reweight(const BodyPoses& poses);
-
  private:
-  struct Drr {
-    std::vector<float> line_integrals;
-    PixelJacobian jacobian;  // by the parameters of all slots; empty if not wanted
+  // A place of one view where X-ray and DRR are compared.
+  struct Tile {
+    std::size_t view = 0;
+    std::vector<std::uint32_t> compared;  // of the view's compared pixels
+    double residuals = 1.0;               // independent ones
   };
-  // One direction of one view: what is compared there.
-  struct List {
-    std::size_t view;
-    std::span<const float> xray;
-    std::uint32_t Neighbors::* from;
-    std::uint32_t Neighbors::* to;
+  struct Drr {
+    std::vector<float> line_integrals;                        // of the rendered pixels
+    std::vector<std::vector<MotionDerivatives>> derivatives;  // [body][rendered pixel], 0 where the body is not
   };
 
   Drr drr_of(std::size_t view, const BodyPoses& poses) const;
-  Drr drr_with_jacobian(std::size_t view, const PoseSlots& slots, std::span<const double> parameters) const;
-  QuadraticModel image_model(const PoseSlots& slots, std::span<const double> parameters) const;
+  std::vector<QuadraticModel> view_models(const PoseSlots& slots, std::span<const double> parameters) const;
   QuadraticModel spring_model(const PoseSlots& slots, std::span<const double> parameters) const;
-  QuadraticModel list_model(const List& list, const Drr& drr) const;
-  double tiles_counted(std::size_t view) const;
+  void add_tile(const Tile& tile, const Drr& drr, const PoseSlots& slots, QuadraticModel& by_motions) const;
 
   const JointedBodies& bodies_;
   const BodyRenderers& renderers_;
   const Objective& pixels_;
-  std::vector<List> lists_;
-  std::vector<std::vector<std::size_t>> tile_of_;  // [view][compared pixel]
-  std::vector<std::vector<double>> tile_weights_;  // [view][tile]
+  std::vector<std::vector<Tile>> runs_;  // of tiles that follow each other in one view
 };
 
 }  // namespace isoshift

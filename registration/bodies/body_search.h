@@ -4,7 +4,6 @@
 #include <span>
 #include <vector>
 
-#include "drr/attenuation.h"
 #include "registration/bodies/jointed_bodies.h"
 #include "registration/search.h"
 
@@ -13,38 +12,50 @@ namespace isoshift {
 // From coarse to fine; every stage begins where the last one ended.
 struct BodyStage {
   double pixel_mm = 2.0;        // the stage's pixels, at the isocenter
-  double pixel_fraction = 0.4;  // share of the field's pixels compared: those with the strongest gradients
+  double pixel_fraction = 0.8;  // share of the field's pixels compared: those with the strongest gradients
   int min_pixels = 4000;        // of every view, if the field has them
-  double initial_step_mm = 0.7;
-  int climbs = 2;            // each after the tiles have been weighed by what the last one left unexplained
-  int max_evaluations = 20;  // per climb
+  double tile_mm = 12.0;        // edge of the tiles, at the isocenter
+  // Of the springs of soft tissue: it is held at first, or it would settle where the patient as a whole was found, and
+  // keep the bones there.
+  double soft_sigmas = 1.0;
+  double initial_step_mm = 2.0;  // of the parameters of all bodies together: first trust-region radius
+  int max_evaluations = 20;
 };
 
 struct BodySearchOptions {
-  std::vector<BodyStage> stages = {
-      {.pixel_mm = 4.0, .pixel_fraction = 0.6, .min_pixels = 2000, .initial_step_mm = 1.5, .max_evaluations = 25},
-      {.pixel_mm = 2.0}};
-  double voxel_mm = 2.0;   // the CT is reduced to voxels up to this edge
-  double bound_mm = 40.0;  // of every parameter and stage
-};
-
-// What was found of one body. Motions are in the room, about the isocenter, in the units of MotionDerivatives.
-struct FoundBody {
-  Eigen::Isometry3d room_from_patient = Eigen::Isometry3d::Identity();  // in the first view, if it breathes
-  Eigen::Matrix<double, 6, 6> covariance = Eigen::Matrix<double, 6, 6>::Zero();
-  double image_share = 0.0;  // of what is known about its pose in the least certain direction; the rest are springs
+  std::vector<BodyStage> stages = {{.pixel_mm = 4.0,
+                                    .pixel_fraction = 0.6,
+                                    .min_pixels = 2000,
+                                    .tile_mm = 25.0,
+                                    .soft_sigmas = 0.1,
+                                    .initial_step_mm = 4.0},
+                                   {.pixel_mm = 2.0},
+                                   {.pixel_mm = 1.3, .tile_mm = 10.0, .initial_step_mm = 1.0}};
+  double voxel_mm = 1.4;    // the CT is reduced to voxels up to this edge
+  double bound_mm = 40.0;   // of every parameter and stage
+  double least_gain = 0.1;  // of the logarithm of probability: a stage ends when no step promises more
 };
 
 struct BodySearchResult {
-  std::vector<FoundBody> bodies;
   BodyPoses poses;
-  int evaluations = 0;
-  double seconds = 0.0;
+  // Of the motions of all bodies, in the first view for those that breathe: in the room, about the isocenter, in the
+  // units of MotionDerivatives, six after six. Its own share of what is known about a body's place in the direction
+  // that is known least; springs and neighbors are the rest.
+  Eigen::MatrixXd covariance;
+  std::vector<double> image_shares;
+  std::vector<StageReport> stages;
 };
 
-// `ct_hu` is the CT that the shares divide. Throws Error where a view has too few pixels to compare.
-BodySearchResult search_bodies(const JointedBodies& bodies, const Volume<float>& ct_hu, const AttenuationModel& model,
-                               const FixedViews& views, const Eigen::Isometry3d& whole_room_from_patient,
-                               const BodySearchOptions& options = {});
+// A patient whose bodies can be rendered: what searches share.
+struct BodyScene {
+  const JointedBodies& bodies;
+  const BodyRenderers& renderers;
+  Renderer& whole;  // of all bodies as one: chooses the pixels that are compared
+  const FixedViews& views;
+};
+
+// From a pose of the whole patient that is about right. Throws Error where a view has too few pixels to compare.
+BodySearchResult search_bodies(const BodyScene& scene, const Eigen::Isometry3d& whole_room_from_patient,
+                               const BodySearchOptions& options = {}, const SearchProgress& progress = {});
 
 }  // namespace isoshift

@@ -12,7 +12,9 @@ namespace isoshift {
 struct JointedBodies {
   struct Body {
     std::string name;
-    bool breathes = false;  // may lie elsewhere in every view: it has a pose per view
+    bool is_vertebra = false;  // those of a spine follow each other, from the feet to the head
+    bool breathes = false;     // may lie elsewhere in every view: it has a pose per view
+    bool is_soft = false;      // far from bone: a search holds it to its neighbors until the bones are about right
   };
   // Two bodies should neither move apart at a joint nor turn against each other: by one sigma more seldom than not.
   struct Spring {

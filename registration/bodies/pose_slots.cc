@@ -40,4 +40,15 @@ Eigen::Matrix<double, 6, 6> PoseSlots::motions(std::size_t slot, std::span<const
   return about_isocenter * motions_per_parameter(parameters.subspan(kParameters * slot, kParameters));
 }
 
+Eigen::MatrixXd PoseSlots::motions_of_bodies(std::span<const double> parameters) const {
+  const auto rows = static_cast<Eigen::Index>(kParameters * slot_of_.size());
+  Eigen::MatrixXd result = Eigen::MatrixXd::Zero(rows, static_cast<Eigen::Index>(parameters.size()));
+  for (std::size_t body = 0; body < slot_of_.size(); ++body) {
+    const std::size_t slot = of(body, 0);
+    result.block<6, 6>(static_cast<Eigen::Index>(kParameters * body), static_cast<Eigen::Index>(kParameters * slot)) =
+        motions(slot, parameters);
+  }
+  return result;
+}
+
 }  // namespace isoshift

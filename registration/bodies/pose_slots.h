@@ -27,6 +27,9 @@ class PoseSlots {
   // How a slot's parameters move its body: motions in the room about the isocenter, in the units of MotionDerivatives.
   Eigen::Matrix<double, 6, 6> motions(std::size_t slot, std::span<const double> parameters) const;
 
+  // The same of the bodies in the first view: six rows per body, a column per parameter.
+  Eigen::MatrixXd motions_of_bodies(std::span<const double> parameters) const;
+
  private:
   std::vector<std::vector<std::size_t>> slot_of_;  // [body][view]
   std::vector<Eigen::Isometry3d> base_;

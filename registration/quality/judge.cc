@@ -27,6 +27,9 @@ constexpr double kMaxSpreadMm = 1.0, kMaxSpreadRad = rad_from_deg(1.0);
 // distance 2 % off in one of them 0.68 mm and more (docs/evaluation.md).
 constexpr double kMaxContradictionMm = 0.5, kMaxContradictionSigmas = 3.0;
 constexpr double kMaxTwoSigmaMm = 1.0, kMaxTwoSigmaRad = rad_from_deg(1.0);
+constexpr double kMinImageShare = 0.2, kMaxDeformationMm = 2.0;
+// What carries a target is small, and turns less surely than a whole patient; what counts is where its surface lies.
+constexpr double kMaxTwoSigmaRadOfBodies = rad_from_deg(2.0);
 // An alternative must leave this much more unexplained (1 - gradient correlation) than the images as they are. On head
 // phantoms, which are nearly symmetric, a mirrored AP view leaves 1.2 to 4 times as much.
 constexpr double kAlternativeMargin = 1.1;
@@ -51,8 +54,10 @@ void judge_search(std::span<const double> parameters, const RegistrationOptions&
   }
   if (result.stages.empty() || result.stages.back().reached_limit)
     review(result, "the last stage of the search did not converge");
+  // Of the whole, if bodies answered: they went on from one of its poses.
   for (const StageReport& stage : result.stages)
-    if (stage.spread_mm && (*stage.spread_mm > kMaxSpreadMm || *stage.spread_rad > kMaxSpreadRad))
+    if (result.bodies.empty() && stage.spread_mm &&
+        (*stage.spread_mm > kMaxSpreadMm || *stage.spread_rad > kMaxSpreadRad))
       review(result, fmt::format("searches from different starts end {:.1f} mm and {:.1f} degrees apart in stage {}",
                                  *stage.spread_mm, deg_from_rad(*stage.spread_rad), stage.name));
 }
@@ -74,6 +79,8 @@ void judge_views(bool is_volume_chosen, RegistrationResult& result) {
     if (!view.has_all_excluded)
       review(result,
              fmt::format("what is excluded covers nearly all that {} shows, and was compared nevertheless", name));
+    if (!result.bodies.empty())
+      continue;  // the parts of the whole did not agree, or bodies would not have been searched
     const int with_signal = view.consistency.with_signal(), disagreeing = view.consistency.disagreeing();
     if (disagreeing > parts_that_may_disagree(with_signal, is_volume_chosen))
       review(result, fmt::format("{} of {} parts of {} match elsewhere: anatomy may have moved against the rest",
@@ -107,7 +114,23 @@ void judge_contradiction(RegistrationResult& result) {
                                std::sqrt(squares)));
 }
 
+// The answer is that of the bodies that carry the target: they must be seen, and the target must not be bent itself.
+void judge_bodies(RegistrationResult& result) {
+  double image_share = 0.0;
+  for (const BodyMotion& body : result.bodies) image_share += body.carries_target * body.image_share;
+  if (!(image_share >= kMinImageShare))
+    review(result, fmt::format("the images hardly show the bodies that carry the target: {:.0f} % of what is known of "
+                               "their place comes from them, the rest from their neighbors",
+                               100.0 * image_share));
+  if (!(result.target_deformation_mm <= kMaxDeformationMm))
+    review(result,
+           fmt::format("the target itself is bent: parts of its surface lie up to {:.1f} mm off when its center "
+                       "is right",
+                       result.target_deformation_mm));
+}
+
 void judge_uncertainty(RegistrationResult& result) {
+  const double most_rad = result.bodies.empty() ? kMaxTwoSigmaRad : kMaxTwoSigmaRadOfBodies;
   if (!result.uncertainty) {
     review(result, "the images do not determine the pose");
   } else {
@@ -115,7 +138,7 @@ void judge_uncertainty(RegistrationResult& result) {
       if (!(2.0 * result.uncertainty->translation_mm[axis] <= kMaxTwoSigmaMm))
         review(result, fmt::format("the {} is uncertain: {:.1f} mm at two sigma", kAxes[static_cast<std::size_t>(axis)],
                                    2.0 * result.uncertainty->translation_mm[axis]));
-      if (!(2.0 * result.uncertainty->rotation_rad[axis] <= kMaxTwoSigmaRad))
+      if (!(2.0 * result.uncertainty->rotation_rad[axis] <= most_rad))
         review(result, fmt::format("the {} is uncertain: {:.1f} degrees at two sigma",
                                    kAxes[static_cast<std::size_t>(axis) + 3],
                                    deg_from_rad(2.0 * result.uncertainty->rotation_rad[axis])));
@@ -164,6 +187,7 @@ void judge(std::span<const double> parameters, const RegistrationOptions& option
   judge_views(options.region != nullptr && options.region->has_volume(), result);
   judge_contradiction(result);
   judge_uncertainty(result);
+  if (!result.bodies.empty()) judge_bodies(result);
   judge_alternatives(result);
   if (!options.check_alternatives)
     review(result, "the preset leaves out the check for mirrored, turned and exchanged images");

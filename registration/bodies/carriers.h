@@ -1,0 +1,46 @@
+#pragma once
+// The bones that carry a target: X-rays hardly show soft tissue, so that the answer for a target is theirs.
+
+#include <span>
+#include <vector>
+
+#include "registration/bodies/body_search.h"
+#include "registration/bodies/patient_bodies.h"
+#include "setup/target.h"
+
+namespace isoshift {
+
+// Where bodies put a target: its rigid motion (setup error), the covariance of that motion (in the room, about the
+// isocenter, in the units of MotionDerivatives), and how far its surface lies from where that motion puts it.
+struct CarriedTarget {
+  Eigen::Isometry3d setup_error = Eigen::Isometry3d::Identity();
+  Eigen::Matrix<double, 6, 6> covariance = Eigen::Matrix<double, 6, 6>::Zero();
+  double deformation_mm = 0.0;  // at most
+};
+
+class Carriers {
+ public:
+  // Bones carry a target if they lie within 20 mm of its center or surface. The nearer they are, the larger their
+  // shares.
+  Carriers(const PatientBodies& patient, const Target& target, const Eigen::Isometry3d& planned_room_from_patient);
+
+  // Whether bones lie that near.
+  bool exist() const { return !at_center_.empty(); }
+
+  // The share of each body, soft tissue included (0); they add up to 1.
+  std::span<const double> shares() const { return at_center_; }
+
+  CarriedTarget target_at(const BodySearchResult& found) const;
+
+  // How the target moves with the motions of all bodies (BodySearchResult::covariance): 6 x 6n.
+  Eigen::MatrixXd motion_per_motions() const;
+
+ private:
+  Eigen::Isometry3d planned_;
+  Eigen::Vector3d center_room_mm_;
+  std::vector<Eigen::Vector3d> extent_room_mm_;
+  std::vector<double> at_center_;
+  std::vector<std::vector<double>> at_extent_;
+};
+
+}  // namespace isoshift

@@ -1,0 +1,211 @@
+#include "registration/bodies/register_bodies.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <set>
+
+#include "geometry/rotation.h"
+#include "geometry/voxel_box.h"
+#include "registration/bodies/body_objective.h"
+#include "registration/bodies/carriers.h"
+#include "registration/pose_parameters.h"
+#include "registration/quality/judge.h"
+
+namespace isoshift {
+namespace {
+
+using Eigen::Vector3d;
+
+// Of the target's motion, in nats per mm^2: 1 at 14 mm. It holds what a view alone does not see.
+constexpr double kSpring = 0.01;
+constexpr double kNearTargetMm = 30.0;
+
+std::set<Beam> beams_of(std::span<const FixedImage> images) {
+  std::set<Beam> beams;
+  for (const FixedImage& image : images) beams.insert(image.view.beam);
+  return beams;
+}
+
+// How the target's center and points 30 mm from it move in a view with a motion of the target (in the room, about the
+// isocenter): two rows per point, mm at the isocenter.
+Eigen::MatrixXd seen_motions(const XrayView& view, const CarriedTarget& target, const Vector3d& center_room_mm) {
+  constexpr double kStep = 1e-3;
+  std::vector<Vector3d> points = {target.setup_error * center_room_mm};
+  for (int axis = 0; axis < 3; ++axis)
+    for (const double side : {-kNearTargetMm, kNearTargetMm})
+      points.push_back(points.front() + side * Vector3d::Unit(axis));
+  Eigen::MatrixXd motions = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(2 * points.size()), 6);
+  for (std::size_t n = 0; n < points.size(); ++n)
+    for (int axis = 0; axis < 6; ++axis) {
+      const Vector3d way =
+          axis < 3 ? Vector3d(Vector3d::Unit(axis)) : Vector3d(Vector3d::Unit(axis - 3).cross(points[n]));
+      const auto here = view.project(points[n]), there = view.project(points[n] + kStep * way);
+      if (here && there)
+        motions.block<2, 1>(static_cast<Eigen::Index>(2 * n), axis) = (*there - *here) / (kStep * pixels_per_mm(view));
+    }
+  return motions;
+}
+
+// Line integrals of the rendered pixels of a view, with bodies at some poses.
+std::vector<float> drr_of(const BodyScene& scene, const Objective& pixels, const BodyPoses& poses, std::size_t view) {
+  std::vector<float> drr(pixels.rendered_pixels(view).size());
+  for (std::size_t body = 0; body < scene.renderers.count(); ++body)
+    scene.renderers.add(body, pixels.views()[view], poses[body][view], pixels.rendered_pixels(view), drr);
+  return drr;
+}
+
+// What the search found, as images and as certainty: of every view how well it matches, and what it alone would want.
+void report_match(const BodyScene& scene, const Carriers& carriers, const CarriedTarget& target,
+                  const Vector3d& center_room_mm, const BodySearchResult& found, RegistrationResult& result) {
+  constexpr double kPixelMm = 2.0;
+  const Eigen::Isometry3d& about = found.poses.front().front();
+  const std::vector<FixedImage> level = scene.views.reduced_to(kPixelMm, about, 0.0);
+  const Objective pixels(scene.whole, level, about, {.similarity = SimilarityKind::kGradientCorrelation});
+  const BodyObjective objective(scene.bodies, scene.renderers, pixels, BodyStage().tile_mm);
+  const PoseSlots slots(scene.bodies, scene.renderers, found.poses);
+  const std::vector<double> at_base(PoseSlots::kParameters * slots.count(), 0.0);
+  const BodyObjective::Parts parts = objective.parts(slots, at_base);
+  const Eigen::MatrixXd target_motion = carriers.motion_per_motions() * slots.motions_of_bodies(at_base);
+  for (std::size_t view = 0; view < level.size(); ++view) {
+    ViewMatch& match = result.views[view];
+    match.left_out.reset();
+    match.similarity_final = pixels.comparison(view).of(drr_of(scene, pixels, found.poses, view));
+    // The step from the common optimum to where this view and the springs are best.
+    const QuadraticModel& alone = parts.views[view];
+    const Eigen::MatrixXd held = alone.curvature + parts.springs.curvature +
+                                 kSpring * Eigen::MatrixXd::Identity(alone.curvature.rows(), alone.curvature.cols());
+    const auto solver = held.ldlt();
+    const Eigen::MatrixXd seen = seen_motions(level[view].view, target, center_room_mm) * target_motion;
+    const double points = 0.5 * static_cast<double>(seen.rows());
+    const Eigen::VectorXd wanted = solver.solve(alone.gradient + parts.springs.gradient);
+    match.contradiction = {.mm = (seen * wanted).norm() / std::sqrt(points),
+                           .sigma_mm = std::sqrt((seen * solver.solve(seen.transpose())).trace() / points)};
+  }
+}
+
+// How every bone moved against the target: where its center lies, and how it is turned, once the target is right.
+std::vector<BodyMotion> motions_of(const JointedBodies& bodies, const BodyRenderers& renderers,
+                                   const Carriers& carriers, const CarriedTarget& target,
+                                   const Eigen::Isometry3d& planned, const BodySearchResult& found) {
+  const Eigen::MatrixXd target_motion = carriers.motion_per_motions();
+  std::vector<BodyMotion> motions;
+  for (std::size_t n = 0; n < bodies.bodies.size(); ++n) {
+    if (bodies.bodies[n].is_soft) continue;
+    const Vector3d center = planned * renderers.center_patient_mm(n);
+    const Eigen::Isometry3d against = target.setup_error.inverse() * found.poses[n].front() * planned.inverse();
+    const Eigen::AngleAxisd turn(against.linear());
+    Eigen::MatrixXd difference = -target_motion;
+    difference.middleCols<6>(static_cast<Eigen::Index>(6 * n)) += Eigen::Matrix<double, 6, 6>::Identity();
+    Eigen::Matrix<double, 3, 6> at_center;
+    at_center << Eigen::Matrix3d::Identity(), -cross_matrix(found.poses[n].front() * renderers.center_patient_mm(n));
+    const Eigen::MatrixXd per_motions = at_center * difference;
+    const Vector3d variance = (per_motions * found.covariance * per_motions.transpose()).diagonal();
+    motions.push_back({.name = bodies.bodies[n].name,
+                       .center_room_mm = center,
+                       .displacement_mm = against * center - center,
+                       .rotation_rad = turn.angle() * turn.axis(),
+                       .sigma_mm = variance.cwiseSqrt(),
+                       .carries_target = carriers.shares()[n],
+                       .image_share = found.image_shares[n],
+                       .breathes = bodies.bodies[n].breathes});
+  }
+  return motions;
+}
+
+Uncertainty uncertainty_of(const Eigen::Matrix<double, 6, 6>& covariance) {
+  const Eigen::Matrix<double, 6, 1> sigma = covariance.diagonal().cwiseSqrt();
+  return {.translation_mm = sigma.head<3>(), .rotation_rad = sigma.tail<3>()};
+}
+
+std::vector<double> parameters_of(const Eigen::Isometry3d& setup_error) {
+  const Eigen::AngleAxisd turn(setup_error.linear());
+  const Vector3d t = setup_error.translation(), r = kLeverMm * turn.angle() * turn.axis();
+  return {t.x(), t.y(), t.z(), r.x(), r.y(), r.z()};
+}
+
+// Gradient correlation, mean over the views, with bodies at some poses.
+double match_of(const BodyScene& scene, const BodyPoses& poses, double pixel_mm) {
+  const Eigen::Isometry3d& about = poses.front().front();
+  const std::vector<FixedImage> level = scene.views.reduced_to(pixel_mm, about, 5.0);
+  const Objective pixels(scene.whole, level, about, {.similarity = SimilarityKind::kGradientCorrelation});
+  double sum = 0.0;
+  for (std::size_t view = 0; view < level.size(); ++view)
+    sum += pixels.comparison(view).of(drr_of(scene, pixels, poses, view)) / static_cast<double>(level.size());
+  return sum;
+}
+
+// How well the images match with the spine one vertebra higher or lower: the same search, as free, from there. Its
+// first stage only, which ends in the same trough.
+std::vector<Alternative> compare_levels(const BodyScene& scene, const Carriers& carriers,
+                                        const Eigen::Isometry3d& whole_room_from_patient, BodySearchOptions search) {
+  const auto at_target =
+      static_cast<std::size_t>(std::ranges::max_element(carriers.shares()) - carriers.shares().begin());
+  std::vector<Alternative> alternatives;
+  if (!scene.bodies.bodies[at_target].is_vertebra) return alternatives;
+  search.stages.resize(1);
+  const double pixel_mm = search.stages.front().pixel_mm;
+  const BodySearchResult as_is = search_bodies(scene, whole_room_from_patient, search);
+  const std::vector<double> here = parameters_of(carriers.target_at(as_is).setup_error);
+  for (const int step : {-1, 1}) {
+    const std::size_t other = at_target + static_cast<std::size_t>(step);
+    if (other >= scene.bodies.bodies.size() || !scene.bodies.bodies[other].is_vertebra) continue;
+    const Vector3d way = scene.renderers.center_patient_mm(other) - scene.renderers.center_patient_mm(at_target);
+    const BodySearchResult there = search_bodies(scene, whole_room_from_patient * Eigen::Translation3d(way), search);
+    const PoseDistance distance = distance_between(here, parameters_of(carriers.target_at(there).setup_error));
+    alternatives.push_back(
+        {.description = fmt::format("the spine one vertebra farther toward the {}", step > 0 ? "head" : "feet"),
+         .similarity = match_of(scene, there.poses, pixel_mm),
+         .as_is = match_of(scene, as_is.poses, pixel_mm),
+         .distance_mm = distance.translation_mm,
+         .angle_rad = distance.angle_rad});
+  }
+  return alternatives;
+}
+
+}  // namespace
+
+bool may_have_bent(const RegistrationOptions& options, const RegistrationResult& whole) {
+  const bool is_whole = options.region == nullptr || !options.region->has_volume();
+  return is_whole && options.dof == Dof::kRigid && options.check_alternatives && whole.unobservable_room.empty() &&
+         whole.verdict != Verdict::kAccepted;
+}
+
+void register_bodies(const BentPatient& patient, std::span<const FixedImage> images,
+                     const Eigen::Isometry3d& start_room_from_patient, const RegistrationOptions& options,
+                     RegistrationResult& result, const SearchProgress& progress) {
+  const auto begin = std::chrono::steady_clock::now();
+  const Carriers carriers(patient.parts, patient.target, start_room_from_patient);
+  if (!carriers.exist()) {
+    result.demote(Verdict::kReview, "no bone carries the target: soft tissue is not seen in X-rays");
+    return;
+  }
+  const ProjectedRegion everything;
+  FixedViews fixed{.images = {images.begin(), images.end()},
+                   .region = options.region != nullptr ? *options.region : everything};
+  for (FixedImage& image : fixed.images) restrict_to(options.rectangles, image);
+  const BodySearchOptions search;
+  const std::set<Beam> beam_set = beams_of(images);
+  const std::vector<Beam> beams(beam_set.begin(), beam_set.end());
+  const CoarserCt ct = coarser_ct(patient.ct_hu, patient.attenuation,
+                                  block_of(patient.ct_hu.spacing_mm(), patient.ct_hu.size, search.voxel_mm));
+  const BodyRenderers renderers(RendererKind::kCpu, ct.hu, ct.model, beams, patient.parts.bodies.shares);
+  const auto whole = make_renderer(RendererKind::kCpu, ct.hu, ct.model, beams);
+  const BodyScene scene{.bodies = patient.parts.bodies, .renderers = renderers, .whole = *whole, .views = fixed};
+
+  const Eigen::Isometry3d whole_pose = result.actual_room_from_patient;
+  const BodySearchResult found = search_bodies(scene, whole_pose, search, progress);
+  const CarriedTarget target = carriers.target_at(found);
+  result.actual_room_from_patient = target.setup_error * start_room_from_patient;
+  result.uncertainty = uncertainty_of(target.covariance);
+  result.target_deformation_mm = target.deformation_mm;
+  std::ranges::copy(found.stages, std::back_inserter(result.stages));
+  report_match(scene, carriers, target, patient.target.center_room_mm, found, result);
+  result.bodies = motions_of(patient.parts.bodies, renderers, carriers, target, start_room_from_patient, found);
+  std::ranges::copy(compare_levels(scene, carriers, whole_pose, search), std::back_inserter(result.alternatives));
+  judge(parameters_of(target.setup_error), options, result);
+  result.seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+}
+
+}  // namespace isoshift

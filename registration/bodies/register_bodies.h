@@ -1,0 +1,30 @@
+#pragma once
+// The answer for the target of a patient who has bent: where the bodies lie that carry it, and what the others did.
+
+#include "registration/bodies/patient_bodies.h"
+#include "registration/register_views.h"
+#include "setup/target.h"
+
+namespace isoshift {
+
+// What the CT shows, and what of it is the target.
+struct BentPatient {
+  const Volume<float>& ct_hu;
+  AttenuationModel attenuation;
+  PatientBodies parts;
+  Target target;
+};
+
+// Whether bodies may answer: whatever was found of the patient as a whole is not acceptable, nothing but the whole
+// image was chosen, and all six degrees of freedom were searched from close enough.
+bool may_have_bent(const RegistrationOptions& options, const RegistrationResult& whole);
+
+// Searches all bodies from the pose of the whole, and judges again. In the result, pose, uncertainty, similarities and
+// contradictions are those of the bodies that carry the target; `alternatives` gains what the images say of a spine one
+// vertebra higher or lower; `bodies` holds what the others did. Bones carry the target by their shares of it; if soft
+// tissue has most of it, or the CT shows no body, the result stays as it is but for a reason.
+void register_bodies(const BentPatient& patient, std::span<const FixedImage> images,
+                     const Eigen::Isometry3d& start_room_from_patient, const RegistrationOptions& options,
+                     RegistrationResult& result, const SearchProgress& progress = {});
+
+}  // namespace isoshift
