@@ -25,6 +25,7 @@ constexpr double kMaxSigmaMm = 0.5;
 constexpr double kRodBrightness = -0.5;  // beyond a rod; beyond a field's side the image has less than half
 constexpr double kJawToleranceMm = 3.0;  // a side and a declared jaw
 constexpr double kInnerMarginMm = 4.0;   // of a side's penumbra, when edges further in are looked for
+constexpr double kCornerMm = 4.0;         // of a side, that the penumbra of the next one shades
 constexpr double kTurnSigma = 0.003;     // of the collimator angle, 0.2 degrees
 constexpr double kMaxTurn = 0.0175;      // 1 degree
 constexpr std::array kNames = {"left", "right", "upper", "lower"};
@@ -33,12 +34,11 @@ struct Side {
   FieldSide edge;
   SideLine line;
   double brightness_beyond = -10.0;
-  double seen = 0.0;  // share of its blocks
   // Without the scale of the intensity, half of it is not where half the beam arrives.
   double least_seen = 0.5, max_scatter_mm = kMaxScatterMm;
 
   bool is_open() const { return edge.is_open; }
-  bool is_straight() const { return seen > least_seen && line.scatter_mm <= max_scatter_mm; }
+  bool is_straight() const { return line.seen > least_seen && line.scatter_mm <= max_scatter_mm; }
   bool is_clear() const { return edge.evidence >= kClear && is_straight(); }
 };
 
@@ -52,36 +52,11 @@ struct Upright {
   const UprightXray& of(std::size_t side) const { return side < 2 ? xray : transposed; }
 };
 
-// All sides seen with the penumbra that fits them best.
-std::array<SideSightings, 4> sightings_of(const Upright& upright, const FieldRectangle& rectangle) {
-  const int corner = static_cast<int>(std::lround(4.0 / upright.xray.mm));
-  std::array<SideSightings, 4> best;
-  double least = 1e30;
-  for (const double penumbra_mm : kPenumbraSigmasMm) {
-    std::array<SideSightings, 4> all;
-    double misfit = 0.0;
-    for (std::size_t n = 0; n < 4; ++n) {
-      if (rectangle.sides[n].is_open) continue;
-      const std::size_t across = n < 2 ? 2 : 0;
-      const FieldSide &before = rectangle.sides[across], &after = rectangle.sides[across + 1];
-      all[n] = sightings_of_side(upright.of(n), rectangle.sides[n].at, n % 2 == 0 ? 1 : -1,
-                                 before.at + (before.is_open ? 0 : corner), after.at - (after.is_open ? 0 : corner),
-                                 penumbra_mm);
-      misfit += all[n].misfit;
-    }
-    if (misfit >= least) continue;
-    least = misfit;
-    best = std::move(all);
-  }
-  return best;
-}
-
-// The four sides measured: each by itself, then all with the turn that they share.
+// The four sides measured, all with the turn and the penumbra that they share.
 Sides measured(const Upright& upright, const FieldRectangle& rectangle) {
   Sides sides;
-  const double mm = upright.xray.mm;
-  const std::array<SideSightings, 4> sightings = sightings_of(upright, rectangle);
-  double turn = 0.0, weights = 1.0 / (kTurnSigma * kTurnSigma);
+  const int corner = static_cast<int>(std::lround(kCornerMm / upright.xray.mm));
+  std::vector<SideToMeasure> to_measure;
   for (std::size_t n = 0; n < 4; ++n) {
     Side& side = sides[n];
     side.edge = rectangle.sides[n];
@@ -89,22 +64,20 @@ Sides measured(const Upright& upright, const FieldRectangle& rectangle) {
     if (!upright.xray.has_scale) side.least_seen = 0.3, side.max_scatter_mm = 2.0 * kMaxScatterMm;
     if (side.is_open()) continue;
     const std::size_t across = n < 2 ? 2 : 0;
-    const int first = rectangle.sides[across].at, end = rectangle.sides[across + 1].at;
-    side.brightness_beyond = brightness_beyond(upright.of(n), side.edge.at, n % 2 == 0 ? 1 : -1, first, end);
-    side.line.middle = 0.5 * (first + end);
-    side.seen = static_cast<double>(sightings[n].seen.size()) / std::max(1, sightings[n].blocks);
-    if (sightings[n].seen.empty()) {
-      side.line.sigma_mm = side.line.scatter_mm = 1e3;
-      continue;
-    }
-    const SideLine alone = line_through(sightings[n].seen, mm, 0.0, 2.0 * kTurnSigma);
-    const double weight = 1.0 / (alone.slope_sigma * alone.slope_sigma);
-    weights += weight;
-    turn += weight * (n < 2 ? -alone.slope : alone.slope);
+    const FieldSide &before = rectangle.sides[across], &after = rectangle.sides[across + 1];
+    const int sign = n % 2 == 0 ? 1 : -1;
+    side.brightness_beyond = brightness_beyond(upright.of(n), side.edge.at, sign, before.at, after.at);
+    to_measure.push_back({.xray = &upright.of(n),
+                          .near = side.edge.at,
+                          .sign = sign,
+                          .first = before.at + (before.is_open ? 0 : corner),
+                          .end = after.at - (after.is_open ? 0 : corner),
+                          .slope_sign = n < 2 ? -1 : 1});
   }
-  turn /= weights;
-  for (std::size_t n = 0; n < 4; ++n)
-    if (!sightings[n].seen.empty()) sides[n].line = line_through(sightings[n].seen, mm, n < 2 ? -turn : turn, 1e-5);
+  const std::vector<SideLine> lines = measured_lines(to_measure, kTurnSigma);
+  auto line = lines.begin();
+  for (Side& side : sides)
+    if (!side.is_open()) side.line = *line++;
   return sides;
 }
 
@@ -151,6 +124,8 @@ std::string doubt_about(const Sides& sides) {
     if (side.edge.at_ends < kEndEvidence) return fmt::format("its {} edge ends before the corner", kNames[n]);
     if (side.line.sigma_mm > kMaxSigmaMm)
       return fmt::format("its {} edge is uncertain by {:.1f} mm", kNames[n], side.line.sigma_mm);
+    if (side.line.other_mm > 0.0)
+      return fmt::format("its {} edge may lie {:.1f} mm beside", kNames[n], side.line.other_mm);
     if (std::abs(side.line.slope) > kMaxTurn)
       return fmt::format("its edges are turned by {:.1f} degrees against the collimator angle",
                          deg_from_rad(std::abs(side.line.slope)));
