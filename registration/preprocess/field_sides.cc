@@ -14,8 +14,9 @@ constexpr double kOutwardMm = 8.0;    // the window across it, from where the lo
 constexpr double kInwardMm = 12.0;    // where half the beam arrives lies further in
 constexpr double kWeightMm = 5.0;     // sigma of the weights in the window: what is near the edge tells its place
 constexpr double kFloor = 0.03;       // of the brightest intensity of a block: what is darker counts less
-constexpr double kFirstMm = -2.0;     // places from so far outside of where the logarithm falls most
-constexpr double kLastMm = 5.5;       // to so far inside
+constexpr double kFirstMm = -1.5;     // places from so far outside of where the logarithm falls most
+constexpr double kLastMm = 1.0;       // to so far inside,
+constexpr double kLastSigmas = 1.8;   // and so many sigmas of the penumbra
 constexpr double kStepMm = 0.3;       // of the places
 constexpr double kFineStepMm = 0.06;  // of those near the line
 constexpr double kBestSigmaMm = 0.05;  // what no side is measured better than
@@ -23,10 +24,9 @@ constexpr double kTurnStep = 0.0015;   // radians, 0.09 degrees
 constexpr int kTurns = 8;              // steps to either side
 constexpr double kMisfitFloor = 1e-4;  // mean square of the relative misfit: no block fits better than 1 %
 constexpr double kMostMisfit = 3.0;    // logarithm: a block that the line misfits by more speaks no louder
-constexpr double kOtherMisfit = 0.15;  // mean logarithm by which another place fits worse than the best, at most
-constexpr double kOtherMm = 1.0;       // what lies nearer is no other place
-// The sigmas of the penumbra to choose from.
-constexpr std::array kPenumbraSigmasMm = {0.3, 0.5, 0.7, 0.9, 1.15, 1.45, 1.8, 2.2};
+constexpr double kNearlyMisfit = 0.5;  // mean logarithm: what fits worse by less fits nearly as well
+// Sigmas of the penumbra.
+constexpr double kFirstPenumbraMm = 0.9, kLeastPenumbraMm = 0.25, kMostPenumbraMm = 2.5;
 
 double middle_value(std::vector<double> values) {
   if (values.empty()) return 0.0;
@@ -159,16 +159,13 @@ class SideMisfits {
     return best;
   }
 
-  // The misfit of the best line farther than kOtherMm from `place_mm`.
-  Best other_line(double place_mm, double slope) const {
-    Best best;
-    for (int n = 1; n + 1 < misfits_.rows(); ++n) {
-      const double misfit = of_line(place(n), slope);
-      if (std::abs(place(n) - place_mm) > kOtherMm && misfit < best.misfit &&
-          misfit <= std::min(of_line(place(n - 1), slope), of_line(place(n + 1), slope)))
-        best = {place(n), misfit};
-    }
-    return best;
+  // How far from `best` a line with this slope fits nearly as well.
+  double reach_mm(const Best& best, double slope) const {
+    double reach = 0.0;
+    for (int n = 0; n < misfits_.rows(); ++n)
+      if (of_line(place(n), slope) < best.misfit + kNearlyMisfit * blocks())
+        reach = std::max(reach, std::abs(place(n) - best.place_mm));
+    return reach;
   }
 
   // How far the blocks by themselves lie from a line: of those with an edge within the places.
@@ -221,17 +218,30 @@ Turned best_turn(std::span<const SideMisfits> sides, double turn_sigma) {
 }  // namespace
 
 std::vector<SideLine> measured_lines(const std::vector<SideToMeasure>& sides, double turn_sigma) {
-  const int places = 1 + static_cast<int>(std::lround((kLastMm - kFirstMm) / kStepMm));
+  const auto places_of = [](double sigma_mm) {
+    return 1 + static_cast<int>(std::lround((kLastMm + kLastSigmas * sigma_mm - kFirstMm) / kStepMm));
+  };
   std::vector<SideMisfits> misfits(sides.begin(), sides.end());
-  double penumbra_mm = 0.0;
-  Turned best;
-  for (const double sigma_mm : kPenumbraSigmasMm) {
-    for (SideMisfits& side : misfits) side.look(kFirstMm, kStepMm, places, sigma_mm);
-    const Turned turned = best_turn(misfits, turn_sigma);
-    if (turned.misfit >= best.misfit) continue;
-    best = turned;
-    penumbra_mm = sigma_mm;
-  }
+  const auto fit_with = [&](double sigma_mm) {
+    for (SideMisfits& side : misfits) side.look(kFirstMm, kStepMm, places_of(sigma_mm), sigma_mm);
+    return best_turn(misfits, turn_sigma);
+  };
+  double penumbra_mm = kFirstPenumbraMm;
+  Turned best = fit_with(penumbra_mm);
+  // One penumbra fits best, and the nearer the better.
+  for (const double ratio : {1.5, 1.22, 1.1, 1.05})
+    for (const bool is_up : {true, false}) {
+      bool is_better = true;
+      while (is_better) {
+        const double other_mm = std::clamp(is_up ? penumbra_mm * ratio : penumbra_mm / ratio, kLeastPenumbraMm, kMostPenumbraMm);
+        const Turned other = fit_with(other_mm);
+        is_better = other.misfit < best.misfit;
+        if (is_better) {
+          best = other;
+          penumbra_mm = other_mm;
+        }
+      }
+    }
   std::vector<SideLine> lines;
   for (SideMisfits& side : misfits) {
     SideLine line;
@@ -240,15 +250,13 @@ std::vector<SideLine> measured_lines(const std::vector<SideToMeasure>& sides, do
       lines.push_back(line);
       continue;
     }
-    side.look(kFirstMm, kStepMm, places, penumbra_mm);
+    side.look(kFirstMm, kStepMm, places_of(penumbra_mm), penumbra_mm);
     const double slope = side.slope_sign() * best.turn;
     const auto coarse = side.best_line(slope);
     const std::vector<double> off = side.off_line(coarse.place_mm, slope);
     line.seen = static_cast<double>(off.size()) / side.blocks();
     line.scatter_mm = off.empty() ? 1e3 : 1.48 * middle_value(off);
-    const auto other = side.other_line(coarse.place_mm, slope);
-    if ((other.misfit - coarse.misfit) / side.blocks() < kOtherMisfit)
-      line.other_mm = std::abs(other.place_mm - coarse.place_mm);
+    line.wide_mm = side.reach_mm(coarse, slope);
     const double reach_mm = kStepMm * 1.2;
     side.look(coarse.place_mm - reach_mm - 1.0, kFineStepMm, 1 + static_cast<int>(2.0 * (reach_mm + 1.0) / kFineStepMm),
               penumbra_mm);

@@ -22,6 +22,8 @@ constexpr double kDeclaredEvidence = 0.3;  // of a side where a file says that t
 constexpr double kEndEvidence = 0.2;       // of the last 12 mm of a side, if it does not end there
 constexpr double kMaxScatterMm = 1.0;      // of a straight edge; the true ones had 0.6, over bone 1.0
 constexpr double kMaxSigmaMm = 0.5;
+constexpr double kMaxWideMm = 1.05;        // of the places that explain a side nearly as well
+constexpr double kCollimatorScatterMm = 0.45;  // of a collimator's edge; the outlines of air and patient have more
 constexpr double kRodBrightness = -0.5;  // beyond a rod; beyond a field's side the image has less than half
 constexpr double kJawToleranceMm = 3.0;  // a side and a declared jaw
 constexpr double kInnerMarginMm = 4.0;   // of a side's penumbra, when edges further in are looked for
@@ -124,8 +126,8 @@ std::string doubt_about(const Sides& sides) {
     if (side.edge.at_ends < kEndEvidence) return fmt::format("its {} edge ends before the corner", kNames[n]);
     if (side.line.sigma_mm > kMaxSigmaMm)
       return fmt::format("its {} edge is uncertain by {:.1f} mm", kNames[n], side.line.sigma_mm);
-    if (side.line.other_mm > 0.0)
-      return fmt::format("its {} edge may lie {:.1f} mm beside", kNames[n], side.line.other_mm);
+    if (side.line.wide_mm > kMaxWideMm)
+      return fmt::format("its {} edge may lie {:.1f} mm farther in or out", kNames[n], side.line.wide_mm);
     if (std::abs(side.line.slope) > kMaxTurn)
       return fmt::format("its edges are turned by {:.1f} degrees against the collimator angle",
                          deg_from_rad(std::abs(side.line.slope)));
@@ -152,6 +154,13 @@ bool is_beside(const Sides& sides, const Eigen::Vector2d& isocenter_upright_px, 
          std::max(beyond_mm(0, isocenter_upright_px.x()), beyond_mm(2, isocenter_upright_px.y())) > kToleranceMm;
 }
 
+// Whether an edge is as clear, as straight and as dark beyond as only a collimator's is.
+bool is_collimator(const Side& side) {
+  constexpr double kBeyond = -1.5, kEnds = 0.9, kSeen = 0.9;
+  return !side.is_open() && side.edge.evidence >= kClear && side.edge.at_ends >= kEnds && side.line.seen >= kSeen &&
+         side.line.scatter_mm <= kCollimatorScatterMm && side.brightness_beyond < kBeyond;
+}
+
 // The field as the image alone shows it.
 struct Finding {
   Sides sides;
@@ -164,6 +173,13 @@ Finding find_in(const Upright& upright, const FieldEdges& edges, const Eigen::Ve
   const bool is_anatomy = may_be_rod(sides) || is_beside(sides, isocenter_upright_px, upright.xray.mm);
   if (sides_clear(sides) > 0 && !is_anatomy) {
     finding.doubt = doubt_about(sides);
+    return finding;
+  }
+  if (is_anatomy && std::ranges::any_of(sides, is_collimator)) {
+    finding.doubt = "a collimator's edge leaves the isocenter out";
+    if (std::ranges::all_of(sides, [](const Side& side) { return side.is_open() || is_collimator(side); }))
+      return finding;
+    finding.sides = measured(upright, edges.whole());
     return finding;
   }
   // No field. Edges that are not clear enough, straight and dark beyond all the same, are a reason to ask.
