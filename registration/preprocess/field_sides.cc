@@ -9,16 +9,16 @@
 namespace isoshift {
 namespace {
 
-constexpr double kBlockMm = 5.0;      // along the side
-constexpr double kOutwardMm = 8.0;    // the window across it, from where the logarithm of the intensity falls most
-constexpr double kInwardMm = 12.0;    // where half the beam arrives lies further in
-constexpr double kWeightMm = 5.0;     // sigma of the weights in the window: what is near the edge tells its place
-constexpr double kFloor = 0.03;       // of the brightest intensity of a block: what is darker counts less
-constexpr double kFirstMm = -1.5;     // places from so far outside of where the logarithm falls most
-constexpr double kLastMm = 1.0;       // to so far inside,
-constexpr double kLastSigmas = 1.8;   // and so many sigmas of the penumbra
-constexpr double kStepMm = 0.3;       // of the places
-constexpr double kFineStepMm = 0.06;  // of those near the line
+constexpr double kBlockMm = 5.0;       // along the side
+constexpr double kOutwardMm = 8.0;     // the window across it, from where the logarithm of the intensity falls most
+constexpr double kInwardMm = 12.0;     // where half the beam arrives lies further in
+constexpr double kWeightMm = 5.0;      // sigma of the weights in the window: what is near the edge tells its place
+constexpr double kFloor = 0.03;        // of the brightest intensity of a block: what is darker counts less
+constexpr double kFirstMm = -1.2;      // places from so far outside of where the logarithm falls most
+constexpr double kLastMm = 1.0;        // to so far inside,
+constexpr double kLastSigmas = 1.7;    // and so many sigmas of the penumbra
+constexpr double kStepMm = 0.3;        // of the places
+constexpr double kFineStepMm = 0.06;   // of those near the line
 constexpr double kBestSigmaMm = 0.05;  // what no side is measured better than
 constexpr double kTurnStep = 0.0015;   // radians, 0.09 degrees
 constexpr int kTurns = 8;              // steps to either side
@@ -35,7 +35,6 @@ double middle_value(std::vector<double> values) {
   return *middle;
 }
 
-
 // The mean profile of a block of rows, outside first.
 struct Block {
   double row = 0.0;  // its middle
@@ -47,9 +46,8 @@ std::vector<Block> blocks_of(const SideToMeasure& side, int outward, int count) 
   const int rows = std::max(1, static_cast<int>(std::lround(kBlockMm / xray.mm)));
   std::vector<Block> blocks;
   for (int row = side.first; row + rows <= side.end; row += rows) {
-    Block block{.row = row + 0.5 * rows,
-                .intensity = Eigen::VectorXd::Zero(count),
-                .weight = Eigen::VectorXd::Zero(count)};
+    Block block{
+        .row = row + 0.5 * rows, .intensity = Eigen::VectorXd::Zero(count), .weight = Eigen::VectorXd::Zero(count)};
     for (int n = 0; n < count; ++n) {
       const int column = side.sign > 0 ? side.near - outward + n : side.near - 1 + outward - n;
       if (column < 0 || column >= xray.intensity.cols) continue;
@@ -162,9 +160,10 @@ class SideMisfits {
   // How far from `best` a line with this slope fits nearly as well.
   double reach_mm(const Best& best, double slope) const {
     double reach = 0.0;
-    for (int n = 0; n < misfits_.rows(); ++n)
-      if (of_line(place(n), slope) < best.misfit + kNearlyMisfit * blocks())
-        reach = std::max(reach, std::abs(place(n) - best.place_mm));
+    const double last = place(static_cast<int>(misfits_.rows()) - 1);
+    for (double at = first_mm_; at <= last; at += kFineStepMm)
+      if (of_line(at, slope) < best.misfit + kNearlyMisfit * blocks())
+        reach = std::max(reach, std::abs(at - best.place_mm));
     return reach;
   }
 
@@ -175,8 +174,7 @@ class SideMisfits {
       Eigen::Index least = 0;
       misfits_.col(b).minCoeff(&least);
       if (least == 0 || least + 1 == misfits_.rows()) continue;
-      const double line_mm =
-          place_mm + side_.sign * slope * (blocks_[static_cast<std::size_t>(b)].row - middle_) * mm_;
+      const double line_mm = place_mm + side_.sign * slope * (blocks_[static_cast<std::size_t>(b)].row - middle_) * mm_;
       off.push_back(std::abs(place(static_cast<int>(least)) - line_mm));
     }
     return off;
@@ -233,7 +231,8 @@ std::vector<SideLine> measured_lines(const std::vector<SideToMeasure>& sides, do
     for (const bool is_up : {true, false}) {
       bool is_better = true;
       while (is_better) {
-        const double other_mm = std::clamp(is_up ? penumbra_mm * ratio : penumbra_mm / ratio, kLeastPenumbraMm, kMostPenumbraMm);
+        const double other_mm =
+            std::clamp(is_up ? penumbra_mm * ratio : penumbra_mm / ratio, kLeastPenumbraMm, kMostPenumbraMm);
         const Turned other = fit_with(other_mm);
         is_better = other.misfit < best.misfit;
         if (is_better) {
@@ -256,6 +255,7 @@ std::vector<SideLine> measured_lines(const std::vector<SideToMeasure>& sides, do
     const std::vector<double> off = side.off_line(coarse.place_mm, slope);
     line.seen = static_cast<double>(off.size()) / side.blocks();
     line.scatter_mm = off.empty() ? 1e3 : 1.48 * middle_value(off);
+    line.misfit = std::exp(0.5 * coarse.misfit / side.blocks());
     line.wide_mm = side.reach_mm(coarse, slope);
     const double reach_mm = kStepMm * 1.2;
     side.look(coarse.place_mm - reach_mm - 1.0, kFineStepMm, 1 + static_cast<int>(2.0 * (reach_mm + 1.0) / kFineStepMm),

@@ -14,6 +14,7 @@ struct SideLine {
   double sigma_mm = 0.0;    // of its place
   double scatter_mm = 0.0;  // of the places that its blocks would have by themselves: a collimator is straight
   double seen = 0.0;        // share of its blocks that show an edge
+  double misfit = 0.0;      // what the model of an edge leaves unexplained: share of the intensity
   double wide_mm = 0.0;     // how far off another place explains the side nearly as well
 
   double x(double y) const { return at + slope * (y - middle); }

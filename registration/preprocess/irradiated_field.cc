@@ -22,14 +22,16 @@ constexpr double kDeclaredEvidence = 0.3;  // of a side where a file says that t
 constexpr double kEndEvidence = 0.2;       // of the last 12 mm of a side, if it does not end there
 constexpr double kMaxScatterMm = 1.0;      // of a straight edge; the true ones had 0.6, over bone 1.0
 constexpr double kMaxSigmaMm = 0.5;
-constexpr double kMaxWideMm = 1.05;        // of the places that explain a side nearly as well
+constexpr double kMaxWideMm = 1.45;            // of the places that explain a side nearly as well
+constexpr double kMaxWideOfPoorMm = 0.8;       // the same of a side
+constexpr double kPoorMisfit = 0.12;           // that is explained no better than this
 constexpr double kCollimatorScatterMm = 0.45;  // of a collimator's edge; the outlines of air and patient have more
-constexpr double kRodBrightness = -0.5;  // beyond a rod; beyond a field's side the image has less than half
-constexpr double kJawToleranceMm = 3.0;  // a side and a declared jaw
-constexpr double kInnerMarginMm = 4.0;   // of a side's penumbra, when edges further in are looked for
-constexpr double kCornerMm = 4.0;         // of a side, that the penumbra of the next one shades
-constexpr double kTurnSigma = 0.003;     // of the collimator angle, 0.2 degrees
-constexpr double kMaxTurn = 0.0175;      // 1 degree
+constexpr double kRodBrightness = -0.5;        // beyond a rod; beyond a field's side the image has less than half
+constexpr double kJawToleranceMm = 3.0;        // a side and a declared jaw
+constexpr double kInnerMarginMm = 4.0;         // of a side's penumbra, when edges further in are looked for
+constexpr double kCornerMm = 4.0;              // of a side, that the penumbra of the next one shades
+constexpr double kTurnSigma = 0.003;           // of the collimator angle, 0.2 degrees
+constexpr double kMaxTurn = 0.0175;            // 1 degree
 constexpr std::array kNames = {"left", "right", "upper", "lower"};
 
 struct Side {
@@ -126,7 +128,7 @@ std::string doubt_about(const Sides& sides) {
     if (side.edge.at_ends < kEndEvidence) return fmt::format("its {} edge ends before the corner", kNames[n]);
     if (side.line.sigma_mm > kMaxSigmaMm)
       return fmt::format("its {} edge is uncertain by {:.1f} mm", kNames[n], side.line.sigma_mm);
-    if (side.line.wide_mm > kMaxWideMm)
+    if (side.line.wide_mm > (side.line.misfit > kPoorMisfit ? kMaxWideOfPoorMm : kMaxWideMm))
       return fmt::format("its {} edge may lie {:.1f} mm farther in or out", kNames[n], side.line.wide_mm);
     if (std::abs(side.line.slope) > kMaxTurn)
       return fmt::format("its edges are turned by {:.1f} degrees against the collimator angle",
