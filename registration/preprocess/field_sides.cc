@@ -9,22 +9,22 @@
 namespace isoshift {
 namespace {
 
-constexpr double kBlockMm = 5.0;       // along the side
-constexpr double kOutwardMm = 8.0;     // the window across it, from where the logarithm of the intensity falls most
-constexpr double kInwardMm = 12.0;     // where half the beam arrives lies further in
-constexpr double kWeightMm = 5.0;      // sigma of the weights in the window: what is near the edge tells its place
-constexpr double kFloor = 0.03;        // of the brightest intensity of a block: what is darker counts less
-constexpr double kFirstMm = -1.2;      // places from so far outside of where the logarithm falls most
-constexpr double kLastMm = 1.0;        // to so far inside,
-constexpr double kLastSigmas = 1.7;    // and so many sigmas of the penumbra
-constexpr double kStepMm = 0.3;        // of the places
-constexpr double kFineStepMm = 0.06;   // of those near the line
-constexpr double kBestSigmaMm = 0.05;  // what no side is measured better than
-constexpr double kTurnStep = 0.0015;   // radians, 0.09 degrees
-constexpr int kTurns = 8;              // steps to either side
-constexpr double kMisfitFloor = 1e-4;  // mean square of the relative misfit: no block fits better than 1 %
-constexpr double kMostMisfit = 3.0;    // logarithm: a block that the line misfits by more speaks no louder
-constexpr double kNearlyMisfit = 0.5;  // mean logarithm: what fits worse by less fits nearly as well
+constexpr double kBlockMm = 5.0;           // along the side
+constexpr double kOutwardMm = 8.0;         // the window across it, from where the logarithm of the intensity falls most
+constexpr double kInwardMm = 12.0;         // where half the beam arrives lies further in
+constexpr double kWeightMm = 5.0;          // sigma of the weights in the window: what is near the edge tells its place
+constexpr double kDarkShare = 0.03;        // of the brightest intensity of a block: what is darker counts less
+constexpr double kFirstPlaceMm = -1.2;     // places from so far outside of where the logarithm falls most
+constexpr double kLastPlaceMm = 1.0;       // to so far inside,
+constexpr double kLastPlaceSigmas = 1.7;   // and so many sigmas of the penumbra
+constexpr double kPlaceStepMm = 0.3;       // of the places
+constexpr double kFinePlaceStepMm = 0.06;  // of those near the line
+constexpr double kBestSigmaMm = 0.05;      // what no side is measured better than
+constexpr double kTurnStep = 0.0015;       // radians, 0.09 degrees
+constexpr int kTurns = 8;                  // steps to either side
+constexpr double kMisfitFloor = 1e-4;      // mean square of the relative misfit: no block fits better than 1 %
+constexpr double kMostMisfit = 3.0;        // logarithm: a block that the line misfits by more speaks no louder
+constexpr double kNearlyMisfit = 0.5;      // mean logarithm: what fits worse by less fits nearly as well
 // Sigmas of the penumbra.
 constexpr double kFirstPenumbraMm = 0.9, kLeastPenumbraMm = 0.25, kMostPenumbraMm = 2.5;
 
@@ -59,7 +59,7 @@ std::vector<Block> blocks_of(const SideToMeasure& side, int outward, int count) 
       const double off_mm = (n + 0.5 - outward) * xray.mm - 1.0;
       if (is_valid) block.weight[n] = std::exp(-0.5 * std::pow(off_mm / kWeightMm, 2));
     }
-    const double floor = kFloor * block.intensity.cwiseProduct(block.weight).maxCoeff();
+    const double floor = kDarkShare * block.intensity.cwiseProduct(block.weight).maxCoeff();
     if (!(floor > 0.0)) continue;
     double sum = block.weight.sum();
     if (sum * xray.mm < kWeightMm) continue;
@@ -161,7 +161,7 @@ class SideMisfits {
   double reach_mm(const Best& best, double slope) const {
     double reach = 0.0;
     const double last = place(static_cast<int>(misfits_.rows()) - 1);
-    for (double at = first_mm_; at <= last; at += kFineStepMm)
+    for (double at = first_mm_; at <= last; at += kFinePlaceStepMm)
       if (of_line(at, slope) < best.misfit + kNearlyMisfit * blocks())
         reach = std::max(reach, std::abs(at - best.place_mm));
     return reach;
@@ -217,11 +217,12 @@ Turned best_turn(std::span<const SideMisfits> sides, double turn_sigma) {
 
 std::vector<SideLine> measured_lines(const std::vector<SideToMeasure>& sides, double turn_sigma) {
   const auto places_of = [](double sigma_mm) {
-    return 1 + static_cast<int>(std::lround((kLastMm + kLastSigmas * sigma_mm - kFirstMm) / kStepMm));
+    return 1 +
+           static_cast<int>(std::lround((kLastPlaceMm + kLastPlaceSigmas * sigma_mm - kFirstPlaceMm) / kPlaceStepMm));
   };
   std::vector<SideMisfits> misfits(sides.begin(), sides.end());
   const auto fit_with = [&](double sigma_mm) {
-    for (SideMisfits& side : misfits) side.look(kFirstMm, kStepMm, places_of(sigma_mm), sigma_mm);
+    for (SideMisfits& side : misfits) side.look(kFirstPlaceMm, kPlaceStepMm, places_of(sigma_mm), sigma_mm);
     return best_turn(misfits, turn_sigma);
   };
   double penumbra_mm = kFirstPenumbraMm;
@@ -249,7 +250,7 @@ std::vector<SideLine> measured_lines(const std::vector<SideToMeasure>& sides, do
       lines.push_back(line);
       continue;
     }
-    side.look(kFirstMm, kStepMm, places_of(penumbra_mm), penumbra_mm);
+    side.look(kFirstPlaceMm, kPlaceStepMm, places_of(penumbra_mm), penumbra_mm);
     const double slope = side.slope_sign() * best.turn;
     const auto coarse = side.best_line(slope);
     const std::vector<double> off = side.off_line(coarse.place_mm, slope);
@@ -257,9 +258,9 @@ std::vector<SideLine> measured_lines(const std::vector<SideToMeasure>& sides, do
     line.scatter_mm = off.empty() ? 1e3 : 1.48 * middle_value(off);
     line.misfit = std::exp(0.5 * coarse.misfit / side.blocks());
     line.wide_mm = side.reach_mm(coarse, slope);
-    const double reach_mm = kStepMm * 1.2;
-    side.look(coarse.place_mm - reach_mm - 1.0, kFineStepMm, 1 + static_cast<int>(2.0 * (reach_mm + 1.0) / kFineStepMm),
-              penumbra_mm);
+    const double reach_mm = kPlaceStepMm * 1.2;
+    side.look(coarse.place_mm - reach_mm - 1.0, kFinePlaceStepMm,
+              1 + static_cast<int>(2.0 * (reach_mm + 1.0) / kFinePlaceStepMm), penumbra_mm);
     const auto fine = side.best_line(slope);
     line.at = side.at(fine.place_mm);
     line.slope = slope;

@@ -10,6 +10,7 @@
 #include "geometry/rotation.h"
 #include "registration/preprocess/field_edges.h"
 #include "registration/preprocess/field_sides.h"
+#include "registration/preprocess/leaf_outline.h"
 
 namespace isoshift {
 namespace {
@@ -29,7 +30,7 @@ constexpr double kCollimatorScatterMm = 0.45;  // of a collimator's edge; the ou
 constexpr double kRodBrightness = -0.5;        // beyond a rod; beyond a field's side the image has less than half
 constexpr double kJawToleranceMm = 3.0;        // a side and a declared jaw
 constexpr double kInnerMarginMm = 4.0;         // of a side's penumbra, when edges further in are looked for
-constexpr double kCornerMm = 4.0;              // of a side, that the penumbra of the next one shades
+constexpr double kShadedCornerMm = 4.0;        // of a side, that the penumbra of the next one shades
 constexpr double kTurnSigma = 0.003;           // of the collimator angle, 0.2 degrees
 constexpr double kMaxTurn = 0.0175;            // 1 degree
 constexpr std::array kNames = {"left", "right", "upper", "lower"};
@@ -59,7 +60,7 @@ struct Upright {
 // The four sides measured, all with the turn and the penumbra that they share.
 Sides measured(const Upright& upright, const FieldRectangle& rectangle) {
   Sides sides;
-  const int corner = static_cast<int>(std::lround(kCornerMm / upright.xray.mm));
+  const int corner = static_cast<int>(std::lround(kShadedCornerMm / upright.xray.mm));
   std::vector<SideToMeasure> to_measure;
   for (std::size_t n = 0; n < 4; ++n) {
     Side& side = sides[n];
@@ -304,11 +305,34 @@ std::vector<Eigen::Vector2d> on_receptor(std::vector<Eigen::Vector2d> polygon, i
   return polygon;
 }
 
+// The field that leaves make, where the file declares it and the image shows it.
+std::optional<IrradiatedField> field_of_leaves(const XrayImage& xray, const UprightXray& upright) {
+  constexpr double kShiftSigmaMm = 0.3;
+  const Mapping mapping(upright);
+  std::vector<Eigen::Vector2d> outline_px;
+  for (const Eigen::Vector2d& corner : xray.declared_aperture->corners_px)
+    outline_px.push_back(mapping.upright(corner));
+  const auto shift_px = shift_to_seen_outline(upright, outline_px);
+  if (!shift_px) return std::nullopt;
+  IrradiatedField field{.origin = IrradiatedField::Origin::kDeclared, .sigma_mm = kShiftSigmaMm};
+  for (const Eigen::Vector2d& corner : outline_px) field.corners_px.push_back(mapping.image(corner + *shift_px));
+  field.corners_px = on_receptor(field.corners_px, xray.values.columns, xray.values.rows);
+  return field;
+}
+
+// Whether the file declares leaves that make no rectangle, of the exposure itself.
+bool has_leaves(const XrayImage& xray) {
+  return xray.declared_aperture && xray.declared_aperture->is_of_exposure &&
+         xray.declared_aperture->corners_px.size() > 4;
+}
+
 }  // namespace
 
 IrradiatedField find_irradiated_field(const XrayImage& xray, double pixels_per_mm) {
   using Origin = IrradiatedField::Origin;
   const Upright upright(upright_xray(xray, pixels_per_mm));
+  if (has_leaves(xray))
+    if (auto field = field_of_leaves(xray, upright.xray)) return *field;
   const FieldEdges edges(upright.xray);
   const Eigen::Vector2d isocenter_px =
       Mapping(upright.xray).upright(xray.view.project(Eigen::Vector3d::Zero()).value());
@@ -317,6 +341,7 @@ IrradiatedField find_irradiated_field(const XrayImage& xray, double pixels_per_m
   if (xray.declared_aperture)
     finding = reconciled(std::move(finding), *xray.declared_aperture, upright, edges, field.origin);
   field.doubt = finding.doubt;
+  if (field.is_sure() && has_leaves(xray)) field.doubt = "the file declares leaves that the image does not show";
   for (Side& side : finding.sides) {
     if (!side.is_open()) field.sigma_mm = std::max(field.sigma_mm, side.line.sigma_mm);
     // Blocks of pixels may not reach the rim.
