@@ -175,7 +175,10 @@ class SideMisfits {
       misfits_.col(b).minCoeff(&least);
       if (least == 0 || least + 1 == misfits_.rows()) continue;
       const double line_mm = place_mm + side_.sign * slope * (blocks_[static_cast<std::size_t>(b)].row - middle_) * mm_;
-      off.push_back(std::abs(place(static_cast<int>(least)) - line_mm));
+      const double below = misfits_(least - 1, b), above = misfits_(least + 1, b);
+      const double curvature = below - 2.0 * misfits_(least, b) + above;
+      const double between = curvature > 0.0 ? 0.5 * (below - above) / curvature : 0.0;
+      off.push_back(std::abs(place(static_cast<int>(least)) + between * step_mm_ - line_mm));
     }
     return off;
   }
@@ -265,7 +268,10 @@ std::vector<SideLine> measured_lines(const std::vector<SideToMeasure>& sides, do
     line.at = side.at(fine.place_mm);
     line.slope = slope;
     line.middle = side.middle();
-    line.sigma_mm = std::hypot(line.scatter_mm / std::sqrt(std::max<double>(1.0, off.size())), kBestSigmaMm);
+    // Blocks that are poorly explained scatter, and hardly count for the line.
+    line.sigma_mm =
+        std::hypot(std::min(line.scatter_mm, line.wide_mm) / std::sqrt(std::max(1.0, static_cast<double>(off.size()))),
+                   kBestSigmaMm);
     lines.push_back(line);
   }
   return lines;

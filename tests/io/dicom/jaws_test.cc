@@ -105,21 +105,21 @@ TEST_F(JawsTest, ClosedLeavesAtTheEndsAreNotOpen) {
 TEST_F(JawsTest, LeavesWithoutBoundariesAreLeftOutAndNamed) {
   const JawOpenings openings = of_leaves(kLeavesMm, {});
   EXPECT_EQ(described(openings), "X -25 to 25 mm");
-  EXPECT_THAT(problem(), HasSubstr("MLCX is left out: LeafPositionBoundaries (300a,00be) is missing"));
+  EXPECT_THAT(problem(), HasSubstr("MLCX is left out: LeafPositionBoundaries (300A,00BE) is missing"));
   EXPECT_THAT(problem(), HasSubstr(study_.image(0).string()));
 }
 
 TEST_F(JawsTest, WrongCountsAreNamed) {
   of_leaves({-30, -30, 30, 30}, kBoundariesMm);
-  EXPECT_THAT(problem(), HasSubstr("LeafJawPositions (300a,011c) has 4 values, expected 8"));
+  EXPECT_THAT(problem(), HasSubstr("LeafJawPositions (300A,011C) has 4 values, expected 8"));
   of_leaves(kLeavesMm, {-20, 0, 20});
-  EXPECT_THAT(problem(), HasSubstr("LeafPositionBoundaries (300a,00be) has 3 values, expected 5"));
+  EXPECT_THAT(problem(), HasSubstr("LeafPositionBoundaries (300A,00BE) has 3 values, expected 5"));
   of_leaves(kLeavesMm, {-20, 0, -10, 10, 20});
-  EXPECT_THAT(problem(), HasSubstr("LeafPositionBoundaries (300a,00be) does not rise"));
+  EXPECT_THAT(problem(), HasSubstr("LeafPositionBoundaries (300A,00BE) does not rise"));
   const JawOpenings openings = of_exposure(
       [](DicomItem exposure) { add_device(exposure, DCM_BeamLimitingDeviceSequence, "ASYMX", {-25, 25, 30}); });
   EXPECT_TRUE(openings.is_empty());
-  EXPECT_THAT(problem(), HasSubstr("ASYMX is left out: LeafJawPositions (300a,011c) has 3 values, expected 2"));
+  EXPECT_THAT(problem(), HasSubstr("ASYMX is left out: LeafJawPositions (300A,011C) has 3 values, expected 2"));
 }
 
 TEST_F(JawsTest, SwappedEndsAreNamed) {
@@ -133,7 +133,7 @@ TEST_F(JawsTest, UnknownDevicesAndMissingPositionsAreNamed) {
   of_exposure([](DicomItem exposure) { add_device(exposure, DCM_BeamLimitingDeviceSequence, "IRIS", {-5, 5}); });
   EXPECT_THAT(problem(), HasSubstr("is \"IRIS\", expected X, Y, ASYMX, ASYMY, MLCX or MLCY"));
   of_exposure([](DicomItem exposure) { add_device(exposure, DCM_BeamLimitingDeviceSequence, "X", {}); });
-  EXPECT_THAT(problem(), HasSubstr("X is left out: LeafJawPositions (300a,011c) is missing"));
+  EXPECT_THAT(problem(), HasSubstr("X is left out: LeafJawPositions (300A,011C) is missing"));
 }
 
 TEST_F(JawsTest, APlanDeclaresThoseOfItsFirstControlPoint) {
@@ -159,7 +159,7 @@ TEST_F(JawsTest, APlanWithoutBoundariesOfItsLeavesSaysSo) {
   });
   const RtPlan plan = read_rt_plan(study_.plan());
   EXPECT_TRUE(plan.beams[0].jaws.is_empty());
-  EXPECT_THAT(plan.beams[0].jaws.problems, ElementsAre(HasSubstr("LeafPositionBoundaries (300a,00be) is missing")));
+  EXPECT_THAT(plan.beams[0].jaws.problems, ElementsAre(HasSubstr("LeafPositionBoundaries (300A,00BE) is missing")));
 }
 
 // The gantry's and the collimator's angle turn what is declared; the kV imager's beam does not pass the jaws.
