@@ -258,7 +258,7 @@ Body shoulders(const Vector3d& target_patient_mm, std::uint64_t seed) {
     body.add(Kind::kBox, there({88, 78, 48}), {42, 3, 48}, bone_in_tissue(0.45), tilt(8, -side * body.vary(25, 0.2)));
     body.add(Kind::kBox, there({92, 70, 76}), {45, 6, 4}, bone_in_tissue(0.5),
              tilt(0, -side * 25));  // spine of scapula
-    body.add(Kind::kEllipsoid, there({138, 8, 80}), {20, 20, 21}, bone_in_tissue(0.4));
+    body.add(Kind::kEllipsoid, there({128, 8, 80}), {20, 20, 21}, bone_in_tissue(0.4));
   }
   return body;
 }

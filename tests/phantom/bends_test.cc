@@ -127,7 +127,7 @@ TEST(PhantomBends, EveryVertebraHasProcessesOfItsOwn) {
     }
 }
 
-TEST(PhantomBends, LostTissueBaresNoBoneAndMovesNone) {
+TEST(PhantomBends, LostTissueMovesNoBone) {
   for (const Anatomy anatomy : {Anatomy::kHead, Anatomy::kSpine, Anatomy::kThorax}) {
     const BentPhantom phantom = phantom_of(options_of(anatomy, {"weight-loss:20"}));
     for (const BentBody& bent : phantom.bodies)

@@ -73,7 +73,12 @@ def motion_of(error):
 
 
 def distance_mm(a, b, x):
-    """How far the two motions take a point apart."""
+    """How far the two motions take a point apart.
+
+    >>> turned = [[0, -1, 0], [1, 0, 0], [0, 0, 1]], [0, 0, 3]
+    >>> distance_mm(([[1, 0, 0], [0, 1, 0], [0, 0, 1]], [0, 0, 0]), turned, (2, 2, 0))
+    5.0
+    """
     found = [[sum(m[0][row][k] * x[k] for k in range(3)) + m[1][row] for row in range(3)] for m in (a, b)]
     return math.dist(*found)
 
@@ -116,7 +121,11 @@ def tail(successes, trials, share, upper):
 
 
 def clopper_pearson(successes, trials, confidence=0.95):
-    """The exact interval of a share: Clopper and Pearson, Biometrika 26 (1934)."""
+    """The exact interval of a share: Clopper and Pearson, Biometrika 26 (1934).
+
+    >>> ["%.4f" % bound for bound in clopper_pearson(0, 10) + clopper_pearson(7, 20) + clopper_pearson(95, 100)]
+    ['0.0000', '0.3085', '0.1539', '0.5922', '0.8872', '0.9836']
+    """
     if trials == 0:
         return 0.0, 1.0
     alpha = 0.5 * (1.0 - confidence)
