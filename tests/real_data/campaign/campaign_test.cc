@@ -94,9 +94,7 @@ TEST(Campaign, TruthOfALevelSaysWhereItIsSeen) {
     plan.exposures[1] = {.gantry_deg = 90.0, .photons = 1e12, .scatter_share = 0.0, .blur_mm = 0.0};
     const Deformation deformation(plan.bendings, plan.breath);
     std::mt19937_64 random(1);
-    std::vector<std::vector<float>> images;
-    for (const Exposure& exposure : plan.exposures)
-      images.push_back(expose(patient, deformation, plan.setup, exposure, random));
+    const std::vector<std::vector<float>> images = expose(patient, deformation, plan.setup, plan.exposures, random);
     TemporaryFolder folder;
     write_case(plan, patient, deformation, images, folder.path());
     const nlohmann::json truth = nlohmann::json::parse(std::ifstream(folder / "truth.json"));

@@ -108,8 +108,9 @@ DisplacementField::DisplacementField(const Deformation& deformation, const Vecto
 
 Eigen::Vector3f DisplacementField::at(const Eigen::Vector3f& deformed_mm) const {
   const Eigen::Vector3f place = (deformed_mm - low_mm_) / kSpacingMm;
-  const Eigen::Vector3i first = place.array().floor().cast<int>();
-  if ((first.array() < 0).any() || (first.array() + 1 >= size_.array()).any()) return Eigen::Vector3f::Zero();
+  if (!(place.minCoeff() >= 0.0F)) return Eigen::Vector3f::Zero();
+  const Eigen::Vector3i first = place.cast<int>();
+  if ((first.array() + 1 >= size_.array()).any()) return Eigen::Vector3f::Zero();
   const Eigen::Vector3f f = place - first.cast<float>();
   const auto row = static_cast<std::size_t>(size_.x()), slice = row * static_cast<std::size_t>(size_.y());
   const Eigen::Vector3f* corner =

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <chrono>
+#include <cstdio>
 #include <map>
 
 #include "base/process.h"
@@ -30,12 +31,11 @@ void make_case(std::uint64_t seed, const Patient& patient, const std::filesystem
   const Deformation deformation(plan.bendings, plan.breath);
   const Patient seen = changed(patient, plan);
   std::mt19937_64 noise(seed);
-  std::vector<std::vector<float>> images;
-  for (const Exposure& exposure : plan.exposures)
-    images.push_back(expose(seen, deformation, plan.setup, exposure, noise));
-  write_case(plan, patient, deformation, images, out / fmt::format("{}", seed));
+  write_case(plan, patient, deformation, expose(seen, deformation, plan.setup, plan.exposures, noise),
+             out / fmt::format("{}", seed));
   fmt::print("{} {} {}: {:.1f} s\n", seed, plan.anatomy, plan.stratum,
              std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count());
+  std::fflush(stdout);
 }
 
 int run(int argc, char** argv) {

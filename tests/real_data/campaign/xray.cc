@@ -24,6 +24,8 @@ constexpr std::array<Energy, 4> kKilovoltage = {
 constexpr std::array<Energy, 1> kMegavoltage = {{{0.00494, 0.00877, 1.0}}};
 constexpr double kBoneToWaterInCt = 2.59;  // of their attenuation, as a CT scanner of 120 kV sees it
 
+constexpr double kStepMm = 1.0;  // along a ray
+
 // Millimeters of water and bone along a ray.
 struct Path {
   double water_mm = 0.0, bone_mm = 0.0;
@@ -56,25 +58,35 @@ class RayMarcher {
       last = std::min(last, std::max(a, b));
     }
     Path path;
-    const double length_mm = way.norm();
-    const int steps = static_cast<int>(std::ceil((last - first) * length_mm));
+    const double length_mm = (last - first) * way.norm();
+    const int steps = static_cast<int>(std::ceil(length_mm / kStepMm));
     if (steps <= 0) return path;
-    const double step_mm = (last - first) * length_mm / steps;
-    const Vector3f step = (way / length_mm * step_mm).cast<float>();
-    Vector3f place = (begin_mm + way * first).cast<float>() + 0.5F * step;
-    for (int n = 0; n < steps; ++n, place += step)
-      add(path, hu_at(field_ ? Vector3f(place + field_->at(place)) : place), static_cast<float>(step_mm));
+    const auto step_mm = static_cast<float>(length_mm / steps);
+    const Vector3f step = (way.normalized() * static_cast<double>(step_mm)).cast<float>();
+    const Vector3f start = (begin_mm + way * first).cast<float>() + 0.5F * step;
+    if (!field_) {
+      for (int n = 0; n < steps; ++n) add(path, hu_at(start + static_cast<float>(n) * step), step_mm);
+      return path;
+    }
+    // Displacements change slowly: one for every four steps, linear between them.
+    constexpr int kBetween = 4;
+    Vector3f here = start + field_->at(start);
+    for (int n = 0; n < steps; n += kBetween) {
+      const Vector3f there_mm = start + static_cast<float>(n + kBetween) * step;
+      const Vector3f there = there_mm + field_->at(there_mm), piece = (there - here) / static_cast<float>(kBetween);
+      for (int m = 0; m < std::min(kBetween, steps - n); ++m)
+        add(path, hu_at(here + static_cast<float>(m) * piece), step_mm);
+      here = there;
+    }
     return path;
   }
 
  private:
   float hu_at(const Vector3f& planned_mm) const {
     const Vector3f place = (planned_mm - first_mm_).cwiseProduct(per_mm_);
-    const int i = static_cast<int>(std::floor(place.x())), j = static_cast<int>(std::floor(place.y())),
-              k = static_cast<int>(std::floor(place.z()));
-    if (i < 0 || j < 0 || k < 0 || i + 1 >= patient_.size.x() || j + 1 >= patient_.size.y() ||
-        k + 1 >= patient_.size.z())
-      return -1000.0F;
+    if (!(place.x() >= 0.0F && place.y() >= 0.0F && place.z() >= 0.0F)) return -1000.0F;
+    const int i = static_cast<int>(place.x()), j = static_cast<int>(place.y()), k = static_cast<int>(place.z());
+    if (i + 1 >= patient_.size.x() || j + 1 >= patient_.size.y() || k + 1 >= patient_.size.z()) return -1000.0F;
     const float x = place.x() - static_cast<float>(i), y = place.y() - static_cast<float>(j),
                 z = place.z() - static_cast<float>(k);
     const std::int16_t* v = &patient_.hu[(static_cast<std::size_t>(k) * patient_.size.y() + j) * patient_.size.x() + i];
@@ -160,29 +172,16 @@ double transmitted(const Path& path, bool is_megavoltage) {
   return sum;
 }
 
-}  // namespace
-
-Matrix3d room_axes(const std::string& patient_position) {
-  Matrix3d axes;
-  // On the back: the back points down. Head first the left is at the right of who faces the gantry.
-  if (patient_position == "HFS")
-    axes << 1, 0, 0, 0, 0, 1, 0, -1, 0;
-  else
-    axes << -1, 0, 0, 0, 0, -1, 0, -1, 0;
-  return axes;
-}
-
-std::vector<float> expose(const Patient& patient, const Deformation& deformation, const Setup& setup,
-                          const Exposure& exposure, std::mt19937_64& random) {
+std::vector<float> expose_one(const RayMarcher& rays, const Matrix3d& axes, const Setup& setup,
+                              const Exposure& exposure, std::mt19937_64& random) {
   const double gantry_rad = exposure.gantry_deg * std::numbers::pi / 180.0;
   const double s = std::sin(gantry_rad), c = std::cos(gantry_rad);
   const Vector3d source(kSadMm * s, 0.0, kSadMm * c), right(c, 0.0, -s), up(0.0, 1.0, 0.0);
   const Vector3d panel = -(kSidMm - kSadMm) * source / kSadMm;
-  const Matrix3d patient_from_room = room_axes(patient.position).transpose() * setup.rotation.transpose();
+  const Matrix3d patient_from_room = axes.transpose() * setup.rotation.transpose();
   const auto in_patient = [&](const Vector3d& room_mm) {
     return Vector3d(patient_from_room * (room_mm - setup.translation_mm) + setup.isocenter_patient_mm);
   };
-  const RayMarcher rays(patient, deformation);
   std::vector<float> image(static_cast<std::size_t>(kPixels) * kPixels);
   for (int row = 0; row < kPixels; ++row)
     for (int column = 0; column < kPixels; ++column) {
@@ -200,6 +199,27 @@ std::vector<float> expose(const Patient& patient, const Deformation& deformation
     image[n] = static_cast<float>(std::max(0.0, expected + std::sqrt(expected / exposure.photons) * gauss(random)));
   }
   return image;
+}
+
+}  // namespace
+
+Matrix3d room_axes(const std::string& patient_position) {
+  Matrix3d axes;
+  // On the back: the back points down. Head first the left is at the right of who faces the gantry.
+  if (patient_position == "HFS")
+    axes << 1, 0, 0, 0, 0, 1, 0, -1, 0;
+  else
+    axes << -1, 0, 0, 0, 0, -1, 0, -1, 0;
+  return axes;
+}
+
+std::vector<std::vector<float>> expose(const Patient& patient, const Deformation& deformation, const Setup& setup,
+                                       std::span<const Exposure> exposures, std::mt19937_64& random) {
+  const RayMarcher rays(patient, deformation);
+  std::vector<std::vector<float>> images;
+  for (const Exposure& exposure : exposures)
+    images.push_back(expose_one(rays, room_axes(patient.position), setup, exposure, random));
+  return images;
 }
 
 }  // namespace isoshift::campaign

@@ -5,6 +5,7 @@
 
 #include <Eigen/Core>
 #include <random>
+#include <span>
 #include <vector>
 
 #include "tests/real_data/campaign/deformation.h"
@@ -38,9 +39,9 @@ inline constexpr double kSadMm = 1000.0, kSidMm = 1500.0;
 inline constexpr int kPixels = 640;
 inline constexpr double kPixelMm = 0.64;  // on the panel
 
-// Intensity per pixel, row-major, 1 in the open beam. Column 0 at the left and row 0 at the top, seen from the source
-// with the gantry at the top.
-std::vector<float> expose(const Patient& patient, const Deformation& deformation, const Setup& setup,
-                          const Exposure& exposure, std::mt19937_64& random);
+// Intensity per pixel of every exposure, row-major, 1 in the open beam. Column 0 at the left and row 0 at the top, seen
+// from the source with the gantry at the top.
+std::vector<std::vector<float>> expose(const Patient& patient, const Deformation& deformation, const Setup& setup,
+                                       std::span<const Exposure> exposures, std::mt19937_64& random);
 
 }  // namespace isoshift::campaign
