@@ -21,12 +21,12 @@ using Eigen::Vector3d;
 
 constexpr double kRadPerDeg = 3.14159265358979323846 / 180.0;
 
-// Air, 2 mm voxels, 100 mm to every side of the origin.
+// Air, 2 mm voxels, 80 x 80 x 120 mm.
 Patient empty_patient(const std::string& position) {
   Patient patient;
-  patient.size = Eigen::Vector3i::Constant(101);
+  patient.size = Eigen::Vector3i(41, 41, 61);
   patient.spacing_mm = Vector3d::Constant(2.0);
-  patient.first_mm = Vector3d::Constant(-100.0);
+  patient.first_mm = Vector3d(-36.0, -46.0, -50.0);
   patient.hu.assign(static_cast<std::size_t>(patient.size.prod()), -1000);
   patient.position = position;
   patient.frame_of_reference_uid = "1.2.3";
@@ -98,7 +98,7 @@ TEST(Campaign, TruthOfALevelSaysWhereItIsSeen) {
     TemporaryFolder folder;
     write_case(plan, patient, deformation, images, folder.path());
     const nlohmann::json truth = nlohmann::json::parse(std::ifstream(folder / "truth.json"));
-    const nlohmann::json& level = truth["levels"][truth["levels"].size() - 2];  // -90, ..., 60, 90: as far as the CT
+    const nlohmann::json& level = truth["levels"].back();  // 60 mm; at 90 there is no CT
     ASSERT_NEAR(level["center_patient_mm"][2].get<double>(), at.z(), 1e-9);
     const Vector3d planned = std::string(position) == "HFS" ? Vector3d(0, 60, 0) : Vector3d(0, -60, 0);
     Vector3d found;
