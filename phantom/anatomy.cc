@@ -4,8 +4,9 @@
 #include <cmath>
 #include <numbers>
 #include <random>
+#include <string>
 
-#include "phantom/shapes.h"
+#include "phantom/anatomy.h"
 
 namespace isoshift {
 namespace {
@@ -32,8 +33,21 @@ class Body {
 
   void add(Kind kind, const Vector3d& at, const Vector3d& half_extent, const Material& material,
            const Eigen::Matrix3d& rotation = Eigen::Matrix3d::Identity()) {
-    shapes_.push_back(make_shape(kind, center_ + at, half_extent, material, rotation));
+    parts_.shapes.push_back(make_shape(kind, center_ + at, half_extent, material, rotation));
+    parts_.shapes.back().body = current_;
   }
+
+  // The shapes that follow belong to this rigid body; motion reaches it at `carried_at`.
+  void begin(const std::string& name, const Vector3d& at, const Vector3d& carried_at, bool is_vertebra = false) {
+    current_ = static_cast<int>(parts_.bodies.size());
+    parts_.bodies.push_back({name, center_ + at, center_ + carried_at, is_vertebra});
+  }
+  void begin(const std::string& name, const Vector3d& at) { begin(name, at, at); }
+  void go_on_with(int body) { current_ = body; }
+  // The shapes that follow are soft tissue, each by itself.
+  void end() { current_ = -1; }
+  // The shape added last is skin or fat that can become thinner by this much on every side.
+  void note_outline(double most_mm) { parts_.outlines.push_back({parts_.shapes.size() - 1, most_mm}); }
 
   // A hollow ellipsoid of bone.
   void add_shell(const Vector3d& at, const Vector3d& outer, double thickness, double bone_share) {
@@ -62,45 +76,54 @@ class Body {
 
   double vary(double value, double share) { return value * (1.0 + share * (2.0 * uniform_(random_) - 1.0)); }
 
-  // Says where a vertebral body is that shapes were added for.
-  void note_vertebra(const Vector3d& at) { vertebrae_.push_back(center_ + at); }
-
-  std::vector<Shape> take() { return std::move(shapes_); }
-  std::vector<Vector3d> take_vertebrae() { return std::move(vertebrae_); }
+  PhantomParts take() { return std::move(parts_); }
 
  private:
   Vector3d center_;
-  std::vector<Vector3d> vertebrae_;
+  PhantomParts parts_;
+  int current_ = -1;
   std::mt19937_64 random_;
   std::normal_distribution<double> gauss_;
   std::uniform_real_distribution<double> uniform_;
-  std::vector<Shape> shapes_;
 };
+
+constexpr const char* side_name(double side) { return side < 0.0 ? "right" : "left"; }
 
 // x is left, y posterior, z superior. Seeds differ as people do: by millimeters everywhere.
 Body head(const Vector3d& center_patient_mm, std::uint64_t seed) {
   Body body(center_patient_mm, seed);
   constexpr double kPlacesMm = 4.0, kSidesMm = 1.5;  // how places differ between people, and between the sides of one
+  constexpr int kSkull = 0, kMandible = 1;           // in the order in which they begin
   const Vector3d skull_at(0, 4, 20);
   const Vector3d skull(body.vary(66, 0.06), body.vary(84, 0.06), body.vary(72, 0.06));
+  body.begin("skull", skull_at);
   body.add(Kind::kEllipsoid, skull_at, skull.array() + 7.0, kTissue);
+  body.note_outline(4.0);
   body.add(Kind::kEllipsoid, body.near({0, -22, -45}, kSidesMm), {52, 62, 52},
-           {.water = 0.55, .bone = 0.0});                                              // face, over the head's tissue
+           {.water = 0.55, .bone = 0.0});  // face, over the head's tissue
+  body.note_outline(4.0);
+  body.end();
   body.add(Kind::kCylinder, {0, 22, -70}, {46, 50, 34}, {.water = 0.5, .bone = 0.0});  // neck
+  body.note_outline(10.0);
+  body.go_on_with(kSkull);
   body.add_shell(skull_at, skull, body.vary(6.0, 0.2), 0.8);
   body.add_grains(110, skull_at, skull.array() - 3.0, true);
 
   const Vector3d orbit = body.near({31, -65, -14}, kPlacesMm), sinus = body.near({26, -52, -40}, kPlacesMm),
                  petrous = body.near({46, 18, -18}, kPlacesMm), jaw = body.near({44, -32, -66}, kPlacesMm),
                  mastoid = body.near({55, 28, -30}, kPlacesMm);
+  body.begin("mandible", {0, jaw.y(), jaw.z()}, {0, -14, -44});  // carried at its joints
   for (const double side : {-1.0, 1.0}) {
     const auto there = [&](const Vector3d& at) { return body.near(Vector3d(side * at.x(), at.y(), at.z()), kSidesMm); };
     const Vector3d orbit_at = there(orbit), mastoid_at = there(mastoid);
+    body.go_on_with(kSkull);
     body.add(Kind::kEllipsoid, orbit_at, {17, 17, 15}, {.water = 0.1, .bone = -0.1});
     body.add_shell(orbit_at, {20, 20, 18}, 2.5, 0.7);
     body.add(Kind::kEllipsoid, there(sinus), {13, 14, body.vary(15, 0.2)}, kAirInTissue);  // maxillary sinus
     body.add(Kind::kBox, there(petrous), {14, 9, 8}, bone_in_tissue(0.75), tilt(0, side * body.vary(35, 0.2)));
+    body.go_on_with(kMandible);
     body.add(Kind::kBox, there(jaw), {4, 20, 22}, bone_in_tissue(0.7), tilt(body.vary(20, 0.3)));
+    body.go_on_with(kSkull);
     body.add(Kind::kEllipsoid, mastoid_at, {9, 12, 14}, bone_in_tissue(0.4));
     body.add(Kind::kEllipsoid, mastoid_at, {4, 6, 7}, {.water = -0.3, .bone = 0});
   }
@@ -109,18 +132,21 @@ Body head(const Vector3d& center_patient_mm, std::uint64_t seed) {
   body.add(Kind::kBox, body.near({0, -6, -24}, kPlacesMm), {20, 24, 4}, bone_in_tissue(0.55),
            tilt(body.vary(-12, 0.5)));  // skull base
   const Vector3d teeth = body.near({0, -61, -69}, kPlacesMm);
-  body.add(Kind::kCylinder, teeth + Vector3d(0, -1, 7), {22, 20, 5}, bone_in_tissue(0.6));              // upper
-  body.add(Kind::kCylinder, teeth + Vector3d(0, 1, -7), {24, 22, 5}, bone_in_tissue(0.65));             // lower
+  body.add(Kind::kCylinder, teeth + Vector3d(0, -1, 7), {22, 20, 5}, bone_in_tissue(0.6));  // upper
+  body.go_on_with(kMandible);
+  body.add(Kind::kCylinder, teeth + Vector3d(0, 1, -7), {24, 22, 5}, bone_in_tissue(0.65));  // lower
+  body.go_on_with(kSkull);
   body.add(Kind::kCylinder, {body.vary(15, 0.4), -70, teeth.z() + 1}, {3, 3, 6}, bone_in_tissue(0.9));  // a crown
-  body.add(Kind::kCylinder, body.near({0, -22, -78}, kPlacesMm), {9, 8, 22}, kAirInTissue);             // airway
+  body.end();
+  body.add(Kind::kCylinder, body.near({0, -22, -78}, kPlacesMm), {9, 8, 22}, kAirInTissue);  // airway
   const Vector3d cervical = body.near({0, 24, -56}, kPlacesMm);
   const double pitch = body.vary(17, 0.1);
   for (int n = 0; n < 3; ++n) {
     const Vector3d at = cervical - Vector3d(0, 0, pitch * n);
+    body.begin("C" + std::to_string(n + 1), at, at, true);
     body.add(Kind::kCylinder, at, {11, 9, 7}, bone_in_tissue(0.55));
     body.add(Kind::kBox, at + Vector3d(0, 26, -2), {4, 14, 4}, bone_in_tissue(0.5), tilt(15));
     body.add_grains(6, at, {9, 7, 5}, false);
-    body.note_vertebra(at);
   }
   return body;
 }
@@ -128,6 +154,7 @@ Body head(const Vector3d& center_patient_mm, std::uint64_t seed) {
 Body spine(const Vector3d& center_patient_mm, std::uint64_t seed) {
   Body body(center_patient_mm, seed);
   body.add(Kind::kCylinder, {0, -30, 0}, {150, 95, 110}, kTissue);
+  body.note_outline(20.0);
   body.add(Kind::kEllipsoid, {body.vary(60, 0.2), -60, 10}, {40, 22, 30}, {.water = -0.95, .bone = 0});  // bowel gas
   body.add(Kind::kEllipsoid, {body.vary(-45, 0.2), -75, -35}, {25, 14, 40}, {.water = -0.9, .bone = 0});
   constexpr int kVertebrae = 5, kMiddle = 2;
@@ -137,6 +164,7 @@ Body spine(const Vector3d& center_patient_mm, std::uint64_t seed) {
     const double z = pitch * (n - kMiddle);
     const Vector3d at(body.vary(1.0, 1.0) + scoliosis * std::sin(0.7 * n), lordosis * std::cos(0.6 * n), z);
     const Vector3d half(body.vary(23, 0.06), body.vary(17, 0.06), body.vary(13, 0.06));
+    body.begin("L" + std::to_string(kVertebrae - n), at, at, true);
     body.add(Kind::kCylinder, at, half, bone_in_tissue(0.25));
     body.add(Kind::kCylinder, at + Vector3d(0, 0, half.z()), {half.x(), half.y(), 1.2}, bone_in_tissue(0.5));
     body.add(Kind::kCylinder, at - Vector3d(0, 0, half.z()), {half.x(), half.y(), 1.2}, bone_in_tissue(0.5));
@@ -147,11 +175,12 @@ Body spine(const Vector3d& center_patient_mm, std::uint64_t seed) {
       body.add(Kind::kBox, at + Vector3d(side * process, 28, 2), {16, 4, 5}, bone_in_tissue(0.4), tilt(0, side * 12));
     }
     body.add(Kind::kBox, at + Vector3d(0, 50, -6), {3.5, 15, 10}, bone_in_tissue(0.5), tilt(20));  // spinous
-    body.note_vertebra(at);
   }
   for (const double side : {-1.0, 1.0}) {  // lowest ribs
+    body.begin(std::string("rib ") + side_name(side), {side * 85, 22, 62}, {0, 0, 62});
     body.add(Kind::kCylinder, {side * body.vary(85, 0.1), 22, 62}, {4, 6, 52}, bone_in_tissue(0.5),
              tilt(0) * Eigen::AngleAxisd(side * 1.2, Vector3d::UnitY()).toRotationMatrix());
+    body.begin(std::string("iliac wing ") + side_name(side), {side * 95, 10, -92}, {0, 0, -92});
     body.add(Kind::kEllipsoid, {side * body.vary(95, 0.06), 10, body.vary(-92, 0.06)}, {48, 14, 34},
              bone_in_tissue(0.3));  // iliac wing
   }
@@ -164,6 +193,7 @@ Body thorax(const Vector3d& target_patient_mm, std::uint64_t seed, const Vector3
   constexpr double kMiddle = 65.0, kLungAir = 0.72;
   const Material lung{.water = -kLungAir, .bone = 0.0}, in_lung{.water = kLungAir, .bone = 0.0};
   body.add(Kind::kCylinder, {kMiddle, 10, 0}, {165, 112, 125}, kTissue);
+  body.note_outline(12.0);
   for (const double side : {-1.0, 1.0})
     body.add(Kind::kEllipsoid, {kMiddle + side * body.vary(68, 0.03), body.vary(5, 0.5), 25}, {55, 82, 105}, lung);
   body.add(Kind::kEllipsoid, {kMiddle + 35, -25, 5}, {40, 42, 50}, in_lung);  // heart
@@ -187,17 +217,20 @@ Body thorax(const Vector3d& target_patient_mm, std::uint64_t seed, const Vector3
 
   for (int n = -3; n <= 3; ++n) {  // spine
     const Vector3d at(kMiddle, 70, 28.0 * n);
+    body.begin("T" + std::to_string(8 - n), at, at, true);
     body.add(Kind::kCylinder, at, {17, 14, 11}, bone_in_tissue(0.28));
     body.add_grains(5, at, {13, 11, 9}, false);
     body.add(Kind::kBox, at + Vector3d(0, 32, -6), {3, 12, 9}, bone_in_tissue(0.45), tilt(20));
     for (const double side : {-1.0, 1.0})
       body.add(Kind::kBox, at + Vector3d(side * 25, 18, 0), {12, 4, 5}, bone_in_tissue(0.4), tilt(0, side * 15));
-    body.note_vertebra(at);
   }
   // Ribs: pieces along ellipses that come forward and down; their front follows the breath a little.
   constexpr int kPieces = 9;
   for (int rib = -3; rib <= 3; ++rib)
-    for (const double side : {-1.0, 1.0})
+    for (const double side : {-1.0, 1.0}) {
+      // A rib hangs on the spine, so the spine's motion at its back end carries it whole.
+      body.begin("rib " + std::to_string(8 - rib) + " " + side_name(side),
+                 Vector3d(kMiddle + side * 138, 8, 30.0 * rib - 2.5), Vector3d(kMiddle, 70, 30.0 * rib + 20));
       for (int piece = 0; piece < kPieces; ++piece) {
         const double share = (piece + 0.5) / kPieces;  // from the back to the front
         const double angle = std::numbers::pi * (0.5 - 0.92 * share);
@@ -209,30 +242,75 @@ Body thorax(const Vector3d& target_patient_mm, std::uint64_t seed, const Vector3
             std::atan2(92 * std::cos(angle), -side * 138 * std::sin(angle)) * 180.0 / std::numbers::pi;
         body.add(Kind::kEllipsoid, at + moved, {26, 4, 6.5}, bone_in_tissue(0.5), tilt(0, along_deg));
       }
+    }
+  return body;
+}
+
+// Of a thorax: clavicles, scapulae and the heads of the arms, each side one body that hangs on its clavicle's inner
+// end.
+Body shoulders(const Vector3d& target_patient_mm, std::uint64_t seed) {
+  Body body(target_patient_mm, seed);
+  constexpr double kMiddle = 65.0;
+  for (const double side : {-1.0, 1.0}) {
+    const auto there = [&](const Vector3d& at) { return Vector3d(kMiddle + side * at.x(), at.y(), at.z()); };
+    body.begin(std::string("shoulder ") + side_name(side), there({90, 0, 75}), there({20, -70, 80}));
+    body.add(Kind::kBox, there({72, -52, 88}), {50, 5, 5}, bone_in_tissue(0.6), tilt(0, side * 22));
+    body.add(Kind::kBox, there({88, 78, 48}), {42, 3, 48}, bone_in_tissue(0.45), tilt(8, -side * body.vary(25, 0.2)));
+    body.add(Kind::kBox, there({92, 70, 76}), {45, 6, 4}, bone_in_tissue(0.5),
+             tilt(0, -side * 25));  // spine of scapula
+    body.add(Kind::kEllipsoid, there({128, 8, 80}), {20, 20, 21}, bone_in_tissue(0.4));
+  }
   return body;
 }
 
 }  // namespace
 
-std::vector<Shape> head_phantom(const Vector3d& center_patient_mm, std::uint64_t seed) {
+PhantomParts head_parts(const Vector3d& center_patient_mm, std::uint64_t seed) {
   return head(center_patient_mm, seed).take();
 }
-std::vector<Shape> spine_phantom(const Vector3d& center_patient_mm, std::uint64_t seed) {
+PhantomParts spine_parts(const Vector3d& center_patient_mm, std::uint64_t seed) {
   return spine(center_patient_mm, seed).take();
 }
-std::vector<Shape> thorax_phantom(const Vector3d& target_patient_mm, std::uint64_t seed,
-                                  const Vector3d& displacement_mm) {
+PhantomParts thorax_parts(const Vector3d& target_patient_mm, std::uint64_t seed, const Vector3d& displacement_mm) {
   return thorax(target_patient_mm, seed, displacement_mm).take();
 }
 
+void add_shoulders(PhantomParts& thorax, const Vector3d& target_patient_mm, std::uint64_t seed) {
+  const PhantomParts more = shoulders(target_patient_mm, seed).take();
+  const int earlier = static_cast<int>(thorax.bodies.size());
+  thorax.bodies.insert(thorax.bodies.end(), more.bodies.begin(), more.bodies.end());
+  for (Shape shape : more.shapes) {
+    shape.body += earlier;
+    thorax.shapes.push_back(shape);
+  }
+}
+
+std::vector<Vector3d> PhantomParts::vertebrae() const {
+  std::vector<Vector3d> centers;
+  for (const PhantomBody& body : bodies)
+    if (body.is_vertebra) centers.push_back(body.center_patient_mm);
+  return centers;
+}
+
+std::vector<Shape> head_phantom(const Vector3d& center_patient_mm, std::uint64_t seed) {
+  return head_parts(center_patient_mm, seed).shapes;
+}
+std::vector<Shape> spine_phantom(const Vector3d& center_patient_mm, std::uint64_t seed) {
+  return spine_parts(center_patient_mm, seed).shapes;
+}
+std::vector<Shape> thorax_phantom(const Vector3d& target_patient_mm, std::uint64_t seed,
+                                  const Vector3d& displacement_mm) {
+  return thorax_parts(target_patient_mm, seed, displacement_mm).shapes;
+}
+
 std::vector<Vector3d> head_vertebrae(const Vector3d& center_patient_mm, std::uint64_t seed) {
-  return head(center_patient_mm, seed).take_vertebrae();
+  return head_parts(center_patient_mm, seed).vertebrae();
 }
 std::vector<Vector3d> spine_vertebrae(const Vector3d& center_patient_mm, std::uint64_t seed) {
-  return spine(center_patient_mm, seed).take_vertebrae();
+  return spine_parts(center_patient_mm, seed).vertebrae();
 }
 std::vector<Vector3d> thorax_vertebrae(const Vector3d& target_patient_mm, std::uint64_t seed) {
-  return thorax(target_patient_mm, seed, Vector3d::Zero()).take_vertebrae();
+  return thorax_parts(target_patient_mm, seed, Vector3d::Zero()).vertebrae();
 }
 
 }  // namespace isoshift

@@ -27,6 +27,7 @@ struct Shape {
   Kind kind = Kind::kEllipsoid;
   Eigen::Affine3d unit_from_patient = Eigen::Affine3d::Identity();
   Material added;
+  int body = -1;  // of PhantomParts::bodies; -1: soft tissue
 
   // Length of the part of the segment from `begin` to `end` inside the shape, in mm.
   double chord_mm(const Eigen::Vector3d& begin_patient_mm, const Eigen::Vector3d& end_patient_mm) const;

@@ -51,6 +51,21 @@ ScannedPart part_of(PhantomOptions::Anatomy anatomy) {
   return {};
 }
 
+// A ball about the isocenter: a tumor in the lung, a part of the skull's vault or a vertebra and its margin.
+struct DrawnTarget {
+  const char *name, *interpreted_type;
+  double radius_mm;
+};
+
+DrawnTarget target_of(PhantomOptions::Anatomy anatomy) {
+  switch (anatomy) {
+    case PhantomOptions::Anatomy::kHead: return {"PTV", "PTV", 25.0};
+    case PhantomOptions::Anatomy::kSpine: return {"PTV", "PTV", 20.0};
+    case PhantomOptions::Anatomy::kThorax: return {"Target", "GTV", kTargetRadiusMm};
+  }
+  return {};
+}
+
 CtLattice lattice_of(const PhantomOptions& options) {
   const ScannedPart part = part_of(options.anatomy);
   CtLattice lattice;
@@ -136,7 +151,7 @@ std::vector<std::string> write_ct(const PhantomOptions& options, const StudyUids
                                   const std::filesystem::path& folder, const Progress& progress) {
   std::vector<std::string> instances;
   const auto& [size, spacing_mm, along_columns, patient_from_voxel] = lattice_of(options);
-  const Volume<float> ct = ct_of_shapes(phantom_shapes(options, displacement_mm), size, patient_from_voxel);
+  const Volume<float> ct = ct_of_shapes(phantom_of(options, displacement_mm).in_ct, size, patient_from_voxel);
 
   std::filesystem::create_directories(folder);
   for (int k = 0; k < size.z(); ++k) {
@@ -189,6 +204,13 @@ void write_plan(const PhantomOptions& options, const StudyUids& study, const std
   dataset.put(DCM_ReviewDate, "20260228");
   dataset.put(DCM_ReviewTime, "100000");
   dataset.put(DCM_ReviewerName, "Nobody^Real");
+  if (!options.bends.empty()) {
+    DicomItem reference = dataset.append_item(DCM_DoseReferenceSequence);
+    reference.put(DCM_DoseReferenceNumber, 1);
+    reference.put(DCM_DoseReferenceStructureType, "VOLUME");
+    reference.put(DCM_DoseReferenceType, "TARGET");
+    reference.put(DCM_ReferencedROINumber, 1);
+  }
   DicomItem group = dataset.append_item(DCM_FractionGroupSequence);
   group.put(DCM_FractionGroupNumber, 1);
   group.put(DCM_NumberOfFractionsPlanned, 1);
@@ -214,7 +236,7 @@ void write_xray(const PhantomOptions& options, const StudyUids& study, const std
   imager.receptor_angle_deg = options.receptor_angle_deg;
   imager.pixels = options.image_pixels;
   imager.pixel_mm = kPanelMm / options.image_pixels;
-  const Image<float> intensity = simulate_xray(phantom_shapes(options, moment.displacement_mm), options.placement,
+  const Image<float> intensity = simulate_xray(phantom_of(options, moment.displacement_mm).in_xrays, options.placement,
                                                imager, options.photons, moment.noise_seed);
   std::vector<std::uint16_t> stored(intensity.pixels.size());
   std::ranges::transform(intensity.pixels, stored.begin(), [](float value) {
@@ -268,6 +290,7 @@ void write_xray(const PhantomOptions& options, const StudyUids& study, const std
 
 void write_structures(const PhantomOptions& options, const StudyUids& study, Uids& uids,
                       const std::filesystem::path& path) {
+  const DrawnTarget target = target_of(options.anatomy);
   DicomFile file;
   DicomItem dataset = file.dataset();
   put_common(dataset, study.identity, UID_RTStructureSetStorage, study.structures, "RTSTRUCT", uids.next(),
@@ -286,7 +309,7 @@ void write_structures(const PhantomOptions& options, const StudyUids& study, Uid
   DicomItem roi = dataset.append_item(DCM_StructureSetROISequence);
   roi.put(DCM_ROINumber, 1);
   roi.put(DCM_ReferencedFrameOfReferenceUID, study.frame_of_reference);
-  roi.put(DCM_ROIName, "Target");
+  roi.put(DCM_ROIName, target.name);
   roi.put(DCM_ROIGenerationAlgorithm, "AUTOMATIC");
   DicomItem drawn = dataset.append_item(DCM_ROIContourSequence);
   drawn.put(DCM_ReferencedROINumber, 1);
@@ -294,8 +317,8 @@ void write_structures(const PhantomOptions& options, const StudyUids& study, Uid
   const Eigen::Vector3d& center_mm = options.placement.isocenter_patient_mm;
   for (int k = 0; k < lattice.size.z(); ++k) {
     const double z = (lattice.patient_from_voxel * Eigen::Vector3d(0, 0, k)).z() - center_mm.z();
-    if (std::abs(z) >= kTargetRadiusMm) continue;
-    const double radius_mm = std::sqrt(kTargetRadiusMm * kTargetRadiusMm - z * z);
+    if (std::abs(z) >= target.radius_mm) continue;
+    const double radius_mm = std::sqrt(target.radius_mm * target.radius_mm - z * z);
     constexpr int kPoints = 36;
     std::vector<double> points;
     for (int n = 0; n < kPoints; ++n) {
@@ -312,7 +335,7 @@ void write_structures(const PhantomOptions& options, const StudyUids& study, Uid
   DicomItem observation = dataset.append_item(DCM_RTROIObservationsSequence);
   observation.put(DCM_ObservationNumber, 1);
   observation.put(DCM_ReferencedROINumber, 1);
-  observation.put(DCM_RTROIInterpretedType, "GTV");
+  observation.put(DCM_RTROIInterpretedType, target.interpreted_type);
   observation.put(DCM_ROIInterpreter, "");
   dataset.put(DCM_ApprovalStatus, "UNAPPROVED");
   file.write(path);

@@ -26,7 +26,7 @@ class Uids {
 struct StudyUids {
   Identity identity;
   std::string ct_series, frame_of_reference, plan, plan_series, image_series, image_frame_of_reference;
-  std::string structures;                 // of a thorax
+  std::string structures;                 // empty where no target is drawn
   std::vector<std::string> ct_instances;  // of the planning CT
 };
 
@@ -55,7 +55,7 @@ void write_plan(const PhantomOptions& options, const StudyUids& study, const std
 void write_xray(const PhantomOptions& options, const StudyUids& study, const std::string& sop_instance_uid,
                 std::size_t number, const Moment& moment, const std::filesystem::path& path);
 
-// The target at the end of expiration, a circle per slice.
+// The target, of a breathing phantom at the end of expiration: a circle per slice.
 void write_structures(const PhantomOptions& options, const StudyUids& study, Uids& uids,
                       const std::filesystem::path& path);
 

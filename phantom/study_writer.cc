@@ -16,21 +16,57 @@
 namespace isoshift {
 namespace {
 
+using Json = nlohmann::ordered_json;
+
+Json list(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
+
+Json rows(const Eigen::Matrix3d& matrix) {
+  Json result = Json::array();
+  for (int row = 0; row < 3; ++row) result.push_back({matrix(row, 0), matrix(row, 1), matrix(row, 2)});
+  return result;
+}
+
+// Each body is followed through the room: from where it was planned to where it lies now.
+Json truth_of_bodies(const PhantomOptions& options) {
+  const Placement& placement = options.placement;
+  Placement as_planned = placement;
+  as_planned.translation_mm.setZero();
+  as_planned.rotation_deg.setZero();
+  Json bodies = Json::array();
+  for (const auto& [body, moved_from_planned] : phantom_of(options).bodies) {
+    const auto found_at = [&](const Eigen::Vector3d& planned_fixed_mm) {
+      return placement.fixed_from_patient(moved_from_planned * as_planned.patient_from_fixed(planned_fixed_mm));
+    };
+    const Eigen::Vector3d translation_mm = found_at(Eigen::Vector3d::Zero());
+    Eigen::Matrix3d rotation;
+    for (int axis = 0; axis < 3; ++axis) rotation.col(axis) = found_at(Eigen::Vector3d::Unit(axis)) - translation_mm;
+    bodies.push_back({{"name", body.name},
+                      {"center_patient_mm", list(body.center_patient_mm)},
+                      {"rotation_matrix", rows(rotation)},
+                      {"translation_mm", list(translation_mm)}});
+  }
+  return bodies;
+}
+
 void write_truth(const PhantomOptions& options, const std::filesystem::path& path) {
   const Placement& placement = options.placement;
-  const Eigen::Matrix3d rotation = placement.rotation();
-  nlohmann::ordered_json rows = nlohmann::ordered_json::array();
-  for (int row = 0; row < 3; ++row) rows.push_back({rotation(row, 0), rotation(row, 1), rotation(row, 2)});
-  const auto list = [](const Eigen::Vector3d& v) { return nlohmann::ordered_json{v.x(), v.y(), v.z()}; };
-  const nlohmann::ordered_json truth = {
-      {"isocenter_patient_mm", list(placement.isocenter_patient_mm)},
-      {"patient_position", placement.patient_position},
-      {"couch_deg", placement.couch_angle_deg},
-      {"setup_error_room",
-       {{"translation_mm", list(placement.translation_mm)},
-        {"rotation_deg_rx_ry_rz", list(placement.rotation_deg)},
-        {"rotation_matrix", rows},
-        {"means", "anatomy planned at x (IEC 61217 fixed, mm from the isocenter) is found at R x + t; R = Rz Rx Ry"}}}};
+  const bool is_bent = !options.bends.empty();
+  Json truth = {{"isocenter_patient_mm", list(placement.isocenter_patient_mm)},
+                {"patient_position", placement.patient_position},
+                {"couch_deg", placement.couch_angle_deg}};
+  Json& error = truth["setup_error_room"];
+  if (is_bent) error["center_patient_mm"] = list(placement.isocenter_patient_mm);
+  error["translation_mm"] = list(placement.translation_mm);
+  error["rotation_deg_rx_ry_rz"] = list(placement.rotation_deg);
+  error["rotation_matrix"] = rows(placement.rotation());
+  error["means"] =
+      fmt::format("anatomy{} planned at x (IEC 61217 fixed, mm from the isocenter) is found at R x + t; R = Rz Rx Ry",
+                  is_bent ? " at the target's center" : "");
+  if (is_bent) {
+    for (const Bend& bend : options.bends) truth["bends"].push_back(bend.text());
+    truth["bodies"] = truth_of_bodies(options);
+    truth["bodies_mean"] = "the same for each rigid body of the phantom";
+  }
   write_text(path, truth.dump(1) + "\n");
 }
 
@@ -102,6 +138,15 @@ void write_later_fractions(const PhantomOptions& options, const StudyUids& study
 
 }  // namespace
 
+std::string_view anatomy_name(PhantomOptions::Anatomy anatomy) {
+  switch (anatomy) {
+    case PhantomOptions::Anatomy::kHead: return "head";
+    case PhantomOptions::Anatomy::kSpine: return "spine";
+    case PhantomOptions::Anatomy::kThorax: return "thorax";
+  }
+  return "";
+}
+
 void PhantomOptions::check() const {
   if (!patient_position_from(placement.patient_position))
     throw UsageError(fmt::format("patient position {} is not one of HFS, HFP, FFS, FFP, HFDR, HFDL, FFDR, FFDL",
@@ -120,6 +165,7 @@ void PhantomOptions::check() const {
     throw UsageError("the setup error, the couch angle and the receptor angle must be finite numbers");
   if (!(std::abs(ct_tilt_deg) <= 30.0))
     throw UsageError(fmt::format("a CT tilt of {} degrees is not within 30", ct_tilt_deg));
+  check_bends(bends, anatomy_name(anatomy), placement.patient_position);
   if (breathing.seconds != 0.0 && anatomy != Anatomy::kThorax)
     throw UsageError("only a thorax breathes: --anatomy thorax");
   if (!(breathing.seconds >= 0.0 && breathing.seconds <= 7200.0) ||
@@ -135,14 +181,38 @@ void PhantomOptions::check() const {
     throw UsageError(fmt::format("{} photons: expected 0 or more", photons));
 }
 
-std::vector<Shape> phantom_shapes(const PhantomOptions& options, const Eigen::Vector3d& target_displacement_mm) {
+BentPhantom phantom_of(const PhantomOptions& options, const Eigen::Vector3d& target_displacement_mm) {
   const Eigen::Vector3d& isocenter = options.placement.isocenter_patient_mm;
+  PhantomParts parts;
+  BendingAnatomy anatomy{.isocenter_patient_mm = isocenter};
   switch (options.anatomy) {
-    case PhantomOptions::Anatomy::kHead: return head_phantom(isocenter, options.seed);
-    case PhantomOptions::Anatomy::kSpine: return spine_phantom(isocenter, options.seed);
-    case PhantomOptions::Anatomy::kThorax: return thorax_phantom(isocenter, options.seed, target_displacement_mm);
+    case PhantomOptions::Anatomy::kHead:
+      parts = head_parts(isocenter, options.seed);
+      anatomy.spine_from_isocenter_mm = Eigen::Vector3d(0, 24, 0);
+      anatomy.couch_top_from_isocenter_mm = 101.0;
+      anatomy.couch_width_mm = 170.0;
+      break;
+    case PhantomOptions::Anatomy::kSpine:
+      parts = spine_parts(isocenter, options.seed);
+      anatomy.spine_from_isocenter_mm = Eigen::Vector3d::Zero();
+      anatomy.couch_top_from_isocenter_mm = 70.0;
+      anatomy.couch_width_mm = 400.0;
+      break;
+    case PhantomOptions::Anatomy::kThorax:
+      parts = thorax_parts(isocenter, options.seed, target_displacement_mm);
+      if (std::ranges::find(options.bends, Bend::Kind::kShoulders, &Bend::kind) != options.bends.end())
+        add_shoulders(parts, isocenter, options.seed);
+      anatomy.spine_from_isocenter_mm = Eigen::Vector3d(65, 70, 0);
+      anatomy.couch_top_from_isocenter_mm = 123.0;
+      anatomy.couch_width_mm = 400.0;
+      break;
   }
-  return {};
+  if (!options.bends.empty()) make_vertebrae_differ(parts, options.seed);
+  return bent(std::move(parts), options.bends, anatomy);
+}
+
+bool has_target(const PhantomOptions& options) {
+  return options.anatomy == PhantomOptions::Anatomy::kThorax || !options.bends.empty();
 }
 
 void write_phantom_study(const PhantomOptions& options, const std::filesystem::path& folder, const Progress& progress) {
@@ -152,11 +222,10 @@ void write_phantom_study(const PhantomOptions& options, const std::filesystem::p
   const bool breathes = options.breathing.seconds > 0.0;
   study.ct_instances = write_ct(options, study, study.ct_series, Eigen::Vector3d::Zero(), uids, folder / "CT",
                                 breathes ? Progress() : progress);
-  if (options.anatomy == PhantomOptions::Anatomy::kThorax) study.structures = uids.next();
+  if (has_target(options)) study.structures = uids.next();
   write_plan(options, study, folder / "RTPLAN.dcm");
   if (!breathes) write_session(options, study, uids, 1, folder / "RTIMAGE");
-  if (options.anatomy == PhantomOptions::Anatomy::kThorax)
-    write_structures(options, study, uids, folder / "RTSTRUCT.dcm");
+  if (has_target(options)) write_structures(options, study, uids, folder / "RTSTRUCT.dcm");
   if (breathes) write_breathing(options, study, uids, folder, progress);
   write_later_fractions(options, study, uids, folder);
   write_truth(options, folder / "truth.json");

@@ -15,6 +15,7 @@ struct PhantomCommandOptions {
   std::filesystem::path output;
   std::string anatomy = "head";
   std::filesystem::path trace;
+  std::vector<std::string> bends;
   std::vector<double> translation_mm = {4.3, -6.1, 3.2};
   std::vector<double> rotation_deg = {1.4, -2.1, 1.8};
   bool overwrite = false;
@@ -24,6 +25,7 @@ void run_phantom(PhantomCommandOptions options, Console& console) {
   PhantomOptions& phantom = options.phantom;
   using enum PhantomOptions::Anatomy;
   phantom.anatomy = options.anatomy == "head" ? kHead : options.anatomy == "spine" ? kSpine : kThorax;
+  for (const std::string& bend : options.bends) phantom.bends.push_back(Bend::from_text(bend));
   Notes notes;
   if (!options.trace.empty()) phantom.breathing.trace = read_motion_trace(options.trace, notes);
   print_warnings(notes.warnings, console);
@@ -52,6 +54,7 @@ void add_phantom_command(CLI::App& app, Console& console, int&) {
   command->footer(
       "\nExample:\n  isoshift phantom -o study --translation 5,0,-3 --rotation 1,0,2\n"
       "  isoshift register study -o result --truth study/truth.json\n"
+      "  isoshift phantom -o bent --anatomy spine --bend spine:4,weight-loss:10\n"
       "  isoshift phantom -o breathing --anatomy thorax --breathing 30 --image-pixels 256 --voxel-mm 2 --translation "
       "0,0,0 --rotation 0,0,0");
   command->add_option("-o,--output", options->output, "Folder to make")->required()->type_name("FOLDER");
@@ -114,6 +117,12 @@ void add_phantom_command(CLI::App& app, Console& console, int&) {
                    "Move the target as recorded in this trace (t_s or Timestamp; x, y, z in patient axes, mm), "
                    "relative to the trace's first position")
       ->type_name("CSV");
+  command
+      ->add_option("--bend", options->bends,
+                   "Bend the patient against the CT: neck, spine, jaw (degrees), shoulders, weight-loss (mm), "
+                   "missing-couch, extra-couch; truth.json then has the motion of every body")
+      ->delimiter(',')
+      ->type_name("KIND[:AMOUNT],...");
   command
       ->add_option("--fractions", options->phantom.fractions,
                    "Days of treatment, each with X-rays and a random setup error of its own")

@@ -42,12 +42,22 @@ TEST(PhantomCommand, SameSeedMakesTheSameStudy) {
   EXPECT_NE(uid("a"), uid("c"));
 }
 
+TEST(PhantomCommand, BentStudyHasItsTarget) {
+  TemporaryFolder folder;
+  ASSERT_EQ(make_phantom(folder / "bent", {"--bend", "neck:4,jaw"}).exit_status, 0);
+  const CommandOutcome inspected = run_command({"inspect", (folder / "bent").string()});
+  EXPECT_EQ(inspected.exit_status, 0) << inspected.err;
+  EXPECT_THAT(inspected.out, testing::HasSubstr("PTV"));
+}
+
 TEST(PhantomCommand, RefusesNonsense) {
   TemporaryFolder folder;
   EXPECT_EQ(make_phantom(folder / "a", {"--patient-position", "HFX"}).exit_status, 2);
   EXPECT_EQ(make_phantom(folder / "a", {"--photons", "-1"}).exit_status, 2);
   EXPECT_EQ(make_phantom(folder / "a", {"--translation", "nan,0,0"}).exit_status, 2);
   EXPECT_EQ(make_phantom(folder / "a", {"--gantry-angles", "30.2,30.4"}).exit_status, 2);
+  EXPECT_EQ(make_phantom(folder / "a", {"--bend", "knee"}).exit_status, 2);
+  EXPECT_THAT(make_phantom(folder / "a", {"--bend", "neck,spine:3"}).err, testing::HasSubstr("--bend spine"));
   EXPECT_FALSE(std::filesystem::exists(folder / "a"));
 }
 
