@@ -113,6 +113,7 @@ struct Registration {
   // Where the patient has bent: what bones did against the target. The pose is then the target's. Empty: the patient as
   // a whole was registered.
   std::vector<BodyMotion> bodies;
+  double target_image_share = 0.0;  // of what is known about where the target lies; springs between bodies are the rest
   double target_deformation_mm = 0.0;  // how far the target's surface lies from where a rigid motion puts it, at most
   double seconds = 0.0, seconds_rendering = 0.0, seconds_similarity = 0.0;  // in all, and of that in the search
 

@@ -30,15 +30,15 @@ JointedBodies with_soft_tissue_held(JointedBodies bodies, double sigmas) {
 
 // One climb of all slots from their base.
 OptimizerResult climb_from_base(const BodyObjective& objective, const PoseSlots& slots, const BodyStage& stage,
-                                const BodySearchOptions& limits) {
+                                double bound_mm) {
   const std::size_t count = kParameters * slots.count();
   const OptimizerOptions options{.kind = OptimizerKind::kLevenbergMarquardt,
                                  .start = std::vector<double>(count, 0.0),
-                                 .lower = std::vector<double>(count, -limits.bound_mm),
-                                 .upper = std::vector<double>(count, limits.bound_mm),
+                                 .lower = std::vector<double>(count, -bound_mm),
+                                 .upper = std::vector<double>(count, bound_mm),
                                  .initial_step = std::vector<double>(count, stage.initial_step_mm),
                                  .relative_tolerance = 0.01,
-                                 .least_gain = limits.least_gain,
+                                 .least_gain = stage.least_gain,
                                  .max_evaluations = stage.max_evaluations};
   const BatchModel models = [&](std::span<const std::vector<double>> points) {
     std::vector<QuadraticModel> result;
@@ -48,24 +48,20 @@ OptimizerResult climb_from_base(const BodyObjective& objective, const PoseSlots&
   return climb(models, std::span(&options, 1)).front();
 }
 
-// The smallest share of `part` in `whole`, over all directions; `whole` is positive definite.
-double least_share(const Eigen::Matrix3d& part, const Eigen::Matrix3d& whole) {
-  const Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::Matrix3d> eigen(part, whole, Eigen::EigenvaluesOnly);
-  return std::clamp(eigen.eigenvalues().minCoeff(), 0.0, 1.0);
-}
-
 // What is known about the bodies where they were found.
 void report_certainty(const BodyObjective& objective, const PoseSlots& slots, BodySearchResult& result) {
   const std::vector<double> at_base(kParameters * slots.count(), 0.0);
   const BodyObjective::Parts parts = objective.parts(slots, at_base);
   const Eigen::MatrixXd images = parts.of_all_views().curvature;
-  const Eigen::MatrixXd whole = images + parts.springs.curvature;
   const Eigen::MatrixXd motions = slots.motions_of_bodies(at_base);
-  result.covariance = motions * whole.ldlt().solve(motions.transpose());
-  for (std::size_t body = 0; body < result.poses.size(); ++body) {
-    const auto at = static_cast<Eigen::Index>(kParameters * slots.of(body, 0));
-    result.image_shares.push_back(least_share(images.block<3, 3>(at, at), whole.block<3, 3>(at, at)));
-  }
+  const auto covariance = [&](double spring_weight) -> Eigen::MatrixXd {
+    const Eigen::MatrixXd whole = images + spring_weight * parts.springs.curvature;
+    return motions * whole.ldlt().solve(motions.transpose());
+  };
+  const QuadraticModel all = weighted_sum(1.0, parts.of_all_views(), 1.0, parts.springs);
+  result.motions_left = motions * all.curvature.ldlt().solve(all.gradient);
+  result.covariance = covariance(1.0);
+  result.covariance_on_loose_springs = covariance(0.25);
 }
 
 StageReport report_of(const BodyStage& stage, const OptimizerResult& climbed, double seconds) {
@@ -85,6 +81,13 @@ StageReport report_of(const BodyStage& stage, const OptimizerResult& climbed, do
 
 }  // namespace
 
+double image_share(const Eigen::Matrix3d& covariance, const Eigen::Matrix3d& on_loose_springs) {
+  // Variances of what images alone show do not grow; those of what springs alone hold grow fourfold.
+  const Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::Matrix3d> growth(on_loose_springs, covariance,
+                                                                         Eigen::EigenvaluesOnly);
+  return std::clamp((4.0 - growth.eigenvalues().maxCoeff()) / 3.0, 0.0, 1.0);
+}
+
 BodySearchResult search_bodies(const BodyScene& scene, const Eigen::Isometry3d& whole_room_from_patient,
                                const BodySearchOptions& options, const SearchProgress& progress) {
   BodySearchResult result;
@@ -99,7 +102,7 @@ BodySearchResult search_bodies(const BodyScene& scene, const Eigen::Isometry3d& 
     const JointedBodies held = with_soft_tissue_held(scene.bodies, stage.soft_sigmas);
     const BodyObjective objective(held, scene.renderers, pixels, stage.tile_mm);
     const PoseSlots slots(scene.bodies, scene.renderers, result.poses);
-    const OptimizerResult climbed = climb_from_base(objective, slots, stage, options);
+    const OptimizerResult climbed = climb_from_base(objective, slots, stage, options.bound_mm);
     result.poses = slots.poses(climbed.best);
     const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - begin;
     result.stages.push_back(report_of(stage, climbed, seconds.count()));

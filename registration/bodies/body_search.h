@@ -19,7 +19,8 @@ struct BodyStage {
   // keep the bones there.
   double soft_sigmas = 1.0;
   double initial_step_mm = 2.0;  // of the parameters of all bodies together: first trust-region radius
-  int max_evaluations = 20;
+  double least_gain = 0.1;       // of the logarithm of probability: the stage ends when no step promises more
+  int max_evaluations = 25;
 };
 
 struct BodySearchOptions {
@@ -31,20 +32,23 @@ struct BodySearchOptions {
                                     .initial_step_mm = 4.0},
                                    {.pixel_mm = 2.0},
                                    {.pixel_mm = 1.3, .tile_mm = 10.0, .initial_step_mm = 1.0}};
-  double voxel_mm = 1.4;    // the CT is reduced to voxels up to this edge
-  double bound_mm = 40.0;   // of every parameter and stage
-  double least_gain = 0.1;  // of the logarithm of probability: a stage ends when no step promises more
+  double voxel_mm = 1.4;   // the CT is reduced to voxels up to this edge
+  double bound_mm = 40.0;  // of every parameter and stage
 };
 
 struct BodySearchResult {
   BodyPoses poses;
   // Of the motions of all bodies, in the first view for those that breathe: in the room, about the isocenter, in the
-  // units of MotionDerivatives, six after six. Its own share of what is known about a body's place in the direction
-  // that is known least; springs and neighbors are the rest.
-  Eigen::MatrixXd covariance;
-  std::vector<double> image_shares;
+  // units of MotionDerivatives, six after six. And the same if the sigmas of all springs were twice as large: what the
+  // images show does not change by that.
+  Eigen::MatrixXd covariance, covariance_on_loose_springs;
+  Eigen::VectorXd motions_left;  // the same: how far the model would still go
   std::vector<StageReport> stages;
 };
+
+// What share of what is known about a place comes from the images, in the direction that is known least from them; the
+// rest comes from springs. Covariances of the place, in mm.
+double image_share(const Eigen::Matrix3d& covariance, const Eigen::Matrix3d& on_loose_springs);
 
 // A patient whose bodies can be rendered: what searches share.
 struct BodyScene {

@@ -4,6 +4,8 @@
 #include <limits>
 #include <numeric>
 
+#include "geometry/rotation.h"
+
 namespace isoshift {
 namespace {
 
@@ -81,6 +83,12 @@ CarriedTarget Carriers::target_at(const BodySearchResult& found) const {
                  (moved(extent_room_mm_[n], at_extent_[n]) - target.setup_error * extent_room_mm_[n]).norm());
   const Eigen::MatrixXd per_motions = motion_per_motions();
   target.covariance = per_motions * found.covariance * per_motions.transpose();
+  Eigen::Matrix<double, 3, 6> at_center;
+  at_center << Eigen::Matrix3d::Identity(), -cross_matrix(target.setup_error * center_room_mm_);
+  const Eigen::MatrixXd to_center = at_center * per_motions;
+  target.image_share = image_share(to_center * found.covariance * to_center.transpose(),
+                                   to_center * found.covariance_on_loose_springs * to_center.transpose());
+  target.left_mm = (to_center * found.motions_left).norm();
   return target;
 }
 

@@ -16,6 +16,8 @@ struct CarriedTarget {
   Eigen::Isometry3d setup_error = Eigen::Isometry3d::Identity();
   Eigen::Matrix<double, 6, 6> covariance = Eigen::Matrix<double, 6, 6>::Zero();
   double deformation_mm = 0.0;  // at most
+  double image_share = 0.0;     // of what is known about its center
+  double left_mm = 0.0;         // how far the search would still move its center
 };
 
 class Carriers {

@@ -21,6 +21,7 @@ using Eigen::Vector3d;
 // Of the target's motion, in nats per mm^2: 1 at 14 mm. It holds what a view alone does not see.
 constexpr double kSpring = 0.01;
 constexpr double kNearTargetMm = 30.0;
+constexpr double kConvergedMm = 0.1;
 
 std::set<Beam> beams_of(std::span<const FixedImage> images) {
   std::set<Beam> beams;
@@ -102,13 +103,16 @@ std::vector<BodyMotion> motions_of(const JointedBodies& bodies, const BodyRender
     at_center << Eigen::Matrix3d::Identity(), -cross_matrix(found.poses[n].front() * renderers.center_patient_mm(n));
     const Eigen::MatrixXd per_motions = at_center * difference;
     const Vector3d variance = (per_motions * found.covariance * per_motions.transpose()).diagonal();
+    Eigen::MatrixXd own = Eigen::MatrixXd::Zero(3, difference.cols());
+    own.middleCols<6>(static_cast<Eigen::Index>(6 * n)) = at_center;
     motions.push_back({.name = bodies.bodies[n].name,
                        .center_room_mm = center,
                        .displacement_mm = against * center - center,
                        .rotation_rad = turn.angle() * turn.axis(),
                        .sigma_mm = variance.cwiseSqrt(),
                        .carries_target = carriers.shares()[n],
-                       .image_share = found.image_shares[n],
+                       .image_share = image_share(own * found.covariance * own.transpose(),
+                                                  own * found.covariance_on_loose_springs * own.transpose()),
                        .breathes = bodies.bodies[n].breathes});
   }
   return motions;
@@ -200,7 +204,10 @@ void register_bodies(const BentPatient& patient, std::span<const FixedImage> ima
   result.actual_room_from_patient = target.setup_error * start_room_from_patient;
   result.uncertainty = uncertainty_of(target.covariance);
   result.target_deformation_mm = target.deformation_mm;
+  result.target_image_share = target.image_share;
   std::ranges::copy(found.stages, std::back_inserter(result.stages));
+  // Soft tissue may still creep. What counts is the target.
+  result.stages.back().reached_limit = result.stages.back().reached_limit && target.left_mm > kConvergedMm;
   report_match(scene, carriers, target, patient.target.center_room_mm, found, result);
   result.bodies = motions_of(patient.parts.bodies, renderers, carriers, target, start_room_from_patient, found);
   std::ranges::copy(compare_levels(scene, carriers, whole_pose, search), std::back_inserter(result.alternatives));

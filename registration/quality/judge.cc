@@ -27,7 +27,7 @@ constexpr double kMaxSpreadMm = 1.0, kMaxSpreadRad = rad_from_deg(1.0);
 // distance 2 % off in one of them 0.68 mm and more (docs/evaluation.md).
 constexpr double kMaxContradictionMm = 0.5, kMaxContradictionSigmas = 3.0;
 constexpr double kMaxTwoSigmaMm = 1.0, kMaxTwoSigmaRad = rad_from_deg(1.0);
-constexpr double kMinImageShare = 0.2, kMaxDeformationMm = 2.0;
+constexpr double kMinImageShare = 0.3, kMaxDeformationMm = 2.0;
 // What carries a target is small, and turns less surely than a whole patient; what counts is where its surface lies.
 constexpr double kMaxTwoSigmaRadOfBodies = rad_from_deg(2.0);
 // An alternative must leave this much more unexplained (1 - gradient correlation) than the images as they are. On head
@@ -116,12 +116,10 @@ void judge_contradiction(RegistrationResult& result) {
 
 // The answer is that of the bodies that carry the target: they must be seen, and the target must not be bent itself.
 void judge_bodies(RegistrationResult& result) {
-  double image_share = 0.0;
-  for (const BodyMotion& body : result.bodies) image_share += body.carries_target * body.image_share;
-  if (!(image_share >= kMinImageShare))
+  if (!(result.target_image_share >= kMinImageShare))
     review(result, fmt::format("the images hardly show the bodies that carry the target: {:.0f} % of what is known of "
                                "their place comes from them, the rest from their neighbors",
-                               100.0 * image_share));
+                               100.0 * result.target_image_share));
   if (!(result.target_deformation_mm <= kMaxDeformationMm))
     review(result,
            fmt::format("the target itself is bent: parts of its surface lie up to {:.1f} mm off when its center "

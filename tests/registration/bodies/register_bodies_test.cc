@@ -1,0 +1,104 @@
+// The target of a patient who bent is right, whatever the rest did, and what does not match is not accepted.
+
+#include "registration/bodies/register_bodies.h"
+
+#include <gtest/gtest.h>
+
+#include "registration/presets.h"
+#include "tests/support/bent_scene.h"
+
+namespace isoshift {
+namespace {
+
+using Eigen::Vector3d;
+
+std::vector<MovedGroup> bent_motions() {
+  return {{.translation_mm = {1.0, -2.0, 1.5}, .rotation_deg = {-3.0, 1.0, 0.5}},
+          {.translation_mm = {2.0, -1.0, 0.5}, .rotation_deg = {-0.5, 0.5, 1.0}},
+          {.translation_mm = {2.5, -1.0, 0.0}, .rotation_deg = {2.0, -1.0, 1.5}}};
+}
+
+// The scene's bodies as those of a patient who is bone all over; the target lies in the middle one.
+BentPatient patient_of(const BentScene& scene) {
+  BentPatient patient{.ct_hu = scene.ct, .attenuation = {}, .parts = {}, .target = {}};
+  patient.parts.bodies = scene.bodies;
+  patient.parts.carried = scene.bodies.shares;
+  patient.parts.to_bone_mm = Volume<float>(scene.ct.size, scene.ct.patient_from_voxel);
+  patient.target.name = "PTV";
+  for (int axis = 0; axis < 3; ++axis)
+    for (const double side : {-8.0, 8.0}) patient.target.extent_room_mm.push_back(side * Vector3d::Unit(axis));
+  return patient;
+}
+
+RegistrationResult registered(const BentScene& scene, const std::vector<FixedImage>& images,
+                              const RegistrationOptions& options) {
+  const RendererPyramid renderers(RendererKind::kCpu, scene.ct, {}, std::array{Beam::kKilovoltage});
+  RegistrationResult result = register_views(renderers, images, scene.planned, options);
+  register_bodies(patient_of(scene), images, scene.planned, options, result);
+  return result;
+}
+
+TEST(RegisterBodies, TheTargetIsRightAndTheRestIsSaid) {
+  const BentScene scene = bent_column(bent_motions());
+  const RegistrationResult result = registered(scene, scene.images, preset("setup"));
+  const Eigen::Isometry3d found = result.actual_room_from_patient * scene.planned.inverse();
+  for (int n = 0; n < 8; ++n) {
+    const Vector3d place = 7.5 * Vector3d(2 * (n & 1) - 1, 2 * ((n >> 1) & 1) - 1, 2 * (n >> 2) - 1);
+    EXPECT_LT((found * place - scene.truth[1] * place).norm(), 0.8);  // with voxels of 2 mm
+  }
+  ASSERT_EQ(result.bodies.size(), 3U);
+  EXPECT_GT(result.bodies[1].carries_target, 0.9);
+  EXPECT_LT(result.bodies[1].displacement_mm.norm(), 0.2) << "the target's own body does not move against it";
+  for (const std::size_t other : {std::size_t{0}, std::size_t{2}}) {
+    const Vector3d center = result.bodies[other].center_room_mm;
+    const Vector3d truth = scene.truth[1].inverse() * scene.truth[other] * center - center;
+    EXPECT_LT((result.bodies[other].displacement_mm - truth).norm(), 1.2) << "body " << other;
+    EXPECT_TRUE(result.bodies[other].is_determined());
+  }
+  EXPECT_GT(result.target_image_share, 0.5);
+  for (const ViewMatch& view : result.views) EXPECT_GT(view.similarity_final, 0.8);
+}
+
+// Freedom to bend must not let in what is not this patient.
+TEST(RegisterBodies, AnotherPatientIsNotAccepted) {
+  const BentScene scene = bent_column(bent_motions());
+  // Where the CT shows vertebrae 1 to 3, the X-rays show 4 to 6 of another column.
+  const BentScene other = bent_column(std::vector<MovedGroup>(6, {.translation_mm = {0.0, -54.0, 0.0}}));
+  const RegistrationResult result = registered(scene, other.images, preset("setup"));
+  EXPECT_NE(result.verdict, Verdict::kAccepted);
+}
+
+TEST(RegisterBodies, WithoutBoneNearTheTargetTheWholeAnswersForReview) {
+  const BentScene scene = bent_column(bent_motions());
+  const RendererPyramid renderers(RendererKind::kCpu, scene.ct, {}, std::array{Beam::kKilovoltage});
+  const RegistrationOptions options = preset("fast");
+  const RegistrationResult whole = register_views(renderers, scene.images, scene.planned, options);
+  RegistrationResult result = whole;
+  BentPatient patient = patient_of(scene);
+  std::ranges::fill(patient.parts.to_bone_mm.voxels, 25.0F);
+  register_bodies(patient, scene.images, scene.planned, options, result);
+  EXPECT_EQ(result.actual_room_from_patient.matrix(), whole.actual_room_from_patient.matrix());
+  EXPECT_TRUE(result.bodies.empty());
+  EXPECT_NE(result.verdict, Verdict::kAccepted);
+  ASSERT_FALSE(result.reasons.empty());
+  EXPECT_NE(result.reasons.back().find("no bone"), std::string::npos) << result.reasons.back();
+}
+
+TEST(RegisterBodies, OnlyPatientsWithoutAnAcceptableAnswerMayHaveBent) {
+  RegistrationResult whole;
+  whole.verdict = Verdict::kReview;
+  RegistrationOptions options = preset("setup");
+  EXPECT_TRUE(may_have_bent(options, whole));
+  EXPECT_FALSE(may_have_bent(preset("fast"), whole)) << "it leaves out the checks";
+  options.dof = Dof::kTranslation;
+  EXPECT_FALSE(may_have_bent(options, whole));
+  options.dof = Dof::kRigid;
+  whole.unobservable_room = {Vector3d::UnitX()};
+  EXPECT_FALSE(may_have_bent(options, whole));
+  whole.unobservable_room.clear();
+  whole.verdict = Verdict::kAccepted;
+  EXPECT_FALSE(may_have_bent(options, whole));
+}
+
+}  // namespace
+}  // namespace isoshift
