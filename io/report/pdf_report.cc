@@ -94,11 +94,13 @@ class PdfReport {
     for (std::size_t n = 0; n < page_.who.size(); ++n) {
       if (n >= kMost - 1 && page_.who.size() > kMost && n + 1 < page_.who.size()) continue;  // the last one says when
       const ReportPage::Row& row = page_.who[n];
-      const bool is_patient = row.name == "Patient";
+      const bool is_patient = row.name == "Patient", is_bent = row.name == kBent;
       canvas_.text(kMargin, y_, row.name, {.size = 8.0, .color = color::kGray});
-      y_ += canvas_.text(
-                kMargin + 58.0, y_ - (is_patient ? 1.5 : 0.0), row.value,
-                {.size = is_patient ? 10.5 : 8.5, .bold = is_patient, .width = kWidth - 58.0, .one_line = true}) +
+      y_ += canvas_.text(kMargin + 58.0, y_ - (is_patient ? 1.5 : 0.0), row.value,
+                         {.size = is_patient ? 10.5 : 8.5,
+                          .bold = is_patient || is_bent,
+                          .width = kWidth - 58.0,
+                          .one_line = !is_bent}) +
             1.0;
     }
     y_ += kGap;
