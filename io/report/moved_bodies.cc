@@ -18,7 +18,8 @@ constexpr double kLeastMm = 2.0, kLeastDeg = 2.0;
 // What each axis of the patient (left, back, head) means, for positive and negative components. A bone is tilted the
 // way its end toward the head goes, and turned the way its front goes.
 using AxisWords = std::array<std::array<const char*, 2>, 3>;
-constexpr AxisWords kWays = {{{"left", "right"}, {"back", "front"}, {"head", "feet"}}};
+constexpr AxisWords kWays = {
+    {{"to the left", "to the right"}, {"to the back", "to the front"}, {"toward the head", "toward the feet"}}};
 constexpr AxisWords kTurns = {{{"tilted forward", "tilted backward"},
                                {"tilted to the left", "tilted to the right"},
                                {"turned to the left", "turned to the right"}}};
@@ -42,14 +43,19 @@ std::string angle_words(const Moved& body) {
   return (text.starts_with('+') ? text.substr(1) : text) + " deg";
 }
 
-std::string the(const std::string& name) { return "the " + printable(name); }
+// "Vertebra 3 toward the head" is a name of its own.
+std::string the(const std::string& name) {
+  constexpr std::string_view kNumbered = "vertebra ";
+  const bool is_numbered = name.starts_with(kNumbered) && name.find_first_of("0123456789") == kNumbered.size();
+  return (is_numbered ? "" : "the ") + printable(name);
+}
 
 bool is_plural(const std::string& name) { return name.find("bones") != std::string::npos; }
 
 std::string lies_off(const Moved& body, LengthUnit unit) {
   const std::string way = strongest(body.direction_patient, kWays);
   return fmt::format("{} {} off{}", is_plural(body.name) ? "lie" : "lies", length_words(body, unit),
-                     way.empty() ? "" : fmt::format(" (to the {})", way));
+                     way.empty() ? "" : fmt::format(" ({})", way));
 }
 
 std::string is_turned(const Moved& body) {
@@ -64,7 +70,7 @@ std::string value_of(const Moved& body, LengthUnit unit) {
     words = fmt::format("{} +/- {} {}", unsigned_length(*body.mm, unit, body.two_sigma_mm),
                         rounded_up_length(*body.two_sigma_mm, unit), name_of(unit));
     const std::string way = strongest(body.direction_patient, kWays), turn = strongest(body.axis_patient, kTurns);
-    if (!way.empty() && !is_zero(unsigned_length(*body.mm, unit, body.two_sigma_mm))) words += ", to the " + way;
+    if (!way.empty() && !is_zero(unsigned_length(*body.mm, unit, body.two_sigma_mm))) words += ", " + way;
     words += "; " + angle_words(body);
     if (!turn.empty() && !is_zero(angle_words(body))) words += ", " + turn;
   }
@@ -85,8 +91,8 @@ std::string bent_words(const ShownShift& shown, LengthUnit unit) {
     if (*body.mm > kLeastMm && (farthest == nullptr || *body.mm > *farthest->mm)) farthest = &body;
     if (*body.deg > kLeastDeg && (most_turned == nullptr || *body.deg > *most_turned->deg)) most_turned = &body;
   }
-  if (std::ranges::none_of(shown.moved, counts)) return "what the bones did against the target is not determined";
-  const std::string once = "once the target is right, ";
+  if (std::ranges::none_of(shown.moved, counts)) return "What the bones did against the target is not determined";
+  const std::string once = "Once the target is right, ";
   if (farthest == nullptr && most_turned == nullptr)
     return fmt::format("{}no bone that is determined lies more than {} {} off or is turned by more than {:.0f} deg",
                        once, unsigned_length(kLeastMm, unit), name_of(unit), kLeastDeg);

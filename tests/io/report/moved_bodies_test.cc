@@ -22,7 +22,7 @@ std::vector<ReportPage::Row> rows_of(const SetupResult& report) {
 
 TEST(MovedBodies, TheFarthestAndTheMostTurnedBoneAreNamed) {
   EXPECT_EQ(words_of(bent_report(Verdict::kAccepted)),
-            "once the target is right, the vertebra 3 toward the feet lies 9.2 mm off (to the left); the vertebra 2 "
+            "Once the target is right, vertebra 3 toward the feet lies 9.2 mm off (to the left); vertebra 2 "
             "toward the head is tilted backward by 4.0 deg against it");
 }
 
@@ -31,7 +31,7 @@ TEST(MovedBodies, ABoneThatIsBothIsNamedOnce) {
   report.bodies[0].name = "right bones 60 mm toward the feet";
   report.bodies[0].rotation_rad = {0.0, 0.1, 0.0};  // about the room's y: toward the head
   EXPECT_EQ(words_of(report),
-            "once the target is right, the right bones 60 mm toward the feet lie 9.2 mm off (to the left) and are "
+            "Once the target is right, the right bones 60 mm toward the feet lie 9.2 mm off (to the left) and are "
             "turned to the left by 5.7 deg");
 }
 
@@ -54,7 +54,7 @@ TEST(MovedBodies, SmallMotionsAreNotToldAsMotions) {
     body.rotation_rad *= 0.1;
   }
   EXPECT_EQ(words_of(report),
-            "once the target is right, no bone that is determined lies more than 2.0 mm off or is turned by more than "
+            "Once the target is right, no bone that is determined lies more than 2.0 mm off or is turned by more than "
             "2 deg");
 }
 
@@ -62,7 +62,7 @@ TEST(MovedBodies, WhatIsNotDeterminedOrBreathesIsNotNamed) {
   SetupResult report = bent_report(Verdict::kAccepted);
   EXPECT_THAT(words_of(report), Not(HasSubstr("bones")));
   for (BodyMotion& body : report.bodies) body.image_share = 0.0;
-  EXPECT_EQ(words_of(report), "what the bones did against the target is not determined");
+  EXPECT_EQ(words_of(report), "What the bones did against the target is not determined");
 }
 
 TEST(MovedBodies, TheTableBeginsAtTheTarget) {
@@ -90,7 +90,7 @@ TEST(MovedBodies, EveryFormatTellsItDirectlyBehindTheTarget) {
   EXPECT_EQ(page.who[1].name, "Target");
   EXPECT_EQ(page.who[2].name, kBent);
   for (const std::string& shown : {text_report(page), html_report(report, page)}) {
-    EXPECT_THAT(shown, HasSubstr("the vertebra 3 toward the feet lies 9.2 mm off"));
+    EXPECT_THAT(shown, HasSubstr("vertebra 3 toward the feet lies 9.2 mm off"));
     EXPECT_THAT(shown, HasSubstr("carries the target 62 %"));
     EXPECT_THAT(shown, HasSubstr("its surface lies at most 0.4 mm from where a rigid motion puts it"));
   }
