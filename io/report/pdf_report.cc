@@ -4,6 +4,7 @@
 
 #include "io/report/drawings.h"
 #include "io/report/formats.h"
+#include "io/report/moved_bodies.h"
 #include "setup/shown_shift.h"
 
 namespace isoshift {
@@ -319,13 +320,14 @@ class PdfReport {
   void section(const ReportPage::Section& section) {
     if (y_ + 30.0 > kBottom) next_page();
     y_ += canvas_.text(kMargin, y_, section.title, {.size = 9.5, .bold = true}) + 1.0;
+    const double names = section.title == kMovedTitle ? 150.0 : 108.0;  // its names are long, and no row may break
     for (const ReportPage::Row& row : section.rows) {
-      const TextStyle name{.size = 7.5, .color = color::kGray, .width = 108.0};
-      const TextStyle value{.size = 7.5, .width = kWidth - 116.0};
+      const TextStyle name{.size = 7.5, .color = color::kGray, .width = names};
+      const TextStyle value{.size = 7.5, .width = kWidth - names - 8.0};
       const double height = std::max(canvas_.text_height(row.name, name), canvas_.text_height(row.value, value));
       if (y_ + height > kBottom) next_page();
       canvas_.text(kMargin + 4.0, y_, row.name, name);
-      canvas_.text(kMargin + 116.0, y_, row.value, value);
+      canvas_.text(kMargin + names + 8.0, y_, row.value, value);
       y_ += height + 0.5;
     }
     y_ += kGap;

@@ -44,7 +44,7 @@ TEST(MovedBodies, WaysAreThoseOfThePatientHoweverHeLies) {
   EXPECT_THAT(words("HFS"), HasSubstr("(to the left)"));
   EXPECT_THAT(words("HFP"), HasSubstr("(to the right)"));
   EXPECT_THAT(words("FFS"), HasSubstr("(to the right)"));
-  EXPECT_THAT(words("unknown"), HasSubstr("lies 9.2 mm off; the"));
+  EXPECT_THAT(words("unknown"), HasSubstr("lies 9.2 mm off; vertebra 2"));
 }
 
 TEST(MovedBodies, SmallMotionsAreNotToldAsMotions) {
