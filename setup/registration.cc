@@ -25,7 +25,7 @@ const char* to_string(IrradiatedField::Origin origin) {
 
 bool BodyMotion::is_determined() const {
   constexpr double kMostSigmaMm = 2.0, kLeastShare = 0.1;
-  return sigma_mm.maxCoeff() <= kMostSigmaMm && image_share >= kLeastShare;
+  return (sigma_mm.array() <= kMostSigmaMm).all() && image_share >= kLeastShare;
 }
 
 void Registration::demote(Verdict to, std::string reason) {

@@ -1,5 +1,6 @@
 #include "setup/shown_shift.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "geometry/patient_setup.h"
@@ -44,6 +45,36 @@ std::vector<ShownShift::LeftOver> left_over(const SetupResult& result, const Eig
   for (const SetupResult::Point& point : points)
     left.push_back({point.name, left_over_mm(setup_error, result.table, shift, point.room_mm)});
   return left;
+}
+
+std::vector<ShownShift::Moved> moved_bodies(const SetupResult& result) {
+  std::optional<Eigen::Matrix3d> patient_from_room;
+  if (const auto position = patient_position_from(result.patient_position))
+    patient_from_room =
+        planned_room_from_patient(*position, result.table, Eigen::Vector3d::Zero()).linear().transpose();
+  const auto in_patient = [&](const Eigen::Vector3d& vector) {
+    return patient_from_room && vector.norm() > 0.0
+               ? std::optional(Eigen::Vector3d(*patient_from_room * vector.normalized()))
+               : std::nullopt;
+  };
+  const Eigen::Vector3d target = result.target ? result.target->center_room_mm : Eigen::Vector3d::Zero();
+  std::vector<ShownShift::Moved> all;
+  for (const BodyMotion& body : result.bodies) {
+    ShownShift::Moved& moved = all.emplace_back();
+    moved.name = body.name;
+    moved.from_target_mm = (body.center_room_mm - target).norm();
+    moved.carries_target = body.carries_target;
+    moved.breathes = body.breathes;
+    moved.is_determined = body.is_determined();
+    if (!moved.is_determined) continue;
+    moved.mm = body.displacement_mm.norm();
+    moved.two_sigma_mm = 2.0 * body.sigma_mm.maxCoeff();
+    moved.deg = deg_from_rad(body.rotation_rad.norm());
+    moved.direction_patient = in_patient(body.displacement_mm);
+    moved.axis_patient = in_patient(body.rotation_rad);
+  }
+  std::ranges::stable_sort(all, {}, &ShownShift::Moved::from_target_mm);
+  return all;
 }
 
 }  // namespace
@@ -93,6 +124,7 @@ ShownShift shown_shift(const SetupResult& result) {
     for (std::size_t axis = 0; axis < 3; ++axis)
       if (shown.couch_mm[axis]) shown.couch_sigma_mm[axis] = std::sqrt(variance[static_cast<Eigen::Index>(axis)]);
   }
+  if (!shown.withheld) shown.moved = moved_bodies(result);
   shown.can_rotate = {dof != CouchDof::kThree, dof == CouchDof::kSix, dof == CouchDof::kSix};
   if (!shown.withheld && result.unobservable_room.empty()) shown.left_over = left_over(result, setup_error, applied);
   if (!shown.withheld && result.site && result.site->level)

@@ -36,7 +36,19 @@ struct ShownShift {
     Eigen::Vector3d mm = Eigen::Vector3d::Zero();  // IEC 61217 fixed
   };
   std::vector<LeftOver> left_over;
-  ActionDecision decision;  // by the site's action level
+  // What a bone did against the target. Motions are those of a patient seen along his axes: left, back, head.
+  struct Moved {
+    std::string name;
+    double from_target_mm = 0.0;  // of its center, as planned
+    double carries_target = 0.0;
+    bool breathes = false;
+    bool is_determined = false;  // without it, there are no numbers
+    std::optional<double> mm, two_sigma_mm, deg;
+    // Unit vectors; nothing: it did not move, or the patient's position is not known.
+    std::optional<Eigen::Vector3d> direction_patient, axis_patient;
+  };
+  std::vector<Moved> moved;  // the nearest to the target first; empty: the patient as a whole was registered
+  ActionDecision decision;   // by the site's action level
 };
 ShownShift shown_shift(const SetupResult& result);
 

@@ -7,6 +7,7 @@
 #include "io/report/drawings.h"
 #include "io/report/formats.h"
 #include "io/report/html.h"
+#include "io/report/moved_bodies.h"
 #include "io/report/page.html.h"
 #include "io/report/polygons_json.h"
 
@@ -23,7 +24,10 @@ std::string list(const std::vector<std::string>& lines) {
 std::string rows(const std::vector<ReportPage::Row>& list_of_rows) {
   std::string html;
   for (const ReportPage::Row& row : list_of_rows)
-    html += fmt::format("<tr{}><th>{}</th><td>{}</td></tr>", row.name == "Patient" ? " class=\"patient\"" : "",
+    html += fmt::format("<tr{}><th>{}</th><td>{}</td></tr>",
+                        row.name == "Patient" ? " class=\"patient\""
+                        : row.name == kBent   ? " class=\"bent\""
+                                              : "",
                         html_escaped(row.name), html_escaped(row.value));
   return html;
 }
@@ -134,8 +138,8 @@ std::string in_script(const Json& json) {
 std::string details(const SetupResult& report, const ReportPage& page) {
   std::string html;
   for (const ReportPage::Section& section : page.details) {
-    html +=
-        fmt::format("<details><summary>{}</summary><table>{}</table>", html_escaped(section.title), rows(section.rows));
+    html += fmt::format("<details{}><summary>{}</summary><table>{}</table>",
+                        section.title == kMovedTitle ? " open" : "", html_escaped(section.title), rows(section.rows));
     if (section.title == "Search")
       html += svg_image(520, 110, "The similarity reached against the evaluations made",
                         [&](Canvas& canvas) { draw_convergence(canvas, 0, 0, 520, 110, report.stages); });

@@ -141,7 +141,23 @@ Json target_json(const SetupResult& report, const ShownShift& shown) {
           {"center_room_mm", array_of(target.center_room_mm)},
           {"extent_room_mm", extent},
           {"displacement_mm", displacement},
-          {"sigma_mm", sigma_json(report.uncertainty.has_value(), shown.target_sigma_mm)}};
+          {"sigma_mm", sigma_json(report.uncertainty.has_value(), shown.target_sigma_mm)},
+          {"deformation_mm", report.bodies.empty() ? Json(nullptr) : Json(report.target_deformation_mm)}};
+}
+
+Json bodies_json(const SetupResult& report) {
+  Json list = Json::array();
+  for (const BodyMotion& body : report.bodies)
+    list.push_back({{"name", body.name},
+                    {"center_room_mm", array_of(body.center_room_mm)},
+                    {"displacement_mm", array_of(body.displacement_mm)},
+                    {"rotation_deg", array_of(Eigen::Vector3d(body.rotation_rad.unaryExpr(&deg_from_rad)))},
+                    {"sigma_mm", array_of(body.sigma_mm)},
+                    {"carries_target", body.carries_target},
+                    {"image_share", body.image_share},
+                    {"breathes", body.breathes},
+                    {"is_determined", body.is_determined()}});
+  return list;
 }
 
 Json points_json(const SetupResult& report) {
@@ -253,6 +269,7 @@ std::string json_report(const SetupResult& report) {
                {"couch_target_deg", couch_target_json(shown)},
                {"couch_applied", couch_applied_json(report, shown)},
                {"target", target_json(report, shown)},
+               {"bodies", bodies_json(report)},
                {"uncertainty",
                 {{"translation_mm", sigma_json(report.uncertainty.has_value(), shown.sigma_mm)},
                  {"rotation_deg", sigma_json(report.uncertainty.has_value(), shown.sigma_deg)},

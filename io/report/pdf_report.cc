@@ -4,6 +4,7 @@
 
 #include "io/report/drawings.h"
 #include "io/report/formats.h"
+#include "io/report/moved_bodies.h"
 #include "setup/shown_shift.h"
 
 namespace isoshift {
@@ -94,11 +95,13 @@ class PdfReport {
     for (std::size_t n = 0; n < page_.who.size(); ++n) {
       if (n >= kMost - 1 && page_.who.size() > kMost && n + 1 < page_.who.size()) continue;  // the last one says when
       const ReportPage::Row& row = page_.who[n];
-      const bool is_patient = row.name == "Patient";
+      const bool is_patient = row.name == "Patient", is_bent = row.name == kBent;
       canvas_.text(kMargin, y_, row.name, {.size = 8.0, .color = color::kGray});
-      y_ += canvas_.text(
-                kMargin + 58.0, y_ - (is_patient ? 1.5 : 0.0), row.value,
-                {.size = is_patient ? 10.5 : 8.5, .bold = is_patient, .width = kWidth - 58.0, .one_line = true}) +
+      y_ += canvas_.text(kMargin + 58.0, y_ - (is_patient ? 1.5 : 0.0), row.value,
+                         {.size = is_patient ? 10.5 : 8.5,
+                          .bold = is_patient || is_bent,
+                          .width = kWidth - 58.0,
+                          .one_line = !is_bent}) +
             1.0;
     }
     y_ += kGap;
@@ -317,13 +320,14 @@ class PdfReport {
   void section(const ReportPage::Section& section) {
     if (y_ + 30.0 > kBottom) next_page();
     y_ += canvas_.text(kMargin, y_, section.title, {.size = 9.5, .bold = true}) + 1.0;
+    const double names = section.title == kMovedTitle ? 150.0 : 108.0;  // its names are long, and no row may break
     for (const ReportPage::Row& row : section.rows) {
-      const TextStyle name{.size = 7.5, .color = color::kGray, .width = 108.0};
-      const TextStyle value{.size = 7.5, .width = kWidth - 116.0};
+      const TextStyle name{.size = 7.5, .color = color::kGray, .width = names};
+      const TextStyle value{.size = 7.5, .width = kWidth - names - 8.0};
       const double height = std::max(canvas_.text_height(row.name, name), canvas_.text_height(row.value, value));
       if (y_ + height > kBottom) next_page();
       canvas_.text(kMargin + 4.0, y_, row.name, name);
-      canvas_.text(kMargin + 116.0, y_, row.value, value);
+      canvas_.text(kMargin + names + 8.0, y_, row.value, value);
       y_ += height + 0.5;
     }
     y_ += kGap;

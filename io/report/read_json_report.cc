@@ -127,6 +127,22 @@ std::optional<Target> target_from(const Json& json) {
   return target;
 }
 
+std::vector<BodyMotion> bodies_from(const Json& json) {
+  std::vector<BodyMotion> bodies;
+  for (const Json& body : json) {
+    const Json& sigma = body.at("sigma_mm");
+    bodies.push_back({.name = body.at("name"),
+                      .center_room_mm = vector_from<3>(body.at("center_room_mm")),
+                      .displacement_mm = vector_from<3>(body.at("displacement_mm")),
+                      .rotation_rad = vector_from<3>(body.at("rotation_deg")).unaryExpr(&rad_from_deg),
+                      .sigma_mm = {or_nan(sigma.at(0)), or_nan(sigma.at(1)), or_nan(sigma.at(2))},
+                      .carries_target = body.at("carries_target"),
+                      .image_share = or_nan(body.at("image_share")),
+                      .breathes = body.at("breathes")});
+  }
+  return bodies;
+}
+
 // A word that has a meaning here.
 template <class T>
 T one_of(const std::optional<T>& meaning, const char* place) {
@@ -208,6 +224,8 @@ SetupResult report_from(const Json& json) {
     report.points.push_back({.name = point.at("name"), .room_mm = vector_from<3>(point.at("room_mm"))});
   // Results of before 2026-11-23 do not say.
   if (json.contains("target")) report.target = target_from(json.at("target"));
+  if (json.contains("bodies")) report.bodies = bodies_from(json.at("bodies"));
+  if (!report.bodies.empty() && report.target) report.target_deformation_mm = json.at("target").at("deformation_mm");
   const Json& error = json.at("setup_error");
   report.setup_error.translation() = vector_from<3>(error.at("known_translation_mm"));
   for (std::size_t row = 0; row < 3; ++row)

@@ -8,6 +8,7 @@
 
 #include "geometry/rotation.h"
 #include "io/report/canvas.h"
+#include "io/report/moved_bodies.h"
 #include "io/report/report_sections.h"
 #include "io/report/rounding.h"
 #include "setup/shown_shift.h"
@@ -63,11 +64,6 @@ Quantity length(std::string name, const std::optional<double>& mm, const std::op
                   sigma_mm ? rounded_up_length(2.0 * *sigma_mm, unit) : "", sense);
 }
 
-std::string unsigned_length(double mm, LengthUnit unit) {
-  std::string text = rounded_length(mm, unit);
-  return text.starts_with('+') ? text.substr(1) : text;
-}
-
 Quantity angle(std::string name, double deg, const std::optional<double>& sigma_deg, const Sense& sense) {
   return quantity(std::move(name), deg, "deg", rounded(deg, twice(sigma_deg)),
                   sigma_deg ? rounded_up(2.0 * *sigma_deg) : "", sense);
@@ -107,7 +103,7 @@ std::string described_view(const SetupResult::View& view) {
                  view.origin.empty() ? "" : "angles " + printable(view.origin)});
 }
 
-std::vector<ReportPage::Row> who(const SetupResult& report) {
+std::vector<ReportPage::Row> who(const SetupResult& report, const std::string& bent) {
   const Identity& patient = report.identity;
   std::vector<ReportPage::Row> rows;
   rows.push_back(
@@ -117,6 +113,7 @@ std::vector<ReportPage::Row> who(const SetupResult& report) {
                printable(patient.patient_sex)})});
   if (report.target)
     rows.push_back({"Target", fmt::format("{} ({})", printable(report.target->name), report.target->chosen_by)});
+  if (!bent.empty()) rows.push_back({kBent, bent});
   rows.push_back({"Plan", report.plan_uid.empty()
                               ? "none; isocenter given by hand"
                               : joined({printable(report.plan_label), printable(report.plan_approval)})});
@@ -307,7 +304,7 @@ ReportPage report_page(const SetupResult& report) {
   page.title = "Patient setup shift";
   page.program = fmt::format("isoshift {} ({})", report.version, report.commit);
   page.disclaimer = "Not for clinical use unless validated by the site.";
-  page.who = who(report);
+  page.who = who(report, bent_words(shown, unit));
   page.verdict = report.verdict;
   page.verdict_words = fmt::format("{}: {}", upper_case(to_string(report.verdict)), meaning(report.verdict));
   page.reasons = all_printable(report.reasons);

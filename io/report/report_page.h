@@ -12,6 +12,7 @@
 namespace isoshift {
 
 inline constexpr const char* kNotDetermined = "not determined";
+inline constexpr const char* kBent = "Bent";  // the row that says what moved against the target
 
 // One rounded number with its name. `value` is "not determined" if the number is not determined.
 struct Quantity {

@@ -5,6 +5,7 @@
 
 #include "geometry/rotation.h"
 #include "io/report/canvas.h"
+#include "io/report/moved_bodies.h"
 #include "io/report/rounding.h"
 
 namespace isoshift {
@@ -49,6 +50,10 @@ ReportPage::Section target_section(const SetupResult& report, const ShownShift& 
   if (!shown.withheld) section.rows.push_back({"Center lies off plan by", words(shown.target_mm)});
   if (!shown.withheld && report.uncertainty)
     section.rows.push_back({"One sigma of that", words(shown.target_sigma_mm)});
+  if (!shown.moved.empty())
+    section.rows.push_back(
+        {"Deformation", fmt::format("its surface lies at most {} {} from where a rigid motion puts it",
+                                    unsigned_length(report.target_deformation_mm, unit), name_of(unit))});
   return section;
 }
 
@@ -157,6 +162,7 @@ std::vector<ReportPage::Section> report_sections(const SetupResult& report, cons
                                                  const ReportPage& page) {
   std::vector<ReportPage::Section> sections;
   if (report.target) sections.push_back(target_section(report, shown, unit));
+  if (!shown.moved.empty()) sections.push_back(moved_section(shown, unit));
   sections.push_back(geometry_section(report));
   if (!page.left_over.empty()) sections.push_back(left_over_section(page));
   for (const auto& section : {search_section(report), checks_section(report), provenance_section(report)})

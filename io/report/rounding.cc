@@ -35,6 +35,11 @@ std::string rounded_length(double mm, LengthUnit unit, std::optional<double> two
   return in_steps(mm, two_sigma_mm.value_or(0.0), unit == LengthUnit::kCm ? 1 : 0, false);
 }
 
+std::string unsigned_length(double mm, LengthUnit unit, std::optional<double> two_sigma_mm) {
+  std::string text = rounded_length(mm, unit, two_sigma_mm);
+  return text.starts_with('+') ? text.substr(1) : text;
+}
+
 std::string rounded_up_length(double two_sigma_mm, LengthUnit unit) {
   return in_steps(two_sigma_mm, two_sigma_mm, unit == LengthUnit::kCm ? 1 : 0, true);
 }

@@ -16,6 +16,7 @@ std::string rounded_up(double two_sigma);
 
 // A length in the unit of the site. The length is rounded in mm first: 4.25 mm is 4.3 mm or 0.43 cm.
 std::string rounded_length(double mm, LengthUnit unit, std::optional<double> two_sigma_mm = std::nullopt);
+std::string unsigned_length(double mm, LengthUnit unit, std::optional<double> two_sigma_mm = std::nullopt);
 std::string rounded_up_length(double two_sigma_mm, LengthUnit unit);
 const char* name_of(LengthUnit unit);
 

@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
+
 namespace isoshift {
 namespace {
 
@@ -55,7 +57,10 @@ std::string text_report(const ReportPage& page) {
   text += list("CONVENTIONS", page.conventions);
   for (const ReportPage::Section& section : page.details) {
     text += fmt::format("\n{}\n", upper_case(section.title));
-    for (const ReportPage::Row& row : section.rows) text += fmt::format("  {:<24} {}\n", row.name, row.value);
+    std::size_t width = 24;
+    for (const ReportPage::Row& row : section.rows)
+      if (row.name.size() <= 36) width = std::max(width, row.name.size());
+    for (const ReportPage::Row& row : section.rows) text += fmt::format("  {:<{}} {}\n", row.name, width, row.value);
   }
   return text;
 }

@@ -51,6 +51,31 @@ SetupResult oblique_report(Verdict verdict) {
   return report;
 }
 
+SetupResult bent_report(Verdict verdict) {
+  SetupResult report = oblique_report(verdict);
+  report.table = {};
+  report.target = Target{.name = "PTV", .chosen_by = "--target", .center_room_mm = {0, 10, 0}};
+  report.target_deformation_mm = 0.4;
+  const auto body = [](std::string name, double y_mm, const Eigen::Vector3d& mm, const Eigen::Vector3d& deg) {
+    return BodyMotion{.name = std::move(name),
+                      .center_room_mm = {0, y_mm, 0},
+                      .displacement_mm = mm,
+                      .rotation_rad = deg.unaryExpr(&rad_from_deg),
+                      .sigma_mm = {0.1, 0.2, 0.1},
+                      .image_share = 0.9};
+  };
+  // Head first, supine: y is toward the head, x to the patient's left, z to the front.
+  report.bodies = {body("vertebra 3 toward the feet", -70, {9.0, -2.0, 0.0}, {0.5, 0.0, 0.0}),
+                   body("vertebra nearest to the target", 5, {0.1, 0.0, 0.1}, {0.1, 0.0, 0.0}),
+                   body("vertebra 2 toward the head", 55, {0.0, 0.0, 3.0}, {-4.0, 0.5, 0.0}),
+                   body("front bones 60 mm toward the head", 75, {0.0, 0.0, 12.0}, {0.0, 6.0, 0.0}),
+                   body("left bones 120 mm toward the head", 125, {0.0, 30.0, 0.0}, {0.0, 0.0, 9.0})};
+  report.bodies[1].carries_target = 0.62;
+  report.bodies[3].breathes = true;
+  report.bodies[4].image_share = 0.05;
+  return report;
+}
+
 SiteRules small_couch() {
   return {.name = "Linac 3",
           .sha256 = std::string(64, 'b'),

@@ -13,6 +13,9 @@ SetupResult::View view_with_picture(const std::string& label);
 // head-oblique at its truth, the worked example of docs/conventions.md.
 SetupResult oblique_report(Verdict verdict);
 
+// The worked example in a patient who has bent: the spine toward the feet lies off, the one toward the head is turned.
+SetupResult bent_report(Verdict verdict);
+
 // A site with a couch of four degrees of freedom.
 SiteRules small_couch();
 

@@ -377,6 +377,17 @@ TEST(Report, SurvivesNamesThatAreNoText) {
   EXPECT_THAT(csv_report(report), Not(HasSubstr("\nVERDICT")));
 }
 
+TEST(Report, TheFirstPageSaysWhatMovedAndALaterOneHasTheTable) {
+  const SetupResult report = bent_report(Verdict::kAccepted);
+  const std::string first = text_of_pdf(report, 1), all = text_of_pdf(report);
+  EXPECT_THAT(first, HasSubstr("vertebra 3 toward the feet lies 9.2 mm off"));
+  EXPECT_THAT(first, HasSubstr("against it"));  // the line's end
+  EXPECT_THAT(first, HasSubstr("Approved by"));
+  EXPECT_THAT(first, Not(HasSubstr("What moved against the target")));
+  EXPECT_THAT(all, HasSubstr("What moved against the target"));
+  EXPECT_THAT(all, HasSubstr("carries the target 62 %"));
+}
+
 TEST(Report, FirstPageHoldsAllThatIsSigned) {
   SetupResult report = oblique_report(Verdict::kReview);
   report.site = small_couch();

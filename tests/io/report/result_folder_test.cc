@@ -6,6 +6,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <limits>
+#include <nlohmann/json.hpp>
+
 #include "base/error.h"
 #include "io/report/formats.h"
 #include "tests/support/command.h"
@@ -48,6 +51,42 @@ TEST_F(ResultFolderTest, IsReadBackWhole) {
   EXPECT_EQ(read.views[0].picture.drr_found.pixels, report_.views[0].picture.drr_found.pixels);
   EXPECT_EQ(csv_report(read), csv_report(report_));
   EXPECT_EQ(text_of(read), text_of(report_));
+}
+
+TEST_F(ResultFolderTest, WhatBodiesDidIsReadBack) {
+  const SetupResult bent = bent_report(Verdict::kAccepted);
+  const SetupResult read = report_from_json(json_report(bent), "result.json");
+  EXPECT_EQ(json_report(read), json_report(bent));
+  ASSERT_EQ(read.bodies.size(), bent.bodies.size());
+  EXPECT_EQ(read.target_deformation_mm, bent.target_deformation_mm);
+  for (std::size_t n = 0; n < bent.bodies.size(); ++n) {
+    EXPECT_EQ(read.bodies[n].name, bent.bodies[n].name);
+    EXPECT_EQ(read.bodies[n].displacement_mm, bent.bodies[n].displacement_mm);
+    EXPECT_LT((read.bodies[n].rotation_rad - bent.bodies[n].rotation_rad).norm(), 1e-12);
+    EXPECT_EQ(read.bodies[n].is_determined(), bent.bodies[n].is_determined());
+  }
+}
+
+TEST_F(ResultFolderTest, ResultsWithoutBodiesAreThoseOfTheWholePatient) {
+  auto json = nlohmann::json::parse(json_report(bent_report(Verdict::kAccepted)));
+  json.erase("bodies");
+  json["target"].erase("deformation_mm");
+  const SetupResult read = report_from_json(json.dump(), "result.json");
+  EXPECT_TRUE(read.bodies.empty());
+  const auto again = nlohmann::json::parse(json_report(read));
+  EXPECT_TRUE(again["bodies"].is_array());
+  EXPECT_TRUE(again["bodies"].empty());
+  EXPECT_TRUE(again["target"]["deformation_mm"].is_null());
+}
+
+// What is not a number is written as null; the body is then not determined.
+TEST_F(ResultFolderTest, ABodyWhoseSigmaIsNoNumberIsNotDetermined) {
+  SetupResult bent = bent_report(Verdict::kReview);
+  bent.bodies[0].sigma_mm.z() = std::numeric_limits<double>::quiet_NaN();
+  const auto json = nlohmann::json::parse(json_report(bent));
+  EXPECT_TRUE(json["bodies"][0]["sigma_mm"][2].is_null());
+  EXPECT_EQ(json["bodies"][0]["is_determined"], false);
+  EXPECT_FALSE(report_from_json(json.dump(), "result.json").bodies[0].is_determined());
 }
 
 TEST_F(ResultFolderTest, ThePdfIsADicomObjectToo) {
