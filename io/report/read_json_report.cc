@@ -225,7 +225,10 @@ SetupResult report_from(const Json& json) {
   // Results of before 2026-11-23 do not say.
   if (json.contains("target")) report.target = target_from(json.at("target"));
   if (json.contains("bodies")) report.bodies = bodies_from(json.at("bodies"));
-  if (!report.bodies.empty() && report.target) report.target_deformation_mm = json.at("target").at("deformation_mm");
+  if (!report.bodies.empty() && report.target) {
+    report.target_image_share = json.at("target").at("image_share");
+    report.target_deformation_mm = json.at("target").at("deformation_mm");
+  }
   const Json& error = json.at("setup_error");
   report.setup_error.translation() = vector_from<3>(error.at("known_translation_mm"));
   for (std::size_t row = 0; row < 3; ++row)

@@ -173,7 +173,7 @@ std::vector<Alternative> compare_levels(const BodyScene& scene, const Carriers& 
 bool may_have_bent(const RegistrationOptions& options, const RegistrationResult& whole) {
   const bool is_whole = options.region == nullptr || !options.region->has_volume();
   return is_whole && options.dof == Dof::kRigid && options.check_alternatives && whole.unobservable_room.empty() &&
-         whole.verdict != Verdict::kAccepted;
+         whole.verdict == Verdict::kReview;
 }
 
 void register_bodies(const BentPatient& patient, std::span<const FixedImage> images,

@@ -56,6 +56,7 @@ SetupResult bent_report(Verdict verdict) {
   report.table = {};
   report.target = Target{.name = "PTV", .chosen_by = "--target", .center_room_mm = {0, 10, 0}};
   report.target_deformation_mm = 0.4;
+  report.target_image_share = 0.7;
   const auto body = [](std::string name, double y_mm, const Eigen::Vector3d& mm, const Eigen::Vector3d& deg) {
     return BodyMotion{.name = std::move(name),
                       .center_room_mm = {0, y_mm, 0},

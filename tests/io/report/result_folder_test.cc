@@ -59,6 +59,7 @@ TEST_F(ResultFolderTest, WhatBodiesDidIsReadBack) {
   EXPECT_EQ(json_report(read), json_report(bent));
   ASSERT_EQ(read.bodies.size(), bent.bodies.size());
   EXPECT_EQ(read.target_deformation_mm, bent.target_deformation_mm);
+  EXPECT_EQ(read.target_image_share, bent.target_image_share);
   for (std::size_t n = 0; n < bent.bodies.size(); ++n) {
     EXPECT_EQ(read.bodies[n].name, bent.bodies[n].name);
     EXPECT_EQ(read.bodies[n].displacement_mm, bent.bodies[n].displacement_mm);

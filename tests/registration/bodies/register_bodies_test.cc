@@ -84,7 +84,7 @@ TEST(RegisterBodies, WithoutBoneNearTheTargetTheWholeAnswersForReview) {
   EXPECT_NE(result.reasons.back().find("no bone"), std::string::npos) << result.reasons.back();
 }
 
-TEST(RegisterBodies, OnlyPatientsWithoutAnAcceptableAnswerMayHaveBent) {
+TEST(RegisterBodies, OnlyPatientsWhoNeedAReviewMayHaveBent) {
   RegistrationResult whole;
   whole.verdict = Verdict::kReview;
   RegistrationOptions options = preset("setup");
@@ -96,8 +96,10 @@ TEST(RegisterBodies, OnlyPatientsWithoutAnAcceptableAnswerMayHaveBent) {
   whole.unobservable_room = {Vector3d::UnitX()};
   EXPECT_FALSE(may_have_bent(options, whole));
   whole.unobservable_room.clear();
-  whole.verdict = Verdict::kAccepted;
-  EXPECT_FALSE(may_have_bent(options, whole));
+  for (const Verdict verdict : {Verdict::kAccepted, Verdict::kRejected}) {
+    whole.verdict = verdict;
+    EXPECT_FALSE(may_have_bent(options, whole));
+  }
 }
 
 }  // namespace
