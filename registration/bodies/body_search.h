@@ -29,8 +29,9 @@ struct BodySearchOptions {
                                     .min_pixels = 2000,
                                     .tile_mm = 25.0,
                                     .soft_sigmas = 0.1,
-                                    .initial_step_mm = 4.0},
-                                   {.pixel_mm = 2.0},
+                                    .initial_step_mm = 4.0,
+                                    .least_gain = 0.5},
+                                   {.pixel_mm = 2.0, .least_gain = 1.0, .max_evaluations = 15},
                                    {.pixel_mm = 1.3, .tile_mm = 10.0, .initial_step_mm = 1.0}};
   double voxel_mm = 1.4;   // the CT is reduced to voxels up to this edge
   double bound_mm = 40.0;  // of every parameter and stage

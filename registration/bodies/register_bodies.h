@@ -16,8 +16,8 @@ struct BentPatient {
 };
 
 // Whether bodies may answer: what was found of the patient as a whole needs a review, nothing but the whole image was
-// chosen, and all six degrees of freedom were searched and checked. What is rejected shows other anatomy: freedom to bend
-// must not let it in.
+// chosen, and all six degrees of freedom were searched and checked. What is rejected shows other anatomy: freedom to
+// bend must not let it in.
 bool may_have_bent(const RegistrationOptions& options, const RegistrationResult& whole);
 
 // Searches all bodies from the pose of the whole, and judges again. In the result, pose, uncertainty, similarities and
