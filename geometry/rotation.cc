@@ -27,6 +27,17 @@ Eigen::Matrix3d rotation_z(double angle_rad) {
   return Eigen::AngleAxisd(angle_rad, Eigen::Vector3d::UnitZ()).toRotationMatrix();
 }
 
+Eigen::Vector3d rotation_vector(const Eigen::Matrix3d& rotation) {
+  const Eigen::AngleAxisd turn(rotation);
+  return turn.angle() * turn.axis();
+}
+
+Eigen::Matrix3d rotation_from_vector(const Eigen::Vector3d& vector) {
+  const double angle_rad = vector.norm();
+  if (!(angle_rad > 0.0)) return Eigen::Matrix3d::Identity();
+  return Eigen::AngleAxisd(angle_rad, vector / angle_rad).toRotationMatrix();
+}
+
 Eigen::Matrix3d rotation_from_zxy(const ZxyAngles& angles) {
   return rotation_z(angles.z_rad) * rotation_x(angles.x_rad) * rotation_y(angles.y_rad);
 }

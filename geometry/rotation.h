@@ -19,6 +19,10 @@ Eigen::Matrix3d rotation_x(double angle_rad);
 Eigen::Matrix3d rotation_y(double angle_rad);
 Eigen::Matrix3d rotation_z(double angle_rad);
 
+// The angle times the unit axis, and back.
+Eigen::Vector3d rotation_vector(const Eigen::Matrix3d& rotation);
+Eigen::Matrix3d rotation_from_vector(const Eigen::Vector3d& vector);
+
 // Angles of R = Rz(z_rad) * Rx(x_rad) * Ry(y_rad). For a couch: z is yaw, x is pitch, y is roll.
 struct ZxyAngles {
   double z_rad = 0.0;

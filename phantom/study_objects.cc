@@ -8,6 +8,7 @@
 #include <numbers>
 
 #include "io/dicom/decode.h"
+#include "phantom/dicom/setup_items.h"
 
 namespace isoshift {
 namespace {
@@ -23,19 +24,7 @@ struct CtLattice {
   Eigen::Affine3d patient_from_voxel = Eigen::Affine3d::Identity();
 };
 
-void put_common(DicomItem dataset, const Identity& identity, const char* sop_class, const std::string& sop_instance,
-                const char* modality, const std::string& series, const std::string& frame_of_reference) {
-  put_identity(dataset, identity);
-  dataset.put(DCM_SOPClassUID, sop_class);
-  dataset.put(DCM_SOPInstanceUID, sop_instance);
-  dataset.put(DCM_Modality, modality);
-  dataset.put(DCM_SeriesInstanceUID, series);
-  dataset.put(DCM_SeriesNumber, "1");
-  dataset.put(DCM_FrameOfReferenceUID, frame_of_reference);
-  dataset.put(DCM_PositionReferenceIndicator, "");
-  dataset.put(DCM_Manufacturer, "isoshift phantom");
-  dataset.put(DCM_OperatorsName, "");
-}
+constexpr const char* kManufacturer = "isoshift phantom";
 
 struct ScannedPart {
   Eigen::Vector3d extent_mm, center_from_isocenter_mm;
@@ -80,35 +69,6 @@ CtLattice lattice_of(const PhantomOptions& options) {
       options.placement.isocenter_patient_mm + part.center_from_isocenter_mm -
       0.5 * (lattice.patient_from_voxel.linear() * Eigen::Vector3d((lattice.size.array() - 1).cast<double>()));
   return lattice;
-}
-
-void put_beam(DicomItem beam, const PhantomOptions& options, int number, const std::string& name, double gantry_deg) {
-  beam.put(DCM_TreatmentMachineName, "PHANTOM");
-  beam.put(DCM_PrimaryDosimeterUnit, "MU");
-  beam.put(DCM_SourceAxisDistance, Imager{}.sad_mm);
-  beam.put_empty_sequence(DCM_BeamLimitingDeviceSequence);
-  beam.put(DCM_BeamNumber, number);
-  beam.put(DCM_BeamName, name);
-  beam.put(DCM_BeamType, "STATIC");
-  beam.put(DCM_RadiationType, "PHOTON");
-  beam.put(DCM_TreatmentDeliveryType, "SETUP");
-  for (const DcmTagKey& count : {DCM_NumberOfWedges, DCM_NumberOfCompensators, DCM_NumberOfBoli, DCM_NumberOfBlocks})
-    beam.put(count, 0);
-  beam.put(DCM_FinalCumulativeMetersetWeight, 0.0);
-  beam.put(DCM_NumberOfControlPoints, 1);
-  DicomItem point = beam.append_item(DCM_ControlPointSequence);
-  point.put(DCM_ControlPointIndex, 0);
-  point.put(DCM_CumulativeMetersetWeight, 0.0);
-  point.put(DCM_GantryAngle, gantry_deg);
-  point.put(DCM_GantryRotationDirection, "NONE");
-  point.put(DCM_BeamLimitingDeviceAngle, 0.0);
-  point.put(DCM_BeamLimitingDeviceRotationDirection, "NONE");
-  point.put(DCM_PatientSupportAngle, options.placement.couch_angle_deg);
-  point.put(DCM_PatientSupportRotationDirection, "NONE");
-  point.put(DCM_TableTopEccentricAngle, 0.0);
-  point.put(DCM_TableTopEccentricRotationDirection, "NONE");
-  point.put(DCM_IsocenterPosition, std::span(options.placement.isocenter_patient_mm.data(), 3));
-  beam.put(DCM_ReferencedPatientSetupNumber, 1);
 }
 
 // TM with fractions where there are any.
@@ -158,8 +118,8 @@ std::vector<std::string> write_ct(const PhantomOptions& options, const StudyUids
     DicomFile file;
     DicomItem dataset = file.dataset();
     instances.push_back(uids.next());
-    put_common(dataset, study.identity, UID_CTImageStorage, instances.back(), "CT", series_uid,
-               study.frame_of_reference);
+    put_common(dataset, study.identity,
+               {UID_CTImageStorage, instances.back(), "CT", series_uid, study.frame_of_reference}, kManufacturer);
     dataset.put(DCM_ImageType, "ORIGINAL\\PRIMARY\\AXIAL");
     dataset.put(DCM_BodyPartExamined, part_of(options.anatomy).name);
     dataset.put(DCM_PatientPosition, options.placement.patient_position);
@@ -192,8 +152,8 @@ std::string image_label(double gantry_angle_deg) { return fmt::format("KV_G{:03.
 void write_plan(const PhantomOptions& options, const StudyUids& study, const std::filesystem::path& path) {
   DicomFile file;
   DicomItem dataset = file.dataset();
-  put_common(dataset, study.identity, UID_RTPlanStorage, study.plan, "RTPLAN", study.plan_series,
-             study.frame_of_reference);
+  put_common(dataset, study.identity,
+             {UID_RTPlanStorage, study.plan, "RTPLAN", study.plan_series, study.frame_of_reference}, kManufacturer);
   dataset.put(DCM_RTPlanLabel, "SETUP");
   dataset.put(DCM_RTPlanDate, "20260228");
   dataset.put(DCM_RTPlanTime, "090000");
@@ -204,13 +164,7 @@ void write_plan(const PhantomOptions& options, const StudyUids& study, const std
   dataset.put(DCM_ReviewDate, "20260228");
   dataset.put(DCM_ReviewTime, "100000");
   dataset.put(DCM_ReviewerName, "Nobody^Real");
-  if (!options.bends.empty()) {
-    DicomItem reference = dataset.append_item(DCM_DoseReferenceSequence);
-    reference.put(DCM_DoseReferenceNumber, 1);
-    reference.put(DCM_DoseReferenceStructureType, "VOLUME");
-    reference.put(DCM_DoseReferenceType, "TARGET");
-    reference.put(DCM_ReferencedROINumber, 1);
-  }
+  if (!options.bends.empty()) put_target_reference(dataset);
   DicomItem group = dataset.append_item(DCM_FractionGroupSequence);
   group.put(DCM_FractionGroupNumber, 1);
   group.put(DCM_NumberOfFractionsPlanned, 1);
@@ -218,8 +172,14 @@ void write_plan(const PhantomOptions& options, const StudyUids& study, const std
   group.put(DCM_NumberOfBrachyApplicationSetups, 0);
   for (std::size_t n = 0; n < options.gantry_angles_deg.size(); ++n) {
     group.append_item(DCM_ReferencedBeamSequence).put(DCM_ReferencedBeamNumber, static_cast<double>(n + 1));
-    put_beam(dataset.append_item(DCM_BeamSequence), options, static_cast<int>(n + 1),
-             image_label(options.gantry_angles_deg[n]), options.gantry_angles_deg[n]);
+    put_setup_beam(dataset.append_item(DCM_BeamSequence),
+                   {.machine = "PHANTOM",
+                    .sad_mm = Imager{}.sad_mm,
+                    .number = static_cast<int>(n + 1),
+                    .name = image_label(options.gantry_angles_deg[n]),
+                    .gantry_deg = options.gantry_angles_deg[n],
+                    .couch_deg = options.placement.couch_angle_deg,
+                    .isocenter_patient_mm = options.placement.isocenter_patient_mm});
   }
   DicomItem setup = dataset.append_item(DCM_PatientSetupSequence);
   setup.put(DCM_PatientSetupNumber, 1);
@@ -245,8 +205,9 @@ void write_xray(const PhantomOptions& options, const StudyUids& study, const std
 
   DicomFile file;
   DicomItem dataset = file.dataset();
-  put_common(dataset, study.identity, UID_RTImageStorage, sop_instance_uid, "RTIMAGE", study.image_series,
-             study.image_frame_of_reference);
+  put_common(dataset, study.identity,
+             {UID_RTImageStorage, sop_instance_uid, "RTIMAGE", study.image_series, study.image_frame_of_reference},
+             kManufacturer);
   const double corner_mm = 0.5 * (imager.pixels - 1) * imager.pixel_mm;
   dataset.put(DCM_ImageType, imager.is_megavoltage ? "ORIGINAL\\PRIMARY\\PORTAL" : "ORIGINAL\\PRIMARY\\RADIOGRAPH");
   dataset.put(DCM_ConversionType, "DI");
@@ -293,8 +254,9 @@ void write_structures(const PhantomOptions& options, const StudyUids& study, Uid
   const DrawnTarget target = target_of(options.anatomy);
   DicomFile file;
   DicomItem dataset = file.dataset();
-  put_common(dataset, study.identity, UID_RTStructureSetStorage, study.structures, "RTSTRUCT", uids.next(),
-             study.frame_of_reference);
+  put_common(dataset, study.identity,
+             {UID_RTStructureSetStorage, study.structures, "RTSTRUCT", uids.next(), study.frame_of_reference},
+             kManufacturer);
   dataset.put(DCM_StructureSetLabel, "TARGET");
   dataset.put(DCM_StructureSetDate, "20260228");
   dataset.put(DCM_StructureSetTime, "090000");
@@ -306,37 +268,18 @@ void write_structures(const PhantomOptions& options, const StudyUids& study, Uid
   series.put(DCM_SeriesInstanceUID, study.ct_series);
   for (const std::string& instance : study.ct_instances)
     series.append_reference(DCM_ContourImageSequence, UID_CTImageStorage, instance);
-  DicomItem roi = dataset.append_item(DCM_StructureSetROISequence);
-  roi.put(DCM_ROINumber, 1);
-  roi.put(DCM_ReferencedFrameOfReferenceUID, study.frame_of_reference);
-  roi.put(DCM_ROIName, target.name);
-  roi.put(DCM_ROIGenerationAlgorithm, "AUTOMATIC");
-  DicomItem drawn = dataset.append_item(DCM_ROIContourSequence);
-  drawn.put(DCM_ReferencedROINumber, 1);
   const CtLattice lattice = lattice_of(options);
-  const Eigen::Vector3d& center_mm = options.placement.isocenter_patient_mm;
-  for (int k = 0; k < lattice.size.z(); ++k) {
-    const double z = (lattice.patient_from_voxel * Eigen::Vector3d(0, 0, k)).z() - center_mm.z();
-    if (std::abs(z) >= target.radius_mm) continue;
-    const double radius_mm = std::sqrt(target.radius_mm * target.radius_mm - z * z);
-    constexpr int kPoints = 36;
-    std::vector<double> points;
-    for (int n = 0; n < kPoints; ++n) {
-      const double angle = 2.0 * std::numbers::pi * n / kPoints;
-      const Eigen::Vector3d point =
-          center_mm + Eigen::Vector3d(radius_mm * std::cos(angle), radius_mm * std::sin(angle), z);
-      points.insert(points.end(), {point.x(), point.y(), point.z()});
-    }
-    DicomItem contour = drawn.append_item(DCM_ContourSequence);
-    contour.put(DCM_ContourGeometricType, "CLOSED_PLANAR");
-    contour.put(DCM_NumberOfContourPoints, kPoints);
-    contour.put(DCM_ContourData, points);
-  }
-  DicomItem observation = dataset.append_item(DCM_RTROIObservationsSequence);
-  observation.put(DCM_ObservationNumber, 1);
-  observation.put(DCM_ReferencedROINumber, 1);
-  observation.put(DCM_RTROIInterpretedType, target.interpreted_type);
-  observation.put(DCM_ROIInterpreter, "");
+  std::vector<double> slices_mm;
+  slices_mm.reserve(static_cast<std::size_t>(lattice.size.z()));
+  for (int k = 0; k < lattice.size.z(); ++k)
+    slices_mm.push_back((lattice.patient_from_voxel * Eigen::Vector3d(0, 0, k)).z());
+  put_ball_target(dataset,
+                  {.name = target.name,
+                   .interpreted_type = target.interpreted_type,
+                   .center_patient_mm = options.placement.isocenter_patient_mm,
+                   .radius_mm = target.radius_mm,
+                   .contour_points = 36},
+                  study.frame_of_reference, slices_mm, target.radius_mm);
   dataset.put(DCM_ApprovalStatus, "UNAPPROVED");
   file.write(path);
 }

@@ -21,13 +21,15 @@ Eigen::Matrix3d left_jacobian(const Eigen::Vector3d& rotation_vector) {
 
 Eigen::Isometry3d setup_error_from_parameters(std::span<const double> parameters) {
   Eigen::Isometry3d setup_error = Eigen::Isometry3d::Identity();
-  if (parameters.size() == 6) {
-    const Eigen::Vector3d rotation = Eigen::Vector3d(parameters.data() + 3) / kLeverMm;
-    if (const double angle_rad = rotation.norm(); angle_rad > 0.0)
-      setup_error.linear() = Eigen::AngleAxisd(angle_rad, rotation / angle_rad).toRotationMatrix();
-  }
+  if (parameters.size() == 6)
+    setup_error.linear() = rotation_from_vector(Eigen::Vector3d(parameters.data() + 3) / kLeverMm);
   setup_error.translation() = Eigen::Vector3d(parameters.data());
   return setup_error;
+}
+
+std::vector<double> parameters_from_setup_error(const Eigen::Isometry3d& setup_error) {
+  const Eigen::Vector3d t = setup_error.translation(), r = kLeverMm * rotation_vector(setup_error.linear());
+  return {t.x(), t.y(), t.z(), r.x(), r.y(), r.z()};
 }
 
 Eigen::Matrix<double, 6, Eigen::Dynamic> motions_per_parameter(std::span<const double> parameters) {

@@ -12,6 +12,7 @@ namespace isoshift {
 inline constexpr double kLeverMm = 100.0;
 
 Eigen::Isometry3d setup_error_from_parameters(std::span<const double> parameters);
+std::vector<double> parameters_from_setup_error(const Eigen::Isometry3d& setup_error);  // all six
 
 // How parameters move the patient: a 6 x n matrix from small changes of n parameters to the motion on top of the setup
 // error, in the room and about the isocenter, in the units of MotionDerivatives (drr/renderer.h): mm and rad. Rotations

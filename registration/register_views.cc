@@ -86,12 +86,11 @@ RegistrationResult register_views(const RendererPyramid& renderers, std::span<co
   options.check();
   const auto begin = std::chrono::steady_clock::now();
   const ProjectedRegion everything;
-  FixedViews fixed{.images = {images.begin(), images.end()},
+  FixedViews fixed{.images = restricted_to(options.rectangles, images),
                    .region = options.region != nullptr ? *options.region : everything};
   std::vector<XrayView> views;
   for (FixedImage& image : fixed.images) {
     views.push_back(image.view);
-    restrict_to(options.rectangles, image);
     if (options.eight_bit_xrays) round_to_eight_bit(image);
   }
   require_visible(renderers, fixed, start_room_from_patient);

@@ -51,7 +51,8 @@ may_include workflow base geometry bodies setup drr io registration
 may_include phantom base geometry setup io/dicom
 may_include cli base geometry bodies setup drr io registration workflow phantom
 # The campaign reads and writes DICOM with isoshift and has a geometry of its own.
-may_include tests/real_data/campaign base io/dicom tests/support
+may_include phantom/dicom io/dicom
+may_include tests/real_data/campaign base io/dicom phantom/dicom tests/support
 
 only_in 'dcmtk/' io phantom
 only_in 'opencv2/' registration/preprocess/

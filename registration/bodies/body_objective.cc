@@ -36,9 +36,9 @@ struct Stretch {
 
 Stretch stretch_of(const JointedBodies::Spring& spring, const Eigen::Isometry3d& a, const Eigen::Isometry3d& b) {
   const Eigen::Vector3d on_a = a * spring.at_patient_mm, on_b = b * spring.at_patient_mm;
-  const Eigen::AngleAxisd turn(a.linear() * b.linear().transpose());
   Stretch stretch;
-  stretch.sigmas << (on_a - on_b) / spring.sigma_mm, turn.angle() * turn.axis() / spring.sigma_rad;
+  stretch.sigmas << (on_a - on_b) / spring.sigma_mm,
+      rotation_vector(a.linear() * b.linear().transpose()) / spring.sigma_rad;
   stretch.by_a.setZero();
   stretch.by_a.topLeftCorner<3, 3>() = Eigen::Matrix3d::Identity() / spring.sigma_mm;
   stretch.by_a.bottomRightCorner<3, 3>() = Eigen::Matrix3d::Identity() / spring.sigma_rad;

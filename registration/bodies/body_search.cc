@@ -52,16 +52,14 @@ OptimizerResult climb_from_base(const BodyObjective& objective, const PoseSlots&
 void report_certainty(const BodyObjective& objective, const PoseSlots& slots, BodySearchResult& result) {
   const std::vector<double> at_base(kParameters * slots.count(), 0.0);
   const BodyObjective::Parts parts = objective.parts(slots, at_base);
-  const Eigen::MatrixXd images = parts.of_all_views().curvature;
+  const QuadraticModel images = parts.of_all_views();
   const Eigen::MatrixXd motions = slots.motions_of_bodies(at_base);
-  const auto covariance = [&](double spring_weight) -> Eigen::MatrixXd {
-    const Eigen::MatrixXd whole = images + spring_weight * parts.springs.curvature;
-    return motions * whole.ldlt().solve(motions.transpose());
-  };
-  const QuadraticModel all = weighted_sum(1.0, parts.of_all_views(), 1.0, parts.springs);
-  result.motions_left = motions * all.curvature.ldlt().solve(all.gradient);
-  result.covariance = covariance(1.0);
-  result.covariance_on_loose_springs = covariance(0.25);
+  const Eigen::MatrixXd whole = images.curvature + parts.springs.curvature;
+  const auto solver = whole.ldlt();
+  result.motions_left = motions * solver.solve(images.gradient + parts.springs.gradient);
+  result.covariance = motions * solver.solve(motions.transpose());
+  const Eigen::MatrixXd loose = images.curvature + 0.25 * parts.springs.curvature;
+  result.covariance_on_loose_springs = motions * loose.ldlt().solve(motions.transpose());
 }
 
 StageReport report_of(const BodyStage& stage, const OptimizerResult& climbed, double seconds) {
@@ -104,6 +102,7 @@ BodySearchResult search_bodies(const BodyScene& scene, const Eigen::Isometry3d& 
     const PoseSlots slots(scene.bodies, scene.renderers, result.poses);
     const OptimizerResult climbed = climb_from_base(objective, slots, stage, options.bound_mm);
     result.poses = slots.poses(climbed.best);
+    if (&stage == &options.stages.front()) result.poses_after_first_stage = result.poses;
     const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - begin;
     result.stages.push_back(report_of(stage, climbed, seconds.count()));
     if (progress) progress(static_cast<double>(result.stages.size()) / static_cast<double>(options.stages.size()));

@@ -38,7 +38,7 @@ struct BodySearchOptions {
 };
 
 struct BodySearchResult {
-  BodyPoses poses;
+  BodyPoses poses, poses_after_first_stage;
   // Of the motions of all bodies, in the first view for those that breathe: in the room, about the isocenter, in the
   // units of MotionDerivatives, six after six. And the same if the sigmas of all springs were twice as large: what the
   // images show does not change by that.

@@ -58,29 +58,36 @@ Eigen::MatrixXd Carriers::motion_per_motions() const {
   return per_motions;
 }
 
-CarriedTarget Carriers::target_at(const BodySearchResult& found) const {
-  const auto moved = [&](const Eigen::Vector3d& point, std::span<const double> shares) {
-    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-    for (std::size_t body = 0; body < shares.size(); ++body)
-      if (shares[body] > 0.0) sum += shares[body] * (found.poses[body].front() * (planned_.inverse() * point));
-    return sum;
-  };
+Eigen::Vector3d Carriers::moved(const Eigen::Vector3d& point, std::span<const double> shares,
+                                const BodyPoses& poses) const {
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (std::size_t body = 0; body < shares.size(); ++body)
+    if (shares[body] > 0.0) sum += shares[body] * (poses[body].front() * (planned_.inverse() * point));
+  return sum;
+}
+
+Eigen::Isometry3d Carriers::setup_error_at(const BodyPoses& poses) const {
   // The mean of the carriers' rotations, about that of the largest.
-  const auto largest = static_cast<std::size_t>(std::ranges::max_element(at_center_) - at_center_.begin());
-  const Eigen::Matrix3d about = found.poses[largest].front().linear();
+  const Eigen::Matrix3d about = poses[largest()].front().linear();
   Eigen::Vector3d turn = Eigen::Vector3d::Zero();
-  for (std::size_t body = 0; body < at_center_.size(); ++body) {
-    const Eigen::AngleAxisd from(found.poses[body].front().linear() * about.transpose());
-    turn += at_center_[body] * from.angle() * from.axis();
-  }
-  CarriedTarget target;
-  target.setup_error.linear() =
-      Eigen::AngleAxisd(turn.norm(), turn.stableNormalized()) * about * planned_.linear().transpose();
-  target.setup_error.translation() = moved(center_room_mm_, at_center_) - target.setup_error.linear() * center_room_mm_;
+  for (std::size_t body = 0; body < at_center_.size(); ++body)
+    turn += at_center_[body] * rotation_vector(poses[body].front().linear() * about.transpose());
+  Eigen::Isometry3d setup_error = Eigen::Isometry3d::Identity();
+  setup_error.linear() = rotation_from_vector(turn) * about * planned_.linear().transpose();
+  setup_error.translation() = moved(center_room_mm_, at_center_, poses) - setup_error.linear() * center_room_mm_;
+  return setup_error;
+}
+
+std::size_t Carriers::largest() const {
+  return static_cast<std::size_t>(std::ranges::max_element(at_center_) - at_center_.begin());
+}
+
+CarriedTarget Carriers::target_at(const BodySearchResult& found) const {
+  CarriedTarget target{.setup_error = setup_error_at(found.poses)};
   for (std::size_t n = 0; n < extent_room_mm_.size(); ++n)
-    target.deformation_mm =
-        std::max(target.deformation_mm,
-                 (moved(extent_room_mm_[n], at_extent_[n]) - target.setup_error * extent_room_mm_[n]).norm());
+    target.deformation_mm = std::max(
+        target.deformation_mm,
+        (moved(extent_room_mm_[n], at_extent_[n], found.poses) - target.setup_error * extent_room_mm_[n]).norm());
   const Eigen::MatrixXd per_motions = motion_per_motions();
   target.covariance = per_motions * found.covariance * per_motions.transpose();
   Eigen::Matrix<double, 3, 6> at_center;

@@ -32,12 +32,21 @@ class Carriers {
   // The share of each body, soft tissue included (0); they add up to 1.
   std::span<const double> shares() const { return at_center_; }
 
+  // The body that carries most.
+  std::size_t largest() const;
+
+  // The target's motion with bodies at some poses.
+  Eigen::Isometry3d setup_error_at(const BodyPoses& poses) const;
   CarriedTarget target_at(const BodySearchResult& found) const;
 
   // How the target moves with the motions of all bodies (BodySearchResult::covariance): 6 x 6n.
   Eigen::MatrixXd motion_per_motions() const;
 
  private:
+  // Where a place planned at a point lies, with these shares of the bodies.
+  Eigen::Vector3d moved(const Eigen::Vector3d& point_room_mm, std::span<const double> shares,
+                        const BodyPoses& poses) const;
+
   Eigen::Isometry3d planned_;
   Eigen::Vector3d center_room_mm_;
   std::vector<Eigen::Vector3d> extent_room_mm_;

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <chrono>
-#include <set>
 
 #include "geometry/rotation.h"
 #include "geometry/voxel_box.h"
@@ -22,12 +21,6 @@ using Eigen::Vector3d;
 constexpr double kSpring = 0.01;
 constexpr double kNearTargetMm = 30.0;
 constexpr double kConvergedMm = 0.1;
-
-std::set<Beam> beams_of(std::span<const FixedImage> images) {
-  std::set<Beam> beams;
-  for (const FixedImage& image : images) beams.insert(image.view.beam);
-  return beams;
-}
 
 // How the target's center and points 30 mm from it move in a view with a motion of the target (in the room, about the
 // isocenter): two rows per point, mm at the isocenter.
@@ -96,7 +89,6 @@ std::vector<BodyMotion> motions_of(const JointedBodies& bodies, const BodyRender
     if (bodies.bodies[n].is_soft) continue;
     const Vector3d center = planned * renderers.center_patient_mm(n);
     const Eigen::Isometry3d against = target.setup_error.inverse() * found.poses[n].front() * planned.inverse();
-    const Eigen::AngleAxisd turn(against.linear());
     Eigen::MatrixXd difference = -target_motion;
     difference.middleCols<6>(static_cast<Eigen::Index>(6 * n)) += Eigen::Matrix<double, 6, 6>::Identity();
     Eigen::Matrix<double, 3, 6> at_center;
@@ -108,7 +100,7 @@ std::vector<BodyMotion> motions_of(const JointedBodies& bodies, const BodyRender
     motions.push_back({.name = bodies.bodies[n].name,
                        .center_room_mm = center,
                        .displacement_mm = against * center - center,
-                       .rotation_rad = turn.angle() * turn.axis(),
+                       .rotation_rad = rotation_vector(against.linear()),
                        .sigma_mm = variance.cwiseSqrt(),
                        .carries_target = carriers.shares()[n],
                        .image_share = image_share(own * found.covariance * own.transpose(),
@@ -123,12 +115,6 @@ Uncertainty uncertainty_of(const Eigen::Matrix<double, 6, 6>& covariance) {
   return {.translation_mm = sigma.head<3>(), .rotation_rad = sigma.tail<3>()};
 }
 
-std::vector<double> parameters_of(const Eigen::Isometry3d& setup_error) {
-  const Eigen::AngleAxisd turn(setup_error.linear());
-  const Vector3d t = setup_error.translation(), r = kLeverMm * turn.angle() * turn.axis();
-  return {t.x(), t.y(), t.z(), r.x(), r.y(), r.z()};
-}
-
 // Gradient correlation, mean over the views, with bodies at some poses.
 double match_of(const BodyScene& scene, const BodyPoses& poses, double pixel_mm) {
   const Eigen::Isometry3d& about = poses.front().front();
@@ -141,27 +127,26 @@ double match_of(const BodyScene& scene, const BodyPoses& poses, double pixel_mm)
 }
 
 // How well the images match with the spine one vertebra higher or lower: the same search, as free, from there. Its
-// first stage only, which ends in the same trough.
+// first stage only, which ends in the same trough. `as_is`: where that stage ended from the whole itself.
 std::vector<Alternative> compare_levels(const BodyScene& scene, const Carriers& carriers,
-                                        const Eigen::Isometry3d& whole_room_from_patient, BodySearchOptions search) {
-  const auto at_target =
-      static_cast<std::size_t>(std::ranges::max_element(carriers.shares()) - carriers.shares().begin());
+                                        const Eigen::Isometry3d& whole_room_from_patient, BodySearchOptions search,
+                                        const BodyPoses& as_is) {
   std::vector<Alternative> alternatives;
-  if (!scene.bodies.bodies[at_target].is_vertebra) return alternatives;
+  if (!scene.bodies.bodies[carriers.largest()].is_vertebra) return alternatives;
   search.stages.resize(1);
-  const double pixel_mm = search.stages.front().pixel_mm;
-  const BodySearchResult as_is = search_bodies(scene, whole_room_from_patient, search);
-  const std::vector<double> here = parameters_of(carriers.target_at(as_is).setup_error);
+  const double pixel_mm = search.stages.front().pixel_mm, match_as_is = match_of(scene, as_is, pixel_mm);
+  const std::vector<double> here = parameters_from_setup_error(carriers.setup_error_at(as_is));
   for (const int step : {-1, 1}) {
-    const std::size_t other = at_target + static_cast<std::size_t>(step);
+    const std::size_t other = carriers.largest() + static_cast<std::size_t>(step);
     if (other >= scene.bodies.bodies.size() || !scene.bodies.bodies[other].is_vertebra) continue;
-    const Vector3d way = scene.renderers.center_patient_mm(other) - scene.renderers.center_patient_mm(at_target);
-    const BodySearchResult there = search_bodies(scene, whole_room_from_patient * Eigen::Translation3d(way), search);
-    const PoseDistance distance = distance_between(here, parameters_of(carriers.target_at(there).setup_error));
+    const Vector3d way =
+        scene.renderers.center_patient_mm(other) - scene.renderers.center_patient_mm(carriers.largest());
+    const BodyPoses there = search_bodies(scene, whole_room_from_patient * Eigen::Translation3d(way), search).poses;
+    const PoseDistance distance = distance_between(here, parameters_from_setup_error(carriers.setup_error_at(there)));
     alternatives.push_back(
         {.description = fmt::format("the spine one vertebra farther toward the {}", step > 0 ? "head" : "feet"),
-         .similarity = match_of(scene, there.poses, pixel_mm),
-         .as_is = match_of(scene, as_is.poses, pixel_mm),
+         .similarity = match_of(scene, there, pixel_mm),
+         .as_is = match_as_is,
          .distance_mm = distance.translation_mm,
          .angle_rad = distance.angle_rad});
   }
@@ -186,16 +171,13 @@ void register_bodies(const BentPatient& patient, std::span<const FixedImage> ima
     return;
   }
   const ProjectedRegion everything;
-  FixedViews fixed{.images = {images.begin(), images.end()},
-                   .region = options.region != nullptr ? *options.region : everything};
-  for (FixedImage& image : fixed.images) restrict_to(options.rectangles, image);
+  const FixedViews fixed{.images = restricted_to(options.rectangles, images),
+                         .region = options.region != nullptr ? *options.region : everything};
   const BodySearchOptions search;
-  const std::set<Beam> beam_set = beams_of(images);
-  const std::vector<Beam> beams(beam_set.begin(), beam_set.end());
   const CoarserCt ct = coarser_ct(patient.ct_hu, patient.attenuation,
                                   block_of(patient.ct_hu.spacing_mm(), patient.ct_hu.size, search.voxel_mm));
-  const BodyRenderers renderers(RendererKind::kCpu, ct.hu, ct.model, beams, patient.parts.bodies.shares);
-  const auto whole = make_renderer(RendererKind::kCpu, ct.hu, ct.model, beams);
+  const BodyRenderers renderers(RendererKind::kCpu, ct.hu, ct.model, patient.beams, patient.parts.bodies.shares);
+  const auto whole = make_renderer(RendererKind::kCpu, ct.hu, ct.model, patient.beams);
   const BodyScene scene{.bodies = patient.parts.bodies, .renderers = renderers, .whole = *whole, .views = fixed};
 
   const Eigen::Isometry3d whole_pose = result.actual_room_from_patient;
@@ -210,8 +192,9 @@ void register_bodies(const BentPatient& patient, std::span<const FixedImage> ima
   result.stages.back().reached_limit = result.stages.back().reached_limit && target.left_mm > kConvergedMm;
   report_match(scene, carriers, target, patient.target.center_room_mm, found, result);
   result.bodies = motions_of(patient.parts.bodies, renderers, carriers, target, start_room_from_patient, found);
-  std::ranges::copy(compare_levels(scene, carriers, whole_pose, search), std::back_inserter(result.alternatives));
-  judge(parameters_of(target.setup_error), options, result);
+  std::ranges::copy(compare_levels(scene, carriers, whole_pose, search, found.poses_after_first_stage),
+                    std::back_inserter(result.alternatives));
+  judge(parameters_from_setup_error(target.setup_error), options, result);
   result.seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
 }
 

@@ -11,6 +11,7 @@ namespace isoshift {
 struct BentPatient {
   const Volume<float>& ct_hu;
   AttenuationModel attenuation;
+  std::vector<Beam> beams;  // of the views
   PatientBodies parts;
   Target target;
 };

@@ -128,8 +128,11 @@ void restrict_to(const PixelRectangle& rectangle, FixedImage& image) {
                       .corners_px = {{left, top}, {right, top}, {right, bottom}, {left, bottom}}};
 }
 
-void restrict_to(const RectanglesByLabel& rectangles, FixedImage& image) {
-  if (const auto drawn = rectangles.find(image.label); drawn != rectangles.end()) restrict_to(drawn->second, image);
+std::vector<FixedImage> restricted_to(const RectanglesByLabel& rectangles, std::span<const FixedImage> images) {
+  std::vector<FixedImage> restricted(images.begin(), images.end());
+  for (FixedImage& image : restricted)
+    if (const auto drawn = rectangles.find(image.label); drawn != rectangles.end()) restrict_to(drawn->second, image);
+  return restricted;
 }
 
 FixedImage prepare(const XrayImage& xray) {

@@ -45,9 +45,9 @@ struct PixelRectangle {
 // Takes out of the field, at full resolution, what lies outside a rectangle drawn by a person. A field that is not sure
 // does not count: all of the receptor inside the rectangle is compared.
 void restrict_to(const PixelRectangle& rectangle, FixedImage& image);
-// The same with the rectangle of the image's label, if there is one.
+// Copies of images, each restricted to the rectangle of its label, if there is one.
 using RectanglesByLabel = std::map<std::string, PixelRectangle>;
-void restrict_to(const RectanglesByLabel& rectangles, FixedImage& image);
+std::vector<FixedImage> restricted_to(const RectanglesByLabel& rectangles, std::span<const FixedImage> images);
 
 // The whole way for one X-ray, at full resolution. Throws Error for a blank one.
 FixedImage prepare(const XrayImage& xray);

@@ -97,11 +97,11 @@ void add_errors(const RegistrationResult& result, const Eigen::Isometry3d& truth
   }
   run.rotation_share = rotation_share(found, truth, targets_mm);
   const Eigen::Isometry3d error = found * truth.inverse();
-  const Eigen::AngleAxisd turn(error.linear());
+  const Eigen::Vector3d turn_rad = rotation_vector(error.linear());
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const auto n = static_cast<Eigen::Index>(axis);
     run.error[axis] = error.translation()[n];
-    run.error[axis + 3] = deg_from_rad(turn.angle()) * turn.axis()[n];
+    run.error[axis + 3] = deg_from_rad(turn_rad[n]);
   }
   if (!result.uncertainty) return;
   run.sigma.emplace();
@@ -162,6 +162,7 @@ void run_missing(EvaluationFolder& folder, const Study& study, const Registratio
     work();
   } else {
     std::vector<std::jthread> threads;
+    threads.reserve(static_cast<std::size_t>(jobs));
     for (int job = 0; job < jobs; ++job) threads.emplace_back([&] { tbb::task_arena(1).execute(work); });
   }
   if (failure) std::rethrow_exception(failure);

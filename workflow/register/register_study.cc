@@ -7,7 +7,6 @@
 
 #include "base/output_folder.h"
 #include "io/report/result_folder.h"
-#include "registration/bodies/patient_bodies.h"
 #include "registration/bodies/register_bodies.h"
 #include "setup/couch_shift.h"
 #include "workflow/register/setup_result_of.h"
@@ -50,6 +49,7 @@ BentPatient bent_patient(const Study& study, const RegistrationRequest& request,
   const Eigen::Vector3d center_patient_mm = study.planned_room_from_patient.inverse() * target.center_room_mm;
   return {.ct_hu = study.ct->hu,
           .attenuation = request.rendering.model(),
+          .beams = beams_of(study),
           .parts = patient_bodies(map, soft_masks(map), center_patient_mm),
           .target = target};
 }

@@ -50,13 +50,6 @@ std::vector<SetupResult::Point> centroids_of(const std::vector<MarkedStructure>&
   return points;
 }
 
-// The X-rays as they were compared: within the rectangles that a person drew.
-std::vector<FixedImage> compared_images(std::span<const FixedImage> images, const RegistrationOptions& options) {
-  std::vector<FixedImage> compared(images.begin(), images.end());
-  for (FixedImage& image : compared) restrict_to(options.rectangles, image);
-  return compared;
-}
-
 SetupResult::View view_of(const RtImage& image, const XrayView& view, ViewMatch match, ViewPicture picture) {
   return {.label = image.label,
           .sop_class_uid = image.sop_class_uid,
@@ -104,8 +97,8 @@ SetupResult setup_result_of(const Study& study, std::span<const FixedImage> imag
   Renderer& renderer = setup.renderers().finest();
   const RegistrationOptions& registration = setup.options();
   const std::vector<MarkedStructure> structures = marked_structures(study, request.region);
-  std::vector<ViewPicture> pictures =
-      view_pictures(study, compared_images(images, registration), renderer, structures, found.actual_room_from_patient);
+  std::vector<ViewPicture> pictures = view_pictures(study, restricted_to(registration.rectangles, images), renderer,
+                                                    structures, found.actual_room_from_patient);
   std::vector<ViewMatch> matches = std::move(found.views);
   SetupResult result;
   static_cast<Registration&>(result) = std::move(found);

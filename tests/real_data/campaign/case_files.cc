@@ -7,10 +7,10 @@
 #include <cmath>
 #include <fstream>
 #include <nlohmann/json.hpp>
-#include <numbers>
 #include <random>
 
 #include "io/dicom/decode.h"
+#include "phantom/dicom/setup_items.h"
 
 namespace isoshift::campaign {
 namespace {
@@ -39,70 +39,25 @@ CaseUids make_uids(const CasePlan& plan) {
   return uids;
 }
 
-void put_common(DicomItem dataset, const Patient& patient, const char* sop_class, const std::string& sop_instance,
-                const char* modality, const std::string& series, const std::string& frame_of_reference) {
-  put_identity(dataset, patient.identity);
-  dataset.put(DCM_SOPClassUID, sop_class);
-  dataset.put(DCM_SOPInstanceUID, sop_instance);
-  dataset.put(DCM_Modality, modality);
-  dataset.put(DCM_SeriesInstanceUID, series);
-  dataset.put(DCM_SeriesNumber, "1");
-  dataset.put(DCM_FrameOfReferenceUID, frame_of_reference);
-  dataset.put(DCM_PositionReferenceIndicator, "");
-  dataset.put(DCM_Manufacturer, "isoshift campaign");
-  dataset.put(DCM_OperatorsName, "");
-}
+constexpr const char* kManufacturer = "isoshift campaign";
 
 std::string label_of(const CasePlan& plan, std::size_t view) {
   const Exposure& exposure = plan.exposures[view];
   return fmt::format("{}{}_G{:.1f}", exposure.is_megavoltage ? "MV" : "KV", view + 1, exposure.gantry_deg);
 }
 
-void put_beam(DicomItem beam, const CasePlan& plan, std::size_t view) {
-  beam.put(DCM_TreatmentMachineName, "CAMPAIGN");
-  beam.put(DCM_PrimaryDosimeterUnit, "MU");
-  beam.put(DCM_SourceAxisDistance, kSadMm);
-  beam.put_empty_sequence(DCM_BeamLimitingDeviceSequence);
-  beam.put(DCM_BeamNumber, static_cast<int>(view) + 1);
-  beam.put(DCM_BeamName, label_of(plan, view));
-  beam.put(DCM_BeamType, "STATIC");
-  beam.put(DCM_RadiationType, "PHOTON");
-  beam.put(DCM_TreatmentDeliveryType, "SETUP");
-  for (const DcmTagKey& count : {DCM_NumberOfWedges, DCM_NumberOfCompensators, DCM_NumberOfBoli, DCM_NumberOfBlocks})
-    beam.put(count, 0);
-  beam.put(DCM_FinalCumulativeMetersetWeight, 0.0);
-  beam.put(DCM_NumberOfControlPoints, 1);
-  DicomItem point = beam.append_item(DCM_ControlPointSequence);
-  point.put(DCM_ControlPointIndex, 0);
-  point.put(DCM_CumulativeMetersetWeight, 0.0);
-  point.put(DCM_GantryAngle, plan.exposures[view].gantry_deg);
-  point.put(DCM_GantryRotationDirection, "NONE");
-  point.put(DCM_BeamLimitingDeviceAngle, 0.0);
-  point.put(DCM_BeamLimitingDeviceRotationDirection, "NONE");
-  point.put(DCM_PatientSupportAngle, 0.0);
-  point.put(DCM_PatientSupportRotationDirection, "NONE");
-  point.put(DCM_TableTopEccentricAngle, 0.0);
-  point.put(DCM_TableTopEccentricRotationDirection, "NONE");
-  point.put(DCM_IsocenterPosition, std::span(plan.setup.isocenter_patient_mm.data(), 3));
-  beam.put(DCM_ReferencedPatientSetupNumber, 1);
-}
-
 void write_plan(const CasePlan& plan, const Patient& patient, const CaseUids& uids, const std::filesystem::path& path) {
   DicomFile file;
   DicomItem dataset = file.dataset();
-  put_common(dataset, patient, UID_RTPlanStorage, uids.plan, "RTPLAN", uids.plan_series,
-             patient.frame_of_reference_uid);
+  put_common(dataset, patient.identity,
+             {UID_RTPlanStorage, uids.plan, "RTPLAN", uids.plan_series, patient.frame_of_reference_uid}, kManufacturer);
   dataset.put(DCM_RTPlanLabel, "SETUP");
   dataset.put(DCM_RTPlanDate, "20260228");
   dataset.put(DCM_RTPlanTime, "090000");
   dataset.put(DCM_RTPlanGeometry, "PATIENT");
   dataset.append_reference(DCM_ReferencedStructureSetSequence, UID_RTStructureSetStorage, uids.structures);
   dataset.put(DCM_ApprovalStatus, "UNAPPROVED");
-  DicomItem dose = dataset.append_item(DCM_DoseReferenceSequence);
-  dose.put(DCM_DoseReferenceNumber, 1);
-  dose.put(DCM_DoseReferenceStructureType, "VOLUME");
-  dose.put(DCM_DoseReferenceType, "TARGET");
-  dose.put(DCM_ReferencedROINumber, 1);
+  put_target_reference(dataset);
   DicomItem group = dataset.append_item(DCM_FractionGroupSequence);
   group.put(DCM_FractionGroupNumber, 1);
   group.put(DCM_NumberOfFractionsPlanned, 1);
@@ -110,7 +65,13 @@ void write_plan(const CasePlan& plan, const Patient& patient, const CaseUids& ui
   group.put(DCM_NumberOfBrachyApplicationSetups, 0);
   for (std::size_t view = 0; view < 2; ++view) {
     group.append_item(DCM_ReferencedBeamSequence).put(DCM_ReferencedBeamNumber, static_cast<int>(view) + 1);
-    put_beam(dataset.append_item(DCM_BeamSequence), plan, view);
+    put_setup_beam(dataset.append_item(DCM_BeamSequence), {.machine = "CAMPAIGN",
+                                                           .sad_mm = kSadMm,
+                                                           .number = static_cast<int>(view) + 1,
+                                                           .name = label_of(plan, view),
+                                                           .gantry_deg = plan.exposures[view].gantry_deg,
+                                                           .couch_deg = 0.0,
+                                                           .isocenter_patient_mm = plan.setup.isocenter_patient_mm});
   }
   DicomItem setup = dataset.append_item(DCM_PatientSetupSequence);
   setup.put(DCM_PatientSetupNumber, 1);
@@ -128,7 +89,8 @@ void write_xray(const CasePlan& plan, const Patient& patient, const CaseUids& ui
   const bool is_mv = plan.exposures[view].is_megavoltage;
   DicomFile file;
   DicomItem dataset = file.dataset();
-  put_common(dataset, patient, UID_RTImageStorage, uids.images[view], "RTIMAGE", uids.image_series, uids.image_frame);
+  put_common(dataset, patient.identity,
+             {UID_RTImageStorage, uids.images[view], "RTIMAGE", uids.image_series, uids.image_frame}, kManufacturer);
   constexpr double kCornerMm = 0.5 * (kPixels - 1) * kPixelMm;
   dataset.put(DCM_ImageType, is_mv ? "ORIGINAL\\PRIMARY\\PORTAL" : "ORIGINAL\\PRIMARY\\RADIOGRAPH");
   dataset.put(DCM_ConversionType, "DI");
@@ -171,41 +133,24 @@ void write_structures(const CasePlan& plan, const Patient& patient, const CaseUi
                       const std::filesystem::path& path) {
   DicomFile file;
   DicomItem dataset = file.dataset();
-  put_common(dataset, patient, UID_RTStructureSetStorage, uids.structures, "RTSTRUCT", uids.structures_series,
-             patient.frame_of_reference_uid);
+  put_common(
+      dataset, patient.identity,
+      {UID_RTStructureSetStorage, uids.structures, "RTSTRUCT", uids.structures_series, patient.frame_of_reference_uid},
+      kManufacturer);
   dataset.put(DCM_StructureSetLabel, "TARGET");
   dataset.put(DCM_StructureSetDate, "20260228");
   dataset.put(DCM_StructureSetTime, "090000");
   dataset.append_item(DCM_ReferencedFrameOfReferenceSequence)
       .put(DCM_FrameOfReferenceUID, patient.frame_of_reference_uid);
-  DicomItem roi = dataset.append_item(DCM_StructureSetROISequence);
-  roi.put(DCM_ROINumber, 1);
-  roi.put(DCM_ReferencedFrameOfReferenceUID, patient.frame_of_reference_uid);
-  roi.put(DCM_ROIName, "PTV");
-  roi.put(DCM_ROIGenerationAlgorithm, "AUTOMATIC");
-  DicomItem drawn = dataset.append_item(DCM_ROIContourSequence);
-  drawn.put(DCM_ReferencedROINumber, 1);
-  for (int k = 0; k < patient.size.z(); ++k) {
-    constexpr int kPoints = 48;
-    const Vector3d& center = plan.setup.isocenter_patient_mm;
-    const double z = patient.place_mm(0, 0, k).z(), from_center = std::abs(z - center.z());
-    if (from_center >= plan.target_radius_mm - 0.5) continue;
-    const double radius = std::sqrt(plan.target_radius_mm * plan.target_radius_mm - from_center * from_center);
-    std::vector<double> points;
-    for (int n = 0; n < kPoints; ++n) {
-      const double angle = 2.0 * std::numbers::pi * n / kPoints;
-      points.insert(points.end(), {center.x() + radius * std::cos(angle), center.y() + radius * std::sin(angle), z});
-    }
-    DicomItem contour = drawn.append_item(DCM_ContourSequence);
-    contour.put(DCM_ContourGeometricType, "CLOSED_PLANAR");
-    contour.put(DCM_NumberOfContourPoints, kPoints);
-    contour.put(DCM_ContourData, points);
-  }
-  DicomItem observation = dataset.append_item(DCM_RTROIObservationsSequence);
-  observation.put(DCM_ObservationNumber, 1);
-  observation.put(DCM_ReferencedROINumber, 1);
-  observation.put(DCM_RTROIInterpretedType, "PTV");
-  observation.put(DCM_ROIInterpreter, "");
+  std::vector<double> slices_mm;
+  for (int k = 0; k < patient.size.z(); ++k) slices_mm.push_back(patient.place_mm(0, 0, k).z());
+  put_ball_target(dataset,
+                  {.name = "PTV",
+                   .interpreted_type = "PTV",
+                   .center_patient_mm = plan.setup.isocenter_patient_mm,
+                   .radius_mm = plan.target_radius_mm,
+                   .contour_points = 48},
+                  patient.frame_of_reference_uid, slices_mm, plan.target_radius_mm - 0.5);
   dataset.put(DCM_ApprovalStatus, "UNAPPROVED");
   file.write(path);
 }

@@ -20,7 +20,7 @@ std::vector<MovedGroup> bent_motions() {
 
 // The scene's bodies as those of a patient who is bone all over; the target lies in the middle one.
 BentPatient patient_of(const BentScene& scene) {
-  BentPatient patient{.ct_hu = scene.ct, .attenuation = {}, .parts = {}, .target = {}};
+  BentPatient patient{.ct_hu = scene.ct, .attenuation = {}, .beams = {Beam::kKilovoltage}, .parts = {}, .target = {}};
   patient.parts.bodies = scene.bodies;
   patient.parts.carried = scene.bodies.shares;
   patient.parts.to_bone_mm = Volume<float>(scene.ct.size, scene.ct.patient_from_voxel);
