@@ -80,14 +80,17 @@ AttenuationByBeam attenuation_of_body(const Volume<float>& ct_hu, const Attenuat
   const Eigen::Affine3d share_from_voxel = share.patient_from_voxel.inverse() * lattice;
   for (const Beam beam : beams) result.emplace(beam, Volume<float>(box.size(), lattice));
   const Eigen::Vector3i& size = result.begin()->second.size;
+  const Eigen::Vector3d along_row = share_from_voxel.linear().col(0);
   parallel_for(0, size.z(), [&](int k) {
-    for (int j = 0; j < size.y(); ++j)
+    for (int j = 0; j < size.y(); ++j) {
+      const Eigen::Vector3d row_start = share_from_voxel * Eigen::Vector3d(0.0, j, k);
       for (int i = 0; i < size.x(); ++i) {
-        const float part = share_at(share, share_from_voxel * Eigen::Vector3d(i, j, k));
+        const float part = share_at(share, row_start + i * along_row);
         if (part == 0.0F) continue;
         const float hu = ct_hu.at(box.first.x() + i, box.first.y() + j, box.first.z() + k);
         for (auto& [beam, volume] : result) volume.at(i, j, k) = part * model.attenuation_per_mm(hu, beam);
       }
+    }
   });
   return result;
 }

@@ -1,29 +1,29 @@
 #include "registration/levenberg_marquardt.h"
 
-#include <Eigen/Eigenvalues>
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 
 namespace isoshift {
 namespace {
 
-// The step, in units of the initial steps, that a model promises most from within a radius; found on the curvature's
-// axes by bisection of the damping.
-Eigen::VectorXd best_step(const Eigen::VectorXd& gradient, const Eigen::MatrixXd& curvature, double radius) {
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(curvature);
-  const Eigen::VectorXd bends = eigen.eigenvalues().cwiseMax(0.0);
-  const Eigen::VectorXd slopes = eigen.eigenvectors().transpose() * gradient;
-  const auto damped = [&](double damping) -> Eigen::VectorXd { return slopes.array() / (bends.array() + damping); };
-  double least = 1e-9 * std::max(bends.maxCoeff(), 1e-12);
-  if (damped(least).norm() > radius) {
-    double most = slopes.norm() / radius;  // no shorter step needs more
-    for (int n = 0; n < 60 && most > 1.001 * least; ++n) {
-      const double middle = std::sqrt(least * most);
-      (damped(middle).norm() > radius ? least : most) = middle;
-    }
-    least = most;
+// The step, in units of the initial steps, that a model promises most from within a radius. The damping that makes it
+// that short is found by Newton's method on 1 / length (Moré and Sorensen 1983), which comes from below and does not
+// overshoot.
+Eigen::VectorXd best_step(const Eigen::VectorXd& gradient, Eigen::MatrixXd curvature, double radius) {
+  constexpr double kLeastDamping = 1e-9, kLonger = 1.001;
+  constexpr int kMostSteps = 60;
+  double added = kLeastDamping * std::max(curvature.diagonal().maxCoeff(), 1e-12);
+  Eigen::VectorXd step;
+  for (int n = 0; n < kMostSteps; ++n) {
+    curvature.diagonal().array() += added;
+    const Eigen::LLT<Eigen::MatrixXd> roots(curvature);
+    step = roots.solve(gradient);
+    const double length = step.norm();
+    if (length <= kLonger * radius) break;
+    added = step.squaredNorm() / roots.matrixL().solve(step).squaredNorm() * (length - radius) / radius;
   }
-  return eigen.eigenvectors() * damped(least);
+  return step;
 }
 
 // One climb: says where it wants a model next, and takes it.

@@ -19,6 +19,14 @@ struct QuadraticModel {
     if (curvature.size() > 0) model.curvature = per_parameter.transpose() * curvature * per_parameter;
     return model;
   }
+
+  // Of the same parameters, both with curvature or both without.
+  QuadraticModel& operator+=(const QuadraticModel& other) {
+    value += other.value;
+    gradient += other.gradient;
+    curvature += other.curvature;
+    return *this;
+  }
 };
 
 // The mean of two, weighted.

@@ -56,11 +56,12 @@ struct ViewMatch {
 
 // How well the images would match if they were not what they say they are.
 struct Alternative {
-  std::string description;   // "view 1 mirrored"
-  double similarity = 0.0;   // gradient correlation that the search reaches with this alternative,
-  double as_is = 0.0;        // and that the same search reaches with the images as they are
-  double distance_mm = 0.0;  // between the poses found: translation at the isocenter,
-  double angle_rad = 0.0;    // and rotation
+  std::string description;    // "view 1 mirrored"
+  double similarity = 0.0;    // gradient correlation that the search reaches with this alternative,
+  double as_is = 0.0;         // and that the same search reaches with the images as they are
+  double distance_mm = 0.0;   // between the poses found: translation at the isocenter,
+  double angle_rad = 0.0;     // and rotation
+  bool is_ruled_out = false;  // by the probability of all that the images show of the bodies, not by similarity
 };
 
 // One standard deviation per axis, in the room: of where the isocenter's anatomy lies, and of the rotation vector.

@@ -192,7 +192,8 @@ Json alternatives_json(const SetupResult& report) {
   for (const Alternative& alternative : report.alternatives)
     list.push_back({{"description", alternative.description},
                     {"similarity", alternative.similarity},
-                    {"as_is", alternative.as_is}});
+                    {"as_is", alternative.as_is},
+                    {"ruled_out", alternative.is_ruled_out}});
   return list;
 }
 

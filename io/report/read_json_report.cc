@@ -246,7 +246,8 @@ SetupResult report_from(const Json& json) {
   for (const Json& alternative : json.at("alternatives"))
     report.alternatives.push_back({.description = alternative.at("description"),
                                    .similarity = alternative.at("similarity"),
-                                   .as_is = alternative.at("as_is")});
+                                   .as_is = alternative.at("as_is"),
+                                   .is_ruled_out = alternative.at("ruled_out")});
   report.preset = json.at("preset");
   report.region = json.at("region");
   report.seed = json.at("seed");

@@ -116,9 +116,9 @@ ReportPage::Section checks_section(const SetupResult& report) {
       section.rows.push_back({"Field of " + printable(view.label), field_words(view)});
   }
   for (const Alternative& alternative : report.alternatives)
-    section.rows.push_back(
-        {"If " + printable(alternative.description),
-         fmt::format("similarity {:.4f}, as it is {:.4f}", alternative.similarity, alternative.as_is)});
+    section.rows.push_back({"If " + printable(alternative.description),
+                            fmt::format("similarity {:.4f}, as it is {:.4f}{}", alternative.similarity,
+                                        alternative.as_is, alternative.is_ruled_out ? "; clearly less probable" : "")});
   return section;
 }
 

@@ -17,7 +17,7 @@ using Eigen::Index;
 
 constexpr double kLeastCovered = 0.05;  // of a tile: fewer pixels fit anything
 constexpr double kLeastRest = 1e-4;     // of 1 - rho: DRRs of a phantom can match without rest
-constexpr std::size_t kTilesOfARun = 8;
+constexpr std::size_t kTilesOfARun = 64;
 
 // One direction of the gradients.
 struct Direction {
@@ -140,10 +140,7 @@ std::vector<QuadraticModel> BodyObjective::view_models(const PoseSlots& slots,
     for (const Tile& tile : runs_[run]) add_tile(tile, drrs[tile.view], slots, sums[run]);
   });
   std::vector<QuadraticModel> views(drrs.size(), no_model(parameters.size()));
-  for (std::size_t run = 0; run < runs_.size(); ++run) {
-    QuadraticModel& view = views[runs_[run].front().view];
-    view = weighted_sum(1.0, view, 1.0, sums[run]);
-  }
+  for (std::size_t run = 0; run < runs_.size(); ++run) views[runs_[run].front().view] += sums[run];
   // From motions to parameters, slot by slot.
   for (std::size_t slot = 0; slot < slots.count(); ++slot) {
     const auto at = static_cast<Index>(6 * slot);
@@ -182,7 +179,7 @@ QuadraticModel BodyObjective::spring_model(const PoseSlots& slots, std::span<con
 
 QuadraticModel BodyObjective::Parts::of_all_views() const {
   QuadraticModel sum = no_model(static_cast<std::size_t>(springs.gradient.size()));
-  for (const QuadraticModel& view : views) sum = weighted_sum(1.0, sum, 1.0, view);
+  for (const QuadraticModel& view : views) sum += view;
   return sum;
 }
 
@@ -192,7 +189,8 @@ BodyObjective::Parts BodyObjective::parts(const PoseSlots& slots, std::span<cons
 
 QuadraticModel BodyObjective::model(const PoseSlots& slots, std::span<const double> parameters) const {
   const Parts both = parts(slots, parameters);
-  return weighted_sum(1.0, both.of_all_views(), 1.0, both.springs);
+  QuadraticModel sum = both.of_all_views();
+  return sum += both.springs;
 }
 
 }  // namespace isoshift

@@ -15,10 +15,6 @@ namespace {
 
 constexpr int kParameters = PoseSlots::kParameters;
 
-BodyPoses all_at(const Eigen::Isometry3d& pose, std::size_t bodies, std::size_t views) {
-  return BodyPoses(bodies, std::vector<Eigen::Isometry3d>(views, pose));
-}
-
 JointedBodies with_soft_tissue_held(JointedBodies bodies, double sigmas) {
   for (JointedBodies::Spring& spring : bodies.springs)
     if (bodies.bodies[spring.a].is_soft || bodies.bodies[spring.b].is_soft) {
@@ -48,18 +44,15 @@ OptimizerResult climb_from_base(const BodyObjective& objective, const PoseSlots&
   return climb(models, std::span(&options, 1)).front();
 }
 
-// What is known about the bodies where they were found.
-void report_certainty(const BodyObjective& objective, const PoseSlots& slots, BodySearchResult& result) {
-  const std::vector<double> at_base(kParameters * slots.count(), 0.0);
-  const BodyObjective::Parts parts = objective.parts(slots, at_base);
-  const QuadraticModel images = parts.of_all_views();
-  const Eigen::MatrixXd motions = slots.motions_of_bodies(at_base);
-  const Eigen::MatrixXd whole = images.curvature + parts.springs.curvature;
-  const auto solver = whole.ldlt();
-  result.motions_left = motions * solver.solve(images.gradient + parts.springs.gradient);
-  result.covariance = motions * solver.solve(motions.transpose());
-  const Eigen::MatrixXd loose = images.curvature + 0.25 * parts.springs.curvature;
-  result.covariance_on_loose_springs = motions * loose.ldlt().solve(motions.transpose());
+// The pixels that a stage compares.
+Objective pixels_of(const BodyScene& scene, const BodyStage& stage) {
+  const Eigen::Isometry3d& about = scene.whole_room_from_patient;
+  return {*scene.of(stage).as_one,
+          scene.views.reduced_to(stage.pixel_mm, about, 5.0),
+          about,
+          {.similarity = SimilarityKind::kGradientCorrelation,
+           .pixel_fraction = stage.pixel_fraction,
+           .min_pixels = static_cast<std::size_t>(stage.min_pixels)}};
 }
 
 StageReport report_of(const BodyStage& stage, const OptimizerResult& climbed, double seconds) {
@@ -86,30 +79,50 @@ double image_share(const Eigen::Matrix3d& covariance, const Eigen::Matrix3d& on_
   return std::clamp((4.0 - growth.eigenvalues().maxCoeff()) / 3.0, 0.0, 1.0);
 }
 
-BodySearchResult search_bodies(const BodyScene& scene, const Eigen::Isometry3d& whole_room_from_patient,
-                               const BodySearchOptions& options, const SearchProgress& progress) {
-  BodySearchResult result;
-  result.poses = all_at(whole_room_from_patient, scene.bodies.bodies.size(), scene.views.images.size());
-  for (const BodyStage& stage : options.stages) {
+std::vector<float> RenderedBodies::line_integrals(const Objective& pixels, const BodyPoses& poses,
+                                                  std::size_t view) const {
+  std::vector<float> drr(pixels.rendered_pixels(view).size());
+  for (std::size_t body = 0; body < apart.count(); ++body)
+    apart.add(body, pixels.views()[view], poses[body][view], pixels.rendered_pixels(view), drr);
+  return drr;
+}
+
+BodyPoses at_one_pose(const BodyScene& scene, const Eigen::Isometry3d& room_from_patient) {
+  return BodyPoses(scene.bodies.bodies.size(),
+                   std::vector<Eigen::Isometry3d>(scene.views.images.size(), room_from_patient));
+}
+
+BodySearchResult search_bodies(const BodyScene& scene, const BodyPoses& start, std::span<const BodyStage> stages,
+                               double bound_mm) {
+  BodySearchResult result{.poses = start};
+  for (const BodyStage& stage : stages) {
     const auto begin = std::chrono::steady_clock::now();
-    const std::vector<FixedImage> images = scene.views.reduced_to(stage.pixel_mm, whole_room_from_patient, 5.0);
-    const Objective pixels(scene.whole, images, whole_room_from_patient,
-                           {.similarity = SimilarityKind::kGradientCorrelation,
-                            .pixel_fraction = stage.pixel_fraction,
-                            .min_pixels = static_cast<std::size_t>(stage.min_pixels)});
+    const Objective pixels = pixels_of(scene, stage);
     const JointedBodies held = with_soft_tissue_held(scene.bodies, stage.soft_sigmas);
-    const BodyObjective objective(held, scene.renderers, pixels, stage.tile_mm);
-    const PoseSlots slots(scene.bodies, scene.renderers, result.poses);
-    const OptimizerResult climbed = climb_from_base(objective, slots, stage, options.bound_mm);
+    const BodyObjective objective(held, scene.of(stage).apart, pixels, stage.tile_mm);
+    const PoseSlots slots(scene.bodies, scene.fine.apart, result.poses);
+    const OptimizerResult climbed = climb_from_base(objective, slots, stage, bound_mm);
     result.poses = slots.poses(climbed.best);
-    if (&stage == &options.stages.front()) result.poses_after_first_stage = result.poses;
+    result.log_probability = climbed.value;
     const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - begin;
     result.stages.push_back(report_of(stage, climbed, seconds.count()));
-    if (progress) progress(static_cast<double>(result.stages.size()) / static_cast<double>(options.stages.size()));
-    if (&stage == &options.stages.back())
-      report_certainty(objective, PoseSlots(scene.bodies, scene.renderers, result.poses), result);
   }
   return result;
+}
+
+BodyCertainty certainty_of(const BodyScene& scene, const BodyPoses& poses, const BodyStage& stage) {
+  const Objective pixels = pixels_of(scene, stage);
+  const BodyObjective objective(scene.bodies, scene.of(stage).apart, pixels, stage.tile_mm);
+  const PoseSlots slots(scene.bodies, scene.fine.apart, poses);
+  const std::vector<double> at_base(kParameters * slots.count(), 0.0);
+  const BodyObjective::Parts parts = objective.parts(slots, at_base);
+  const QuadraticModel images = parts.of_all_views();
+  const Eigen::MatrixXd motions = slots.motions_of_bodies(at_base);
+  const auto solver = Eigen::MatrixXd(images.curvature + parts.springs.curvature).ldlt();
+  const Eigen::MatrixXd loose = images.curvature + 0.25 * parts.springs.curvature;
+  return {.covariance = motions * solver.solve(motions.transpose()),
+          .covariance_on_loose_springs = motions * loose.ldlt().solve(motions.transpose()),
+          .motions_left = motions * solver.solve(images.gradient + parts.springs.gradient)};
 }
 
 }  // namespace isoshift

@@ -82,20 +82,20 @@ std::size_t Carriers::largest() const {
   return static_cast<std::size_t>(std::ranges::max_element(at_center_) - at_center_.begin());
 }
 
-CarriedTarget Carriers::target_at(const BodySearchResult& found) const {
-  CarriedTarget target{.setup_error = setup_error_at(found.poses)};
+CarriedTarget Carriers::target_at(const BodyPoses& poses, const BodyCertainty& certainty) const {
+  CarriedTarget target{.setup_error = setup_error_at(poses)};
   for (std::size_t n = 0; n < extent_room_mm_.size(); ++n)
-    target.deformation_mm = std::max(
-        target.deformation_mm,
-        (moved(extent_room_mm_[n], at_extent_[n], found.poses) - target.setup_error * extent_room_mm_[n]).norm());
+    target.deformation_mm =
+        std::max(target.deformation_mm,
+                 (moved(extent_room_mm_[n], at_extent_[n], poses) - target.setup_error * extent_room_mm_[n]).norm());
   const Eigen::MatrixXd per_motions = motion_per_motions();
-  target.covariance = per_motions * found.covariance * per_motions.transpose();
+  target.covariance = per_motions * certainty.covariance * per_motions.transpose();
   Eigen::Matrix<double, 3, 6> at_center;
   at_center << Eigen::Matrix3d::Identity(), -cross_matrix(target.setup_error * center_room_mm_);
   const Eigen::MatrixXd to_center = at_center * per_motions;
-  target.image_share = image_share(to_center * found.covariance * to_center.transpose(),
-                                   to_center * found.covariance_on_loose_springs * to_center.transpose());
-  target.left_mm = (to_center * found.motions_left).norm();
+  target.image_share = image_share(to_center * certainty.covariance * to_center.transpose(),
+                                   to_center * certainty.covariance_on_loose_springs * to_center.transpose());
+  target.left_mm = (to_center * certainty.motions_left).norm();
   return target;
 }
 

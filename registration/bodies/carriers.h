@@ -37,9 +37,9 @@ class Carriers {
 
   // The target's motion with bodies at some poses.
   Eigen::Isometry3d setup_error_at(const BodyPoses& poses) const;
-  CarriedTarget target_at(const BodySearchResult& found) const;
+  CarriedTarget target_at(const BodyPoses& poses, const BodyCertainty& certainty) const;
 
-  // How the target moves with the motions of all bodies (BodySearchResult::covariance): 6 x 6n.
+  // How the target moves with the motions of all bodies (BodyCertainty::covariance): 6 x 6n.
   Eigen::MatrixXd motion_per_motions() const;
 
  private:

@@ -9,6 +9,7 @@
 #include "geometry/voxel_box.h"
 #include "registration/bodies/body_objective.h"
 #include "registration/bodies/carriers.h"
+#include "registration/bodies/target_search.h"
 #include "registration/pose_parameters.h"
 #include "registration/quality/judge.h"
 
@@ -42,30 +43,22 @@ Eigen::MatrixXd seen_motions(const XrayView& view, const CarriedTarget& target, 
   return motions;
 }
 
-// Line integrals of the rendered pixels of a view, with bodies at some poses.
-std::vector<float> drr_of(const BodyScene& scene, const Objective& pixels, const BodyPoses& poses, std::size_t view) {
-  std::vector<float> drr(pixels.rendered_pixels(view).size());
-  for (std::size_t body = 0; body < scene.renderers.count(); ++body)
-    scene.renderers.add(body, pixels.views()[view], poses[body][view], pixels.rendered_pixels(view), drr);
-  return drr;
-}
-
 // What the search found, as images and as certainty: of every view how well it matches, and what it alone would want.
 void report_match(const BodyScene& scene, const Carriers& carriers, const CarriedTarget& target,
-                  const Vector3d& center_room_mm, const BodySearchResult& found, RegistrationResult& result) {
+                  const Vector3d& center_room_mm, const BodyPoses& poses, RegistrationResult& result) {
   constexpr double kPixelMm = 2.0;
-  const Eigen::Isometry3d& about = found.poses.front().front();
+  const Eigen::Isometry3d& about = poses.front().front();
   const std::vector<FixedImage> level = scene.views.reduced_to(kPixelMm, about, 0.0);
-  const Objective pixels(scene.whole, level, about, {.similarity = SimilarityKind::kGradientCorrelation});
-  const BodyObjective objective(scene.bodies, scene.renderers, pixels, BodyStage().tile_mm);
-  const PoseSlots slots(scene.bodies, scene.renderers, found.poses);
+  const Objective pixels(*scene.fine.as_one, level, about, {.similarity = SimilarityKind::kGradientCorrelation});
+  const BodyObjective objective(scene.bodies, scene.fine.apart, pixels, BodyStage().tile_mm);
+  const PoseSlots slots(scene.bodies, scene.fine.apart, poses);
   const std::vector<double> at_base(PoseSlots::kParameters * slots.count(), 0.0);
   const BodyObjective::Parts parts = objective.parts(slots, at_base);
   const Eigen::MatrixXd target_motion = carriers.motion_per_motions() * slots.motions_of_bodies(at_base);
   for (std::size_t view = 0; view < level.size(); ++view) {
     ViewMatch& match = result.views[view];
     match.left_out.reset();
-    match.similarity_final = pixels.comparison(view).of(drr_of(scene, pixels, found.poses, view));
+    match.similarity_final = pixels.comparison(view).of(scene.fine.line_integrals(pixels, poses, view));
     // The step from the common optimum to where this view and the springs are best.
     const QuadraticModel& alone = parts.views[view];
     const Eigen::MatrixXd held = alone.curvature + parts.springs.curvature +
@@ -82,19 +75,20 @@ void report_match(const BodyScene& scene, const Carriers& carriers, const Carrie
 // How every bone moved against the target: where its center lies, and how it is turned, once the target is right.
 std::vector<BodyMotion> motions_of(const JointedBodies& bodies, const BodyRenderers& renderers,
                                    const Carriers& carriers, const CarriedTarget& target,
-                                   const Eigen::Isometry3d& planned, const BodySearchResult& found) {
+                                   const Eigen::Isometry3d& planned, const BodyPoses& poses,
+                                   const BodyCertainty& certainty) {
   const Eigen::MatrixXd target_motion = carriers.motion_per_motions();
   std::vector<BodyMotion> motions;
   for (std::size_t n = 0; n < bodies.bodies.size(); ++n) {
     if (bodies.bodies[n].is_soft) continue;
     const Vector3d center = planned * renderers.center_patient_mm(n);
-    const Eigen::Isometry3d against = target.setup_error.inverse() * found.poses[n].front() * planned.inverse();
+    const Eigen::Isometry3d against = target.setup_error.inverse() * poses[n].front() * planned.inverse();
     Eigen::MatrixXd difference = -target_motion;
     difference.middleCols<6>(static_cast<Eigen::Index>(6 * n)) += Eigen::Matrix<double, 6, 6>::Identity();
     Eigen::Matrix<double, 3, 6> at_center;
-    at_center << Eigen::Matrix3d::Identity(), -cross_matrix(found.poses[n].front() * renderers.center_patient_mm(n));
+    at_center << Eigen::Matrix3d::Identity(), -cross_matrix(poses[n].front() * renderers.center_patient_mm(n));
     const Eigen::MatrixXd per_motions = at_center * difference;
-    const Vector3d variance = (per_motions * found.covariance * per_motions.transpose()).diagonal();
+    const Vector3d variance = (per_motions * certainty.covariance * per_motions.transpose()).diagonal();
     Eigen::MatrixXd own = Eigen::MatrixXd::Zero(3, difference.cols());
     own.middleCols<6>(static_cast<Eigen::Index>(6 * n)) = at_center;
     motions.push_back({.name = bodies.bodies[n].name,
@@ -103,8 +97,8 @@ std::vector<BodyMotion> motions_of(const JointedBodies& bodies, const BodyRender
                        .rotation_rad = rotation_vector(against.linear()),
                        .sigma_mm = variance.cwiseSqrt(),
                        .carries_target = carriers.shares()[n],
-                       .image_share = image_share(own * found.covariance * own.transpose(),
-                                                  own * found.covariance_on_loose_springs * own.transpose()),
+                       .image_share = image_share(own * certainty.covariance * own.transpose(),
+                                                  own * certainty.covariance_on_loose_springs * own.transpose()),
                        .breathes = bodies.bodies[n].breathes});
   }
   return motions;
@@ -115,42 +109,11 @@ Uncertainty uncertainty_of(const Eigen::Matrix<double, 6, 6>& covariance) {
   return {.translation_mm = sigma.head<3>(), .rotation_rad = sigma.tail<3>()};
 }
 
-// Gradient correlation, mean over the views, with bodies at some poses.
-double match_of(const BodyScene& scene, const BodyPoses& poses, double pixel_mm) {
-  const Eigen::Isometry3d& about = poses.front().front();
-  const std::vector<FixedImage> level = scene.views.reduced_to(pixel_mm, about, 5.0);
-  const Objective pixels(scene.whole, level, about, {.similarity = SimilarityKind::kGradientCorrelation});
-  double sum = 0.0;
-  for (std::size_t view = 0; view < level.size(); ++view)
-    sum += pixels.comparison(view).of(drr_of(scene, pixels, poses, view)) / static_cast<double>(level.size());
-  return sum;
-}
-
-// How well the images match with the spine one vertebra higher or lower: the same search, as free, from there. Its
-// first stage only, which ends in the same trough. `as_is`: where that stage ended from the whole itself.
-std::vector<Alternative> compare_levels(const BodyScene& scene, const Carriers& carriers,
-                                        const Eigen::Isometry3d& whole_room_from_patient, BodySearchOptions search,
-                                        const BodyPoses& as_is) {
-  std::vector<Alternative> alternatives;
-  if (!scene.bodies.bodies[carriers.largest()].is_vertebra) return alternatives;
-  search.stages.resize(1);
-  const double pixel_mm = search.stages.front().pixel_mm, match_as_is = match_of(scene, as_is, pixel_mm);
-  const std::vector<double> here = parameters_from_setup_error(carriers.setup_error_at(as_is));
-  for (const int step : {-1, 1}) {
-    const std::size_t other = carriers.largest() + static_cast<std::size_t>(step);
-    if (other >= scene.bodies.bodies.size() || !scene.bodies.bodies[other].is_vertebra) continue;
-    const Vector3d way =
-        scene.renderers.center_patient_mm(other) - scene.renderers.center_patient_mm(carriers.largest());
-    const BodyPoses there = search_bodies(scene, whole_room_from_patient * Eigen::Translation3d(way), search).poses;
-    const PoseDistance distance = distance_between(here, parameters_from_setup_error(carriers.setup_error_at(there)));
-    alternatives.push_back(
-        {.description = fmt::format("the spine one vertebra farther toward the {}", step > 0 ? "head" : "feet"),
-         .similarity = match_of(scene, there, pixel_mm),
-         .as_is = match_as_is,
-         .distance_mm = distance.translation_mm,
-         .angle_rad = distance.angle_rad});
-  }
-  return alternatives;
+RenderedBodies rendered(const BentPatient& patient, double voxel_mm) {
+  const CoarserCt ct = coarser_ct(patient.ct_hu, patient.attenuation,
+                                  block_of(patient.ct_hu.spacing_mm(), patient.ct_hu.size, voxel_mm));
+  return {.apart = BodyRenderers(RendererKind::kCpu, ct.hu, ct.model, patient.beams, patient.parts.bodies.shares),
+          .as_one = make_renderer(RendererKind::kCpu, ct.hu, ct.model, patient.beams)};
 }
 
 }  // namespace
@@ -174,15 +137,15 @@ void register_bodies(const BentPatient& patient, std::span<const FixedImage> ima
   const FixedViews fixed{.images = restricted_to(options.rectangles, images),
                          .region = options.region != nullptr ? *options.region : everything};
   const BodySearchOptions search;
-  const CoarserCt ct = coarser_ct(patient.ct_hu, patient.attenuation,
-                                  block_of(patient.ct_hu.spacing_mm(), patient.ct_hu.size, search.voxel_mm));
-  const BodyRenderers renderers(RendererKind::kCpu, ct.hu, ct.model, patient.beams, patient.parts.bodies.shares);
-  const auto whole = make_renderer(RendererKind::kCpu, ct.hu, ct.model, patient.beams);
-  const BodyScene scene{.bodies = patient.parts.bodies, .renderers = renderers, .whole = *whole, .views = fixed};
-
-  const Eigen::Isometry3d whole_pose = result.actual_room_from_patient;
-  const BodySearchResult found = search_bodies(scene, whole_pose, search, progress);
-  const CarriedTarget target = carriers.target_at(found);
+  const RenderedBodies fine = rendered(patient, search.voxel_mm), coarse = rendered(patient, search.coarse_voxel_mm);
+  const BodyScene scene{.bodies = patient.parts.bodies,
+                        .fine = fine,
+                        .coarse = coarse,
+                        .views = fixed,
+                        .whole_room_from_patient = result.actual_room_from_patient};
+  const TargetSearchResult found = search_target(scene, carriers, search, progress);
+  const BodyCertainty certainty = certainty_of(scene, found.poses, search.stages.back());
+  const CarriedTarget target = carriers.target_at(found.poses, certainty);
   result.actual_room_from_patient = target.setup_error * start_room_from_patient;
   result.uncertainty = uncertainty_of(target.covariance);
   result.target_deformation_mm = target.deformation_mm;
@@ -190,10 +153,10 @@ void register_bodies(const BentPatient& patient, std::span<const FixedImage> ima
   std::ranges::copy(found.stages, std::back_inserter(result.stages));
   // Soft tissue may still creep. What counts is the target.
   result.stages.back().reached_limit = result.stages.back().reached_limit && target.left_mm > kConvergedMm;
-  report_match(scene, carriers, target, patient.target.center_room_mm, found, result);
-  result.bodies = motions_of(patient.parts.bodies, renderers, carriers, target, start_room_from_patient, found);
-  std::ranges::copy(compare_levels(scene, carriers, whole_pose, search, found.poses_after_first_stage),
-                    std::back_inserter(result.alternatives));
+  report_match(scene, carriers, target, patient.target.center_room_mm, found.poses, result);
+  result.bodies =
+      motions_of(patient.parts.bodies, fine.apart, carriers, target, start_room_from_patient, found.poses, certainty);
+  std::ranges::copy(found.alternatives, std::back_inserter(result.alternatives));
   judge(parameters_from_setup_error(target.setup_error), options, result);
   result.seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
 }

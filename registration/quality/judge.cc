@@ -146,6 +146,7 @@ void judge_uncertainty(RegistrationResult& result) {
 
 void judge_alternatives(RegistrationResult& result) {
   for (const Alternative& alternative : result.alternatives) {
+    if (alternative.is_ruled_out) continue;
     const double as_is = 1.0 - alternative.as_is, as_other = 1.0 - alternative.similarity;
     if (as_other * kAlternativeMargin <= as_is)
       review(result, fmt::format("with {} the images match better ({:.3f}; as they are {:.3f})",

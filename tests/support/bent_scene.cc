@@ -1,6 +1,7 @@
 #include "tests/support/bent_scene.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <random>
 
@@ -37,6 +38,12 @@ std::vector<Shape> vertebra(double z, std::uint64_t seed) {
 }
 
 }  // namespace
+
+RenderedBodies rendered_bodies(const BentScene& scene, const JointedBodies& bodies) {
+  constexpr std::array kOneBeam = {Beam::kKilovoltage};
+  return {.apart = BodyRenderers(RendererKind::kCpu, scene.ct, {}, kOneBeam, bodies.shares),
+          .as_one = make_renderer(RendererKind::kCpu, scene.ct, {}, kOneBeam)};
+}
 
 std::vector<BodyShare> slabs(const Volume<float>& ct, const std::vector<double>& limits_mm, double soft_mm) {
   std::vector<BodyShare> shares(limits_mm.size() + 1, BodyShare(ct.size, ct.patient_from_voxel));

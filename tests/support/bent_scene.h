@@ -4,7 +4,7 @@
 
 #include <vector>
 
-#include "registration/bodies/jointed_bodies.h"
+#include "registration/bodies/body_search.h"
 #include "tests/support/registration_scene.h"
 
 namespace isoshift {
@@ -29,6 +29,9 @@ struct MovedGroup {
 // A column of vertebra-like groups, 36 mm apart along the patient, the middle one at the isocenter; the shares change
 // linearly over 12 mm between two of them.
 BentScene bent_column(const std::vector<MovedGroup>& groups);
+
+// The scene's CT as bodies.
+RenderedBodies rendered_bodies(const BentScene& scene, const JointedBodies& bodies);
 
 // Shares of slabs along the patient's z that add up to 255: from one to the next over `soft_mm` about each limit.
 std::vector<BodyShare> slabs(const Volume<float>& ct, const std::vector<double>& limits_mm, double soft_mm);

@@ -20,13 +20,18 @@ BentScene bent() {
                       {.translation_mm = {2.5, -1.0, 0.0}, .rotation_deg = {2.0, -1.0, 1.5}}});
 }
 
+struct Searched {
+  BodyPoses poses;
+  BodyCertainty certainty;
+};
+
 // Of the farthest of the points, 26 mm from a body's center, with voxels of 2 mm. Tiles that all weigh the same,
 // however faint they are, cost 0.15 mm of it here, where nothing but bodies moves (docs/algorithms.md, "Bodies that
 // bend").
 constexpr double kFarthestMm = 1.0;
 
 // How far the search puts a group's center, and points 15 mm around it, from where they are: the farthest.
-double error_mm(const BentScene& scene, std::size_t group, const BodySearchResult& found) {
+double error_mm(const BentScene& scene, std::size_t group, const Searched& found) {
   const Eigen::Isometry3d error = found.poses[group].front() * scene.planned.inverse();
   const double z = 36.0 * (static_cast<double>(group) - 0.5 * static_cast<double>(scene.truth.size() - 1));
   double farthest = 0.0;
@@ -38,29 +43,36 @@ double error_mm(const BentScene& scene, std::size_t group, const BodySearchResul
   return farthest;
 }
 
-BodySearchResult search_from(const BentScene& scene, const Vector3d& offset_mm, const JointedBodies& bodies) {
-  const Eigen::Isometry3d start = Eigen::Translation3d(offset_mm) * scene.planned;
-  const BodyRenderers renderers(RendererKind::kCpu, scene.ct, {}, std::array{Beam::kKilovoltage}, bodies.shares);
-  const auto whole = make_renderer(RendererKind::kCpu, scene.ct, {}, std::array{Beam::kKilovoltage});
+Searched search_from(const BentScene& scene, const Vector3d& offset_mm, const JointedBodies& bodies) {
+  const RenderedBodies rendered = rendered_bodies(scene, bodies);
   const FixedViews views = scene.views();
-  return search_bodies({.bodies = bodies, .renderers = renderers, .whole = *whole, .views = views}, start);
+  const BodyScene searched{.bodies = bodies,
+                           .fine = rendered,
+                           .coarse = rendered,
+                           .views = views,
+                           .whole_room_from_patient = Eigen::Translation3d(offset_mm) * scene.planned};
+  const BodySearchOptions options;
+  const BodyPoses start = at_one_pose(searched, searched.whole_room_from_patient);
+  const BodyPoses poses = search_bodies(searched, start, options.stages, options.bound_mm).poses;
+  return {.poses = poses, .certainty = certainty_of(searched, poses, options.stages.back())};
 }
 
 // One sigma of where a body's isocenter lies.
-double sigma_mm(const BodySearchResult& found, std::size_t body) {
+double sigma_mm(const Searched& found, std::size_t body) {
   const auto at = static_cast<Eigen::Index>(6 * body);
-  return std::sqrt(found.covariance.block<3, 3>(at, at).trace());
+  return std::sqrt(found.certainty.covariance.block<3, 3>(at, at).trace());
 }
 
-double share_of_images(const BodySearchResult& found, std::size_t body) {
+double share_of_images(const Searched& found, std::size_t body) {
   const auto at = static_cast<Eigen::Index>(6 * body);
-  return image_share(found.covariance.block<3, 3>(at, at), found.covariance_on_loose_springs.block<3, 3>(at, at));
+  return image_share(found.certainty.covariance.block<3, 3>(at, at),
+                     found.certainty.covariance_on_loose_springs.block<3, 3>(at, at));
 }
 
 TEST(BodySearch, FindsEveryBodyOfABentColumn) {
   const BentScene scene = bent();
   for (const Vector3d& offset : {Vector3d(0, 0, 0), Vector3d(4, -3, 2)}) {
-    const BodySearchResult found = search_from(scene, offset, scene.bodies);
+    const Searched found = search_from(scene, offset, scene.bodies);
     for (std::size_t group = 0; group < 3; ++group) {
       EXPECT_LT(error_mm(scene, group, found), kFarthestMm) << "group " << group << " from " << offset.transpose();
       EXPECT_GT(share_of_images(found, group), 0.5);
@@ -80,7 +92,7 @@ TEST(BodySearch, ABodyWithoutImagesIsLeftToItsSprings) {
         const auto bottom = image.view.project(scene.planned * Vector3d(0, 0, -100.0));
         if ((row < top->y()) == (top->y() < bottom->y())) image.field.at(column, row) = 0;
       }
-  const BodySearchResult found = search_from(scene, {0, 0, 0}, scene.bodies);
+  const Searched found = search_from(scene, {0, 0, 0}, scene.bodies);
   EXPECT_LT(share_of_images(found, 2), 0.2);
   EXPECT_GT(share_of_images(found, 1), 0.5);
   EXPECT_LT(error_mm(scene, 0, found), kFarthestMm);
@@ -98,7 +110,7 @@ TEST(BodySearch, ABodyThatBreathesHasAPosePerView) {
   JointedBodies bodies = scene.bodies;
   bodies.bodies[2].breathes = true;
   bodies.springs[1].sigma_mm = 5.0;
-  const BodySearchResult found = search_from(scene, {0, 0, 0}, bodies);
+  const Searched found = search_from(scene, {0, 0, 0}, bodies);
   EXPECT_LT(error_mm(scene, 1, found), kFarthestMm);
   const Vector3d middle = scene.planned * Vector3d(0, 0, 36.0);
   const auto moved = [&](std::size_t view) -> Vector3d {

@@ -115,18 +115,19 @@ TEST(Carriers, MoveTheTargetAsTheyMove) {
   Eigen::Isometry3d motion = Eigen::Isometry3d::Identity();
   motion.linear() = Eigen::AngleAxisd(0.05, Vector3d(1, 2, 3).normalized()).toRotationMatrix();
   motion.translation() = Vector3d(3, -4, 5);
-  BodySearchResult found;
+  BodyPoses poses;
   const std::size_t bodies = patient.bodies.bodies.size();
-  found.poses.assign(bodies, {motion, motion});
+  poses.assign(bodies, {motion, motion});
   const auto parameters = static_cast<Eigen::Index>(6 * bodies);
-  found.covariance = found.covariance_on_loose_springs = Eigen::MatrixXd::Identity(parameters, parameters);
-  found.motions_left = Eigen::VectorXd::Zero(parameters);
-  const CarriedTarget rigid = carriers.target_at(found);
+  const BodyCertainty certainty{.covariance = Eigen::MatrixXd::Identity(parameters, parameters),
+                                .covariance_on_loose_springs = Eigen::MatrixXd::Identity(parameters, parameters),
+                                .motions_left = Eigen::VectorXd::Zero(parameters)};
+  const CarriedTarget rigid = carriers.target_at(poses, certainty);
   EXPECT_LT((rigid.setup_error.matrix() - motion.matrix()).cwiseAbs().maxCoeff(), 1e-9);
   EXPECT_LT(rigid.deformation_mm, 1e-9);
   // The vertebra in which the target lies turns alone: the target's center goes with it, its surface mostly.
-  found.poses[1] = {motion * Eigen::Translation3d(0, 2, 0), motion};
-  const CarriedTarget bent = carriers.target_at(found);
+  poses[1] = {motion * Eigen::Translation3d(0, 2, 0), motion};
+  const CarriedTarget bent = carriers.target_at(poses, certainty);
   const Vector3d center = bent.setup_error * Vector3d::Zero();
   EXPECT_LT((center - motion * Vector3d(0, 2, 0)).norm(), 0.1);
 }

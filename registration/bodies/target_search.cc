@@ -1,0 +1,115 @@
+#include "registration/bodies/target_search.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <functional>
+
+#include "registration/pose_parameters.h"
+
+namespace isoshift {
+namespace {
+
+// Of the logarithm of probability, which is too sure: neighboring tiles are not independent. Searches that ended at
+// another vertebra, or between two, were 20 and more behind after the first stage and hundreds after the second.
+constexpr double kClearlyLess = 15.0;
+constexpr double kSamePlaceMm = 1.0;
+
+// A place to begin at, and what became of it.
+struct Hypothesis {
+  std::string description;
+  BodySearchResult found;
+};
+
+std::vector<Hypothesis> hypotheses_of(const BodyScene& scene, const Carriers& carriers) {
+  const Eigen::Isometry3d& whole = scene.whole_room_from_patient;
+  std::vector<Hypothesis> hypotheses = {{.description = "the spine where the patient as a whole matches best",
+                                         .found = {.poses = at_one_pose(scene, whole)}}};
+  const std::size_t carrier = carriers.largest();
+  if (!scene.bodies.bodies[carrier].is_vertebra) return hypotheses;
+  for (const int step : {-1, 1}) {
+    const std::size_t other = carrier + static_cast<std::size_t>(step);
+    if (other >= scene.bodies.bodies.size() || !scene.bodies.bodies[other].is_vertebra) continue;
+    const Eigen::Vector3d way = scene.fine.apart.center_patient_mm(other) - scene.fine.apart.center_patient_mm(carrier);
+    for (const double part : {0.5, 1.0})
+      hypotheses.push_back({.description = fmt::format("the spine {} vertebra farther toward the {}",
+                                                       part < 1.0 ? "half a" : "one", step > 0 ? "head" : "feet"),
+                            .found = {.poses = at_one_pose(scene, whole * Eigen::Translation3d(part * way))}});
+  }
+  return hypotheses;
+}
+
+// Gradient correlation, mean over the views.
+double match_of(const BodyScene& scene, const BodyPoses& poses, const BodyStage& stage) {
+  const RenderedBodies& rendered = scene.of(stage);
+  const Eigen::Isometry3d& about = scene.whole_room_from_patient;
+  const std::vector<FixedImage> level = scene.views.reduced_to(stage.pixel_mm, about, 5.0);
+  const Objective pixels(*rendered.as_one, level, about, {.similarity = SimilarityKind::kGradientCorrelation});
+  double sum = 0.0;
+  for (std::size_t view = 0; view < level.size(); ++view)
+    sum += pixels.comparison(view).of(rendered.line_integrals(pixels, poses, view)) / static_cast<double>(level.size());
+  return sum;
+}
+
+PoseDistance distance_of(const Carriers& carriers, const Hypothesis& a, const Hypothesis& b) {
+  return distance_between(parameters_from_setup_error(carriers.setup_error_at(a.found.poses)),
+                          parameters_from_setup_error(carriers.setup_error_at(b.found.poses)));
+}
+
+bool is_clearly_less(const Hypothesis& one, const Hypothesis& best) {
+  return one.found.log_probability < best.found.log_probability - kClearlyLess;
+}
+
+// From where the last stage ended.
+void search_on(const BodyScene& scene, const BodyStage& stage, double bound_mm, Hypothesis& one) {
+  BodySearchResult found = search_bodies(scene, one.found.poses, std::span(&stage, 1), bound_mm);
+  one.found.poses = std::move(found.poses);
+  one.found.log_probability = found.log_probability;
+  one.found.stages.push_back(std::move(found.stages.front()));
+}
+
+Alternative alternative_of(const BodyScene& scene, const Carriers& carriers, const BodyStage& stage,
+                           const Hypothesis& other, const Hypothesis& best) {
+  const PoseDistance distance = distance_of(carriers, other, best);
+  return {.description = other.description,
+          .similarity = match_of(scene, other.found.poses, stage),
+          .as_is = match_of(scene, best.found.poses, stage),
+          .distance_mm = distance.translation_mm,
+          .angle_rad = distance.angle_rad,
+          .is_ruled_out = is_clearly_less(other, best)};
+}
+
+}  // namespace
+
+TargetSearchResult search_target(const BodyScene& scene, const Carriers& carriers, const BodySearchOptions& options,
+                                 const SearchProgress& progress) {
+  TargetSearchResult result;
+  std::vector<Hypothesis> open = hypotheses_of(scene, carriers);
+  double done = 0.0;
+  for (const BodyStage& stage : options.stages) {
+    for (Hypothesis& one : open) {
+      search_on(scene, stage, options.bound_mm, one);
+      done += 1.0 / static_cast<double>(options.stages.size() * open.size());
+      if (progress) progress(std::min(done, 1.0));
+    }
+    std::ranges::stable_sort(open, std::greater(), [](const Hypothesis& one) { return one.found.log_probability; });
+    const bool is_last = &stage == &options.stages.back();
+    std::vector<Hypothesis> kept = {open.front()};
+    for (const Hypothesis& one : std::span(open).subspan(1)) {
+      const bool has_come_to_a_better = std::ranges::any_of(kept, [&](const Hypothesis& better) {
+        return distance_of(carriers, one, better).translation_mm < kSamePlaceMm;
+      });
+      if (has_come_to_a_better) continue;
+      if (is_last || is_clearly_less(one, open.front()))
+        result.alternatives.push_back(alternative_of(scene, carriers, stage, one, open.front()));
+      else
+        kept.push_back(one);
+    }
+    open = std::move(kept);
+  }
+  result.poses = open.front().found.poses;
+  result.stages = open.front().found.stages;
+  return result;
+}
+
+}  // namespace isoshift
