@@ -171,6 +171,9 @@ EvaluationSummary summarized(std::span<const EvaluatedRun> runs, bool by_mrpd) {
       ++summary.beyond_2_mm;
       summary.beyond_2_mm_accepted += accepted ? 1 : 0;
     }
+    summary.target_within_1_mm += run.target_mm < 1.0 ? 1 : 0;
+    summary.target_within_1_mm_accepted += run.target_mm < 1.0 && accepted ? 1 : 0;
+    summary.target_beyond_2_mm_accepted += run.target_mm > 2.0 && accepted ? 1 : 0;
   }
   summary.runs = static_cast<int>(runs.size());
   summary.successes = static_cast<int>(found.size());
@@ -186,6 +189,7 @@ EvaluationSummary summarized(std::span<const EvaluatedRun> runs, bool by_mrpd) {
     summary.capture_range_mm = bin.start_mm + 1;
   }
   summary.rotation_share_of_failures = mean_of(failed_rotation_share);
+  summary.median_target_mm = median_of(values_of(runs, &EvaluatedRun::target_mm));
   summary.median_seconds = median_of(values_of(runs, &EvaluatedRun::seconds));
   summary.mean_evaluations = mean_of(values_of(runs, &EvaluatedRun::evaluations));
   if (const double seconds = mean_of(values_of(runs, &EvaluatedRun::seconds)); seconds > 0.0) {

@@ -52,6 +52,7 @@ struct EvaluatedRun {
   double start_mtre_mm = 0.0;
   double mtre_mm = 0.0;
   double mpd_mm = 0.0, mrpd_mm = 0.0;  // means over the views
+  double target_mm = 0.0;              // of the target: the farthest corner of a box of 15 mm edge about its center
   double rotation_share = 0.0;
   std::array<double, 6> error = {};            // x, y, z in mm, about x, y, z in degrees
   std::optional<std::array<double, 6>> sigma;  // what the registration gave as its uncertainty, the same units
@@ -75,6 +76,10 @@ struct EvaluationSummary {
   double rendering_share = 0.0, similarity_share = 0.0;  // of all time
   int within_1_mm = 0, within_1_mm_accepted = 0;         // runs that ended there, and how many of them were accepted
   int beyond_2_mm = 0, beyond_2_mm_accepted = 0;
+  // The same of the target alone, and the median over all runs.
+  double median_target_mm = 0.0;
+  int target_within_1_mm = 0, target_within_1_mm_accepted = 0;
+  int target_beyond_2_mm_accepted = 0;
   // Share of runs whose true error lies within one and two sigma, per axis; nothing without sigmas.
   std::optional<std::array<double, 6>> within_one_sigma, within_two_sigma;
 

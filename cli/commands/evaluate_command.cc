@@ -72,6 +72,9 @@ void add_evaluate_command(CLI::App& app, Console& console, int&) {
       "evaluation that was stopped. The protocol is that of van de Kraats et al. (2005): docs/evaluation.md.");
   add_study_options(*command, options.study);
   command->add_option("--truth", flags->truth, "truth.json of the study: the true setup error")->type_name("FILE");
+  command
+      ->add_option("--target", options.target, "The structure whose error counts, or isocenter [what the plan names]")
+      ->type_name("NAME");
   command->add_option("-o,--output", options.output, "Folder for the results")->type_name("FOLDER");
   command
       ->add_option("--series", flags->series,

@@ -36,8 +36,7 @@ struct BodySearchOptions {
                                     .initial_step_mm = 4.0},
                                    {.pixel_mm = 2.0, .least_gain = 1.0, .max_evaluations = 15},
                                    {.pixel_mm = 1.3, .tile_mm = 10.0, .initial_step_mm = 1.0}};
-  double voxel_mm = 1.4, coarse_voxel_mm = 3.0;  // the CT is reduced to voxels up to these edges
-  double bound_mm = 40.0;                        // of every parameter and stage
+  double bound_mm = 40.0;  // of every parameter and stage
 };
 
 struct BodySearchResult {

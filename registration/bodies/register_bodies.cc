@@ -22,6 +22,7 @@ using Eigen::Vector3d;
 constexpr double kSpring = 0.01;
 constexpr double kNearTargetMm = 30.0;
 constexpr double kConvergedMm = 0.1;
+constexpr double kVoxelMm = 1.4, kCoarseVoxelMm = 3.0;  // the CT is reduced to voxels up to these edges
 
 // How the target's center and points 30 mm from it move in a view with a motion of the target (in the room, about the
 // isocenter): two rows per point, mm at the isocenter.
@@ -109,14 +110,21 @@ Uncertainty uncertainty_of(const Eigen::Matrix<double, 6, 6>& covariance) {
   return {.translation_mm = sigma.head<3>(), .rotation_rad = sigma.tail<3>()};
 }
 
-RenderedBodies rendered(const BentPatient& patient, double voxel_mm) {
-  const CoarserCt ct = coarser_ct(patient.ct_hu, patient.attenuation,
-                                  block_of(patient.ct_hu.spacing_mm(), patient.ct_hu.size, voxel_mm));
-  return {.apart = BodyRenderers(RendererKind::kCpu, ct.hu, ct.model, patient.beams, patient.parts.bodies.shares),
-          .as_one = make_renderer(RendererKind::kCpu, ct.hu, ct.model, patient.beams)};
+RenderedBodies rendered(const Volume<float>& ct_hu, const AttenuationModel& attenuation, std::span<const Beam> beams,
+                        const JointedBodies& bodies, double voxel_mm) {
+  const CoarserCt ct = coarser_ct(ct_hu, attenuation, block_of(ct_hu.spacing_mm(), ct_hu.size, voxel_mm));
+  return {.apart = BodyRenderers(RendererKind::kCpu, ct.hu, ct.model, beams, bodies.shares),
+          .as_one = make_renderer(RendererKind::kCpu, ct.hu, ct.model, beams)};
 }
 
 }  // namespace
+
+BentPatient::BentPatient(const Volume<float>& ct_hu, const AttenuationModel& attenuation, std::span<const Beam> beams,
+                         PatientBodies parts_of_patient, Target target_of_patient)
+    : parts(std::move(parts_of_patient)),
+      target(std::move(target_of_patient)),
+      fine(rendered(ct_hu, attenuation, beams, parts.bodies, kVoxelMm)),
+      coarse(rendered(ct_hu, attenuation, beams, parts.bodies, kCoarseVoxelMm)) {}
 
 bool may_have_bent(const RegistrationOptions& options, const RegistrationResult& whole) {
   const bool is_whole = options.region == nullptr || !options.region->has_volume();
@@ -125,10 +133,10 @@ bool may_have_bent(const RegistrationOptions& options, const RegistrationResult&
 }
 
 void register_bodies(const BentPatient& patient, std::span<const FixedImage> images,
-                     const Eigen::Isometry3d& start_room_from_patient, const RegistrationOptions& options,
+                     const Eigen::Isometry3d& planned_room_from_patient, const RegistrationOptions& options,
                      RegistrationResult& result, const SearchProgress& progress) {
   const auto begin = std::chrono::steady_clock::now();
-  const Carriers carriers(patient.parts, patient.target, start_room_from_patient);
+  const Carriers carriers(patient.parts, patient.target, planned_room_from_patient);
   if (!carriers.exist()) {
     result.demote(Verdict::kReview, "no bone carries the target: soft tissue is not seen in X-rays");
     return;
@@ -137,16 +145,15 @@ void register_bodies(const BentPatient& patient, std::span<const FixedImage> ima
   const FixedViews fixed{.images = restricted_to(options.rectangles, images),
                          .region = options.region != nullptr ? *options.region : everything};
   const BodySearchOptions search;
-  const RenderedBodies fine = rendered(patient, search.voxel_mm), coarse = rendered(patient, search.coarse_voxel_mm);
   const BodyScene scene{.bodies = patient.parts.bodies,
-                        .fine = fine,
-                        .coarse = coarse,
+                        .fine = patient.fine,
+                        .coarse = patient.coarse,
                         .views = fixed,
                         .whole_room_from_patient = result.actual_room_from_patient};
   const TargetSearchResult found = search_target(scene, carriers, search, progress);
   const BodyCertainty certainty = certainty_of(scene, found.poses, search.stages.back());
   const CarriedTarget target = carriers.target_at(found.poses, certainty);
-  result.actual_room_from_patient = target.setup_error * start_room_from_patient;
+  result.actual_room_from_patient = target.setup_error * planned_room_from_patient;
   result.uncertainty = uncertainty_of(target.covariance);
   result.target_deformation_mm = target.deformation_mm;
   result.target_image_share = target.image_share;
@@ -154,8 +161,8 @@ void register_bodies(const BentPatient& patient, std::span<const FixedImage> ima
   // Soft tissue may still creep. What counts is the target.
   result.stages.back().reached_limit = result.stages.back().reached_limit && target.left_mm > kConvergedMm;
   report_match(scene, carriers, target, patient.target.center_room_mm, found.poses, result);
-  result.bodies =
-      motions_of(patient.parts.bodies, fine.apart, carriers, target, start_room_from_patient, found.poses, certainty);
+  result.bodies = motions_of(patient.parts.bodies, patient.fine.apart, carriers, target, planned_room_from_patient,
+                             found.poses, certainty);
   std::ranges::copy(found.alternatives, std::back_inserter(result.alternatives));
   judge(parameters_from_setup_error(target.setup_error), options, result);
   result.seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();

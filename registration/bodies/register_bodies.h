@@ -1,19 +1,21 @@
 #pragma once
 // The answer for the target of a patient who has bent: where the bodies lie that carry it, and what the others did.
 
+#include "registration/bodies/body_search.h"
 #include "registration/bodies/patient_bodies.h"
 #include "registration/register_views.h"
 #include "setup/target.h"
 
 namespace isoshift {
 
-// What the CT shows, and what of it is the target.
+// A patient who may have bent, ready to be searched: made once, for any number of registrations.
 struct BentPatient {
-  const Volume<float>& ct_hu;
-  AttenuationModel attenuation;
-  std::vector<Beam> beams;  // of the views
+  BentPatient(const Volume<float>& ct_hu, const AttenuationModel& attenuation, std::span<const Beam> beams,
+              PatientBodies parts, Target target);
+
   PatientBodies parts;
   Target target;
+  RenderedBodies fine, coarse;  // with voxels up to 1.4 and 3 mm
 };
 
 // Whether bodies may answer: what was found of the patient as a whole needs a review, nothing but the whole image was
@@ -24,9 +26,10 @@ bool may_have_bent(const RegistrationOptions& options, const RegistrationResult&
 // Searches all bodies from the pose of the whole, and judges again. In the result, pose, uncertainty, similarities and
 // contradictions are those of the bodies that carry the target; `alternatives` gains what the images say of a spine one
 // vertebra higher or lower; `bodies` holds what the others did. Bones carry the target by their shares of it; if soft
-// tissue has most of it, or the CT shows no body, the result stays as it is but for a reason.
+// tissue has most of it, or the CT shows no body, the result stays as it is but for a reason. The result's pose must be
+// that of the whole.
 void register_bodies(const BentPatient& patient, std::span<const FixedImage> images,
-                     const Eigen::Isometry3d& start_room_from_patient, const RegistrationOptions& options,
+                     const Eigen::Isometry3d& planned_room_from_patient, const RegistrationOptions& options,
                      RegistrationResult& result, const SearchProgress& progress = {});
 
 }  // namespace isoshift

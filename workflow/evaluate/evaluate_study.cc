@@ -15,6 +15,8 @@
 #include "geometry/target_error.h"
 #include "registration/quality/judge.h"
 #include "setup/couch_shift.h"
+#include "workflow/register/target_of.h"
+#include "workflow/register/target_registration.h"
 
 namespace isoshift {
 namespace {
@@ -31,7 +33,8 @@ Json rows_of(const Eigen::Isometry3d& transform) {
 
 // All that the runs depend on: an evaluation is continued only where it is the same.
 Json configuration_of(const RegistrationRequest& request, const std::string& intensity, const Study& study,
-                      const Renderer& renderer, const Eigen::Isometry3d& truth, const StartProtocol& protocol) {
+                      const Renderer& renderer, const Target& target, const Eigen::Isometry3d& truth,
+                      const StartProtocol& protocol) {
   Json images = Json::array(), settings = Json::object();
   for (const RtImage& image : study.rt_images) images.push_back(image.sop_instance_uid);
   for (const auto& [name, value] : request.rendering.settings()) settings[name] = value;
@@ -69,6 +72,7 @@ Json configuration_of(const RegistrationRequest& request, const std::string& int
           {"around_isocenter_mm", request.region.around_isocenter_mm.value_or(0.0)},
           {"margin_mm", request.region.margin_mm},
           {"rectangles", request.region.rectangles},
+          {"target", target.name},
           {"seed", request.search.seed},
           {"series", protocol.series == StartProtocol::Series::kPaper ? "paper" : "bins"},
           {"start_seed", protocol.seed},
@@ -83,13 +87,26 @@ std::string joined(const std::vector<std::string>& reasons) {
   return text;
 }
 
+// The farthest corner of a box about the target's center, of the edge of the vertebral bodies that are targets.
+double target_error_mm(const Eigen::Isometry3d& found, const Eigen::Isometry3d& truth, const Target& target) {
+  constexpr double kHalfEdgeMm = 7.5;
+  double farthest_mm = 0.0;
+  for (int n = 0; n < 8; ++n) {
+    const Eigen::Vector3d side(2 * (n & 1) - 1, (n & 2) - 1, (n & 4) / 2 - 1);
+    const Eigen::Vector3d corner = target.center_room_mm + kHalfEdgeMm * side;
+    farthest_mm = std::max(farthest_mm, (found * corner - truth * corner).norm());
+  }
+  return farthest_mm;
+}
+
 void add_errors(const RegistrationResult& result, const Eigen::Isometry3d& truth, const Study& study,
-                EvaluatedRun& run) {
+                const Target& target, EvaluatedRun& run) {
   const std::vector<Eigen::Vector3d> targets_mm = standard_targets_mm();
   const Eigen::Isometry3d found =
       setup_error_from_poses(study.planned_room_from_patient, result.actual_room_from_patient);
   run.mtre_mm = mean_target_registration_error_mm(found, truth, targets_mm);
   run.mpd_mm = run.mrpd_mm = 0.0;
+  run.target_mm = target_error_mm(found, truth, target);
   for (const XrayImage& xray : study.xrays) {
     const auto views = static_cast<double>(study.xrays.size());
     run.mpd_mm += mean_projection_distance_mm(found, truth, targets_mm, xray.view) / views;
@@ -114,14 +131,20 @@ void add_errors(const RegistrationResult& result, const Eigen::Isometry3d& truth
 
 // A registration that ends with an error counts as one that found nothing.
 EvaluatedRun evaluated(int number, const StartPose& start, const Eigen::Isometry3d& truth, const Study& study,
-                       std::span<const FixedImage> images, const RegistrationSetup& setup) {
+                       std::span<const FixedImage> images, const Target& target,
+                       const TargetRegistration& registration) {
   constexpr double kNothing = std::numeric_limits<double>::infinity();
-  EvaluatedRun run{
-      .number = number, .start_mtre_mm = start.mtre_mm, .mtre_mm = kNothing, .mpd_mm = kNothing, .mrpd_mm = kNothing};
+  EvaluatedRun run{.number = number,
+                   .start_mtre_mm = start.mtre_mm,
+                   .mtre_mm = kNothing,
+                   .mpd_mm = kNothing,
+                   .mrpd_mm = kNothing,
+                   .target_mm = kNothing};
+  Observer nobody;
   try {
     const RegistrationResult result =
-        register_views(setup.renderers(), images, start.setup_error * study.planned_room_from_patient, setup.options());
-    add_errors(result, truth, study, run);
+        registration.from(start.setup_error * study.planned_room_from_patient, images, nobody);
+    add_errors(result, truth, study, target, run);
     run.verdict = result.verdict;
     run.reasons = joined(result.reasons);
     run.evaluations = result.evaluations();
@@ -136,8 +159,9 @@ EvaluatedRun evaluated(int number, const StartPose& start, const Eigen::Isometry
 
 // Runs what is missing, several at a time, each on one thread; alone, one uses all. What it finds does not depend on
 // that.
-void run_missing(EvaluationFolder& folder, const Study& study, const RegistrationSetup& setup,
-                 const Eigen::Isometry3d& truth, const std::vector<StartPose>& starts, int jobs, Observer& observer) {
+void run_missing(EvaluationFolder& folder, const Study& study, const Target& target,
+                 const TargetRegistration& registration, const Eigen::Isometry3d& truth,
+                 const std::vector<StartPose>& starts, int jobs, Observer& observer) {
   const std::vector<FixedImage> images = prepared(study.xrays);
   std::vector<int> missing;
   for (int number = 0; number < static_cast<int>(starts.size()); ++number)
@@ -148,7 +172,7 @@ void run_missing(EvaluationFolder& folder, const Study& study, const Registratio
   const auto work = [&] {
     for (std::size_t n = next++; n < missing.size(); n = next++) try {
         const int number = missing[n];
-        const EvaluatedRun run = evaluated(number, starts[number], truth, study, images, setup);
+        const EvaluatedRun run = evaluated(number, starts[number], truth, study, images, target, registration);
         const std::lock_guard lock(mutex);
         folder.append(run);
         observer.progress("Evaluating", folder.runs().size(), starts.size());
@@ -178,12 +202,16 @@ EvaluationFolder evaluate_study(const EvaluateOptions& options, Notes& notes, Ob
   const int cores = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
   const int jobs = uses_gl(kind) ? 1 : options.jobs > 0 ? options.jobs : cores;
   const Study study = load(options.study, notes, observer);
+  const TargetChoice choice = target_of(study, {.by_person = options.target});
   RendererStore renderers;
+  BodyStore bodies;
   const RegistrationSetup setup(options.registration, study, beams_of(study), renderers);
+  const TargetRegistration registration(study, options.registration, setup, choice.target, bodies);
   EvaluationFolder folder(
       options.output, configuration_of(options.registration, options.study.intensity, study, setup.renderers().finest(),
-                                       options.truth, options.protocol));
-  run_missing(folder, study, setup, options.truth, start_poses(options.truth, options.protocol), jobs, observer);
+                                       choice.target, options.truth, options.protocol));
+  run_missing(folder, study, choice.target, registration, options.truth, start_poses(options.truth, options.protocol),
+              jobs, observer);
   folder.write_summary();
   return folder;
 }

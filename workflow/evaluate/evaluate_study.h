@@ -16,6 +16,7 @@ struct EvaluateOptions {
   StudyOptions study;
   RegistrationRequest registration;  // settle() must have been called
   StartProtocol protocol;
+  std::string target;  // the structure whose error counts, or "isocenter"; empty: as target_of() finds it
   int jobs = 0;  // registrations at a time, each on one thread; 1: one on all cores; 0: as many as the machine's cores
   Eigen::Isometry3d truth = Eigen::Isometry3d::Identity();  // the true setup error
   std::filesystem::path output;

@@ -7,7 +7,6 @@
 
 #include "base/output_folder.h"
 #include "io/report/result_folder.h"
-#include "registration/bodies/register_bodies.h"
 #include "setup/couch_shift.h"
 #include "workflow/register/setup_result_of.h"
 #include "workflow/register/target_of.h"
@@ -44,16 +43,6 @@ SpatialRegistrationOptions registration_options(RegistrationSource source, Verdi
   return {.content_label = "SETUP_REVIEW", .content_description = "NOT ACCEPTED: REVIEW", .source = source};
 }
 
-BentPatient bent_patient(const Study& study, const RegistrationRequest& request, const Target& target) {
-  const BodyMap map = find_bodies(study.ct->hu);
-  const Eigen::Vector3d center_patient_mm = study.planned_room_from_patient.inverse() * target.center_room_mm;
-  return {.ct_hu = study.ct->hu,
-          .attenuation = request.rendering.model(),
-          .beams = beams_of(study),
-          .parts = patient_bodies(map, soft_masks(map), center_patient_mm),
-          .target = target};
-}
-
 }  // namespace
 
 SetupResult register_study(const RegisterOptions& options, SharedWork& shared, Observer& observer) {
@@ -70,12 +59,8 @@ SetupResult register_study(const RegisterOptions& options, SharedWork& shared, O
   const RegistrationSetup setup(options.registration, study, beams_of(study), shared.renderers);
   const std::vector<FixedImage> images = prepared(study.xrays);
   const double seconds_load = total.seconds();
-  RegistrationResult found = register_views(setup.renderers(), images, study.planned_room_from_patient, setup.options(),
-                                            [&](double share) { observer.progress("Registering", share); });
-  observer.progress("Registering", 1.0);
-  if (may_have_bent(setup.options(), found))
-    register_bodies(bent_patient(study, options.registration, choice.target), images, study.planned_room_from_patient,
-                    setup.options(), found, [&](double share) { observer.progress("Registering the target", share); });
+  const TargetRegistration registration(study, options.registration, setup, choice.target, shared.bodies);
+  RegistrationResult found = registration.from(study.planned_room_from_patient, images, observer);
   for (const std::string& doubt : study.doubts) found.demote(Verdict::kReview, doubt);
   for (const std::string& doubt : choice.doubts) found.demote(Verdict::kReview, doubt);
 

@@ -10,6 +10,7 @@
 #include "workflow/observer.h"
 #include "workflow/register/registration_setup.h"
 #include "workflow/register/study_options.h"
+#include "workflow/register/target_registration.h"
 
 namespace isoshift {
 
@@ -30,6 +31,7 @@ struct RegisterOptions {
 struct SharedWork {
   CtStore cts;
   RendererStore renderers;
+  BodyStore bodies;
 };
 
 // Registers a study and writes the folder of its result, whole or not at all. Precondition:

@@ -19,15 +19,16 @@ std::vector<MovedGroup> bent_motions() {
 }
 
 // The scene's bodies as those of a patient who is bone all over; the target lies in the middle one.
-BentPatient patient_of(const BentScene& scene) {
-  BentPatient patient{.ct_hu = scene.ct, .attenuation = {}, .beams = {Beam::kKilovoltage}, .parts = {}, .target = {}};
-  patient.parts.bodies = scene.bodies;
-  patient.parts.carried = scene.bodies.shares;
-  patient.parts.to_bone_mm = Volume<float>(scene.ct.size, scene.ct.patient_from_voxel);
-  patient.target.name = "PTV";
+BentPatient patient_of(const BentScene& scene, float to_bone_mm = 0.0F) {
+  PatientBodies parts;
+  parts.bodies = scene.bodies;
+  parts.carried = scene.bodies.shares;
+  parts.to_bone_mm = Volume<float>(scene.ct.size, scene.ct.patient_from_voxel);
+  std::ranges::fill(parts.to_bone_mm.voxels, to_bone_mm);
+  Target target{.name = "PTV"};
   for (int axis = 0; axis < 3; ++axis)
-    for (const double side : {-8.0, 8.0}) patient.target.extent_room_mm.push_back(side * Vector3d::Unit(axis));
-  return patient;
+    for (const double side : {-8.0, 8.0}) target.extent_room_mm.push_back(side * Vector3d::Unit(axis));
+  return {scene.ct, {}, std::array{Beam::kKilovoltage}, std::move(parts), std::move(target)};
 }
 
 RegistrationResult registered(const BentScene& scene, const std::vector<FixedImage>& images,
@@ -75,9 +76,7 @@ TEST(RegisterBodies, WithoutBoneNearTheTargetTheWholeAnswersForReview) {
   const RegistrationOptions options = preset("fast");
   const RegistrationResult whole = register_views(renderers, scene.images, scene.planned, options);
   RegistrationResult result = whole;
-  BentPatient patient = patient_of(scene);
-  std::ranges::fill(patient.parts.to_bone_mm.voxels, 25.0F);
-  register_bodies(patient, scene.images, scene.planned, options, result);
+  register_bodies(patient_of(scene, 25.0F), scene.images, scene.planned, options, result);
   EXPECT_EQ(result.actual_room_from_patient.matrix(), whole.actual_room_from_patient.matrix());
   EXPECT_TRUE(result.bodies.empty());
   EXPECT_NE(result.verdict, Verdict::kAccepted);

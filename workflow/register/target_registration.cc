@@ -1,0 +1,37 @@
+#include "workflow/register/target_registration.h"
+
+namespace isoshift {
+
+std::shared_ptr<const CtBodies> BodyStore::get(const std::shared_ptr<const CtSeries>& ct) {
+  if (!last_ || ct != ct_) {
+    last_.reset();  // never two in memory
+    BodyMap map = find_bodies(ct->hu);
+    SoftMasks masks = soft_masks(map);
+    last_ = std::make_shared<const CtBodies>(CtBodies{.map = std::move(map), .masks = std::move(masks)});
+    ct_ = ct;
+  }
+  return last_;
+}
+
+const BentPatient& TargetRegistration::bent_patient() const {
+  std::call_once(bent_once_, [&] {
+    const std::shared_ptr<const CtBodies> of_ct = bodies_.get(study_.ct);
+    const Eigen::Vector3d center_patient_mm = study_.planned_room_from_patient.inverse() * target_.center_room_mm;
+    bent_.emplace(study_.ct->hu, request_.rendering.model(), beams_of(study_),
+                  patient_bodies(of_ct->map, of_ct->masks, center_patient_mm), target_);
+  });
+  return *bent_;
+}
+
+RegistrationResult TargetRegistration::from(const Eigen::Isometry3d& start_room_from_patient,
+                                            std::span<const FixedImage> images, Observer& observer) const {
+  RegistrationResult found = register_views(setup_.renderers(), images, start_room_from_patient, setup_.options(),
+                                            [&](double share) { observer.progress("Registering", share); });
+  observer.progress("Registering", 1.0);
+  if (may_have_bent(setup_.options(), found))
+    register_bodies(bent_patient(), images, study_.planned_room_from_patient, setup_.options(), found,
+                    [&](double share) { observer.progress("Registering the target", share); });
+  return found;
+}
+
+}  // namespace isoshift

@@ -1,0 +1,55 @@
+#pragma once
+// Registers a study for its target: the patient as a whole, and where that needs a review, the bodies that carry the
+// target. For every command that answers for a setup or measures such answers.
+
+#include <memory>
+#include <mutex>
+#include <span>
+
+#include "bodies/soft_masks.h"
+#include "registration/bodies/register_bodies.h"
+#include "workflow/observer.h"
+#include "workflow/register/registration_setup.h"
+
+namespace isoshift {
+
+// The rigid bodies of a CT, and what moves with them.
+struct CtBodies {
+  BodyMap map;
+  SoftMasks masks;
+};
+
+// Keeps the bodies of the last CT, for registrations that share it.
+class BodyStore {
+ public:
+  std::shared_ptr<const CtBodies> get(const std::shared_ptr<const CtSeries>& ct);
+
+ private:
+  std::shared_ptr<const CtSeries> ct_;
+  std::shared_ptr<const CtBodies> last_;
+};
+
+// Borrows all. What only a bent patient needs is made when the first one comes.
+class TargetRegistration {
+ public:
+  TargetRegistration(const Study& study, const RegistrationRequest& request, const RegistrationSetup& setup,
+                     const Target& target, BodyStore& bodies)
+      : study_(study), request_(request), setup_(setup), target_(target), bodies_(bodies) {}
+
+  // Searches from this pose of the whole patient. Several threads may call it at a time.
+  RegistrationResult from(const Eigen::Isometry3d& start_room_from_patient, std::span<const FixedImage> images,
+                          Observer& observer) const;
+
+ private:
+  const BentPatient& bent_patient() const;
+
+  const Study& study_;
+  const RegistrationRequest& request_;
+  const RegistrationSetup& setup_;
+  const Target& target_;
+  BodyStore& bodies_;
+  mutable std::once_flag bent_once_;
+  mutable std::optional<BentPatient> bent_;
+};
+
+}  // namespace isoshift
