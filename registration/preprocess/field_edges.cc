@@ -224,6 +224,16 @@ FieldEdges::Axis FieldEdges::axis_of(const UprightXray& xray) {
 FieldEdges::FieldEdges(const UprightXray& xray)
     : mm_(xray.mm), across_(axis_of(xray)), down_(axis_of(xray.transposed())) {}
 
+int FieldEdges::middle_of_edge(const EdgeMap& map, int at, int first, int end) const {
+  constexpr double kSame = 0.02;
+  const double least = map.mean(at, first, end) - kSame;
+  const int most = static_cast<int>(std::lround(2.0 * kReachMm / mm_));
+  int lower = at, upper = at;
+  while (lower > 0 && at - lower < most && map.mean(lower - 1, first, end) >= least) --lower;
+  while (upper + 1 < map.columns() && upper - at < most && map.mean(upper + 1, first, end) >= least) ++upper;
+  return (lower + upper) / 2;
+}
+
 FieldRectangle FieldEdges::with(int left, int right, int top, int bottom, double score) const {
   const int corner = corner_px(mm_), end = static_cast<int>(std::lround(12.0 / mm_));
   const auto side = [&](const EdgeMap& map, int at, bool is_open, int first, int last, int rim) {
@@ -231,7 +241,7 @@ FieldRectangle FieldEdges::with(int left, int right, int top, int bottom, double
     if (first > 0) first += corner;
     if (last < rim) last -= corner;
     if (last - first < 2) return FieldSide{.at = at, .is_open = false, .evidence = -1.0, .at_ends = -1.0};
-    return FieldSide{.at = at,
+    return FieldSide{.at = middle_of_edge(map, at, first, last),
                      .is_open = false,
                      .evidence = map.mean(at, first, last),
                      .at_ends = std::min(map.mean(at, first, std::min(last, first + end)),

@@ -76,6 +76,8 @@ class FieldEdges {
     int size;                      // of the image across
   };
   static Axis axis_of(const UprightXray& xray);
+  // An edge is as clear at several places about its own: their middle.
+  int middle_of_edge(const EdgeMap& map, int at, int first, int end) const;
   FieldRectangle with(int left, int right, int top, int bottom, double score) const;
 
   double mm_;
