@@ -5,12 +5,14 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numbers>
 #include <utility>
 
 #include "geometry/rotation.h"
 #include "registration/preprocess/field_edges.h"
 #include "registration/preprocess/field_sides.h"
 #include "registration/preprocess/leaf_outline.h"
+#include "registration/preprocess/small_field.h"
 
 namespace isoshift {
 namespace {
@@ -116,6 +118,20 @@ std::vector<Eigen::Vector2d> corners_of(const Mapping& mapping, const Sides& sid
   return corners;
 }
 
+// Of a circle: a polygon that leaves it by less than a hundredth of its radius.
+std::vector<Eigen::Vector2d> circle_of(const Mapping& mapping, const Sides& sides) {
+  constexpr int kCorners = 32;
+  const double radius = 0.25 * (sides[1].line.at - sides[0].line.at + sides[3].line.at - sides[2].line.at);
+  const Eigen::Vector2d middle =
+      0.5 * Eigen::Vector2d(sides[0].line.at + sides[1].line.at, sides[2].line.at + sides[3].line.at);
+  std::vector<Eigen::Vector2d> corners;
+  for (int n = 0; n < kCorners; ++n) {
+    const double angle = 2.0 * std::numbers::pi * n / kCorners;
+    corners.push_back(mapping.image(middle + radius * Eigen::Vector2d(std::cos(angle), std::sin(angle))));
+  }
+  return corners;
+}
+
 int sides_found(const Sides& sides) { return static_cast<int>(std::ranges::count(sides, false, &Side::is_open)); }
 int sides_clear(const Sides& sides) { return static_cast<int>(std::ranges::count(sides, true, &Side::is_clear)); }
 
@@ -168,7 +184,22 @@ bool is_collimator(const Side& side) {
 struct Finding {
   Sides sides;
   std::string doubt = {};
+  bool is_round = false;  // the circle that touches the sides
 };
+
+// What a cone or stereotactic leaves leave of the treatment beam.
+std::optional<Finding> small_finding(const XrayImage& xray, const UprightXray& upright) {
+  if (xray.view.beam != Beam::kMegavoltage) return std::nullopt;
+  const std::optional<SmallField> field = find_small_field(upright);
+  if (!field) return std::nullopt;
+  Finding finding{.sides = {}, .is_round = field->is_round};
+  for (std::size_t n = 0; n < 4; ++n) {
+    const double at = field->sides[n];
+    finding.sides[n].edge = {.at = static_cast<int>(std::lround(at)), .is_open = false};
+    finding.sides[n].line = {.at = at, .sigma_mm = field->sigma_mm};
+  }
+  return finding;
+}
 
 Finding find_in(const Upright& upright, const FieldEdges& edges, const Eigen::Vector2d& isocenter_upright_px) {
   Finding finding{.sides = measured(upright, edges.best())};
@@ -336,7 +367,8 @@ IrradiatedField find_irradiated_field(const XrayImage& xray, double pixels_per_m
   const FieldEdges edges(upright.xray);
   const Eigen::Vector2d isocenter_px =
       Mapping(upright.xray).upright(xray.view.project(Eigen::Vector3d::Zero()).value());
-  Finding finding = innermost(upright, find_in(upright, edges, isocenter_px));
+  const std::optional<Finding> small = small_finding(xray, upright.xray);
+  Finding finding = small ? *small : innermost(upright, find_in(upright, edges, isocenter_px));
   IrradiatedField field{.origin = sides_found(finding.sides) > 0 ? Origin::kFound : Origin::kWholeReceptor};
   if (xray.declared_aperture)
     finding = reconciled(std::move(finding), *xray.declared_aperture, upright, edges, field.origin);
@@ -347,8 +379,10 @@ IrradiatedField find_irradiated_field(const XrayImage& xray, double pixels_per_m
     // Blocks of pixels may not reach the rim.
     if (side.is_open()) side.line.at += side.line.at > 0.0 ? 1e3 : -1e3;
   }
+  const Mapping mapping(upright.xray);
   field.corners_px =
-      on_receptor(corners_of(Mapping(upright.xray), finding.sides), xray.values.columns, xray.values.rows);
+      on_receptor(finding.is_round ? circle_of(mapping, finding.sides) : corners_of(mapping, finding.sides),
+                  xray.values.columns, xray.values.rows);
   return field;
 }
 
