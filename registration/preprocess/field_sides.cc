@@ -13,7 +13,8 @@ constexpr double kBlockMm = 5.0;           // along the side
 constexpr double kOutwardMm = 8.0;         // the window across it, from where the logarithm of the intensity falls most
 constexpr double kInwardMm = 12.0;         // where half the beam arrives lies further in
 constexpr double kWeightMm = 5.0;          // sigma of the weights in the window: what is near the edge tells its place
-constexpr double kDarkShare = 0.03;        // of the brightest intensity of a block: what is darker counts less
+constexpr double kDarkShare = 0.03;        // of the brightest intensity of a block: what is darker counts less;
+constexpr double kDarkShareOfSlope = 0.3;  // the same where it darkens all the way to another edge
 constexpr double kFirstPlaceMm = -1.2;     // places from so far outside of where the logarithm falls most
 constexpr double kLastPlaceMm = 1.0;       // to so far inside,
 constexpr double kLastPlaceSigmas = 1.7;   // and so many sigmas of the penumbra
@@ -59,7 +60,8 @@ std::vector<Block> blocks_of(const SideToMeasure& side, int outward, int count) 
       const double off_mm = (n + 0.5 - outward) * xray.mm - 1.0;
       if (is_valid) block.weight[n] = std::exp(-0.5 * std::pow(off_mm / kWeightMm, 2));
     }
-    const double floor = kDarkShare * block.intensity.cwiseProduct(block.weight).maxCoeff();
+    const double floor =
+        (side.has_slope ? kDarkShareOfSlope : kDarkShare) * block.intensity.cwiseProduct(block.weight).maxCoeff();
     if (!(floor > 0.0)) continue;
     double sum = block.weight.sum();
     if (sum * xray.mm < kWeightMm) continue;

@@ -26,6 +26,8 @@ struct SideToMeasure {
   int near = 0, sign = 1, first = 0, end = 0;
   // +1: a positive turn of the field makes its slope positive.
   int slope_sign = 1;
+  // Beyond the side the image darkens all the way to another edge, which tells nothing of this one.
+  bool has_slope = false;
 };
 
 // The lines of all sides of a field. They are measured together, since the sides of a field share their penumbra and

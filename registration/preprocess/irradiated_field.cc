@@ -63,6 +63,7 @@ struct Upright {
 Sides measured(const Upright& upright, const FieldRectangle& rectangle) {
   Sides sides;
   const int corner = static_cast<int>(std::lround(kShadedCornerMm / upright.xray.mm));
+  const bool has_slope = std::ranges::any_of(rectangle.sides, &FieldSide::has_slope);
   std::vector<SideToMeasure> to_measure;
   for (std::size_t n = 0; n < 4; ++n) {
     Side& side = sides[n];
@@ -79,7 +80,8 @@ Sides measured(const Upright& upright, const FieldRectangle& rectangle) {
                           .sign = sign,
                           .first = before.at + (before.is_open ? 0 : corner),
                           .end = after.at - (after.is_open ? 0 : corner),
-                          .slope_sign = n < 2 ? -1 : 1});
+                          .slope_sign = n < 2 ? -1 : 1,
+                          .has_slope = has_slope});
   }
   const std::vector<SideLine> lines = measured_lines(to_measure, kTurnSigma);
   auto line = lines.begin();
@@ -290,6 +292,14 @@ bool reaches_rim(const std::array<double, 4>& declared, const cv::Size& size, do
          (size.width - declared[1]) * mm <= kJawToleranceMm && (size.height - declared[3]) * mm <= kJawToleranceMm;
 }
 
+// Whether a clear side lies so far within the declared one that this cannot be the field's: leaves or a cone closed it.
+bool is_closed_further(const Sides& sides, const std::array<double, 4>& declared, double mm) {
+  for (std::size_t n = 0; n < 4; ++n)
+    if (sides[n].is_clear() && (n % 2 == 0 ? 1.0 : -1.0) * (sides[n].line.at - declared[n]) * mm > kJawToleranceMm)
+      return true;
+  return false;
+}
+
 // What is found, against what the file declares.
 Finding reconciled(Finding in_image, const DeclaredAperture& aperture, const Upright& upright, const FieldEdges& edges,
                    IrradiatedField::Origin& origin) {
@@ -306,13 +316,15 @@ Finding reconciled(Finding in_image, const DeclaredAperture& aperture, const Upr
     if (is_same) origin = IrradiatedField::Origin::kDeclared;
     return in_image;
   }
-  // Where a side is to be is known: fainter evidence will do.
-  Finding there{.sides = measured(upright, edges.near(declared))};
-  if (is_confirmed(there.sides)) {
-    origin = IrradiatedField::Origin::kDeclared;
-    return there;
+  if (!is_closed_further(in_image.sides, declared, mm)) {
+    // Where a side is to be is known: fainter evidence will do.
+    Finding there{.sides = measured(upright, edges.near(declared))};
+    if (is_confirmed(there.sides)) {
+      origin = IrradiatedField::Origin::kDeclared;
+      return there;
+    }
   }
-  if (aperture.is_of_exposure && !is_all)
+  if (aperture.is_of_exposure && !is_all && !is_inside)
     in_image.doubt = "the file declares a smaller aperture than the image shows" +
                      (in_image.doubt.empty() ? std::string() : "; " + in_image.doubt);
   return in_image;
