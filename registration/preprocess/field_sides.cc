@@ -162,10 +162,13 @@ class SideMisfits {
   // How far from `best` a line with this slope fits nearly as well.
   double reach_mm(const Best& best, double slope) const {
     double reach = 0.0;
-    const double last = place(static_cast<int>(misfits_.rows()) - 1);
-    for (double at = first_mm_; at <= last; at += kFinePlaceStepMm)
+    const int places =
+        1 + static_cast<int>((place(static_cast<int>(misfits_.rows()) - 1) - first_mm_) / kFinePlaceStepMm);
+    for (int n = 0; n < places; ++n) {
+      const double at = first_mm_ + n * kFinePlaceStepMm;
       if (of_line(at, slope) < best.misfit + kNearlyMisfit * blocks())
         reach = std::max(reach, std::abs(at - best.place_mm));
+    }
     return reach;
   }
 

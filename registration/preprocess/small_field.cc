@@ -84,7 +84,8 @@ std::vector<Eigen::Vector2d> outline_of(const cv::Mat& intensity, const Eigen::V
     const double angle = 2.0 * std::numbers::pi * ray / kRays;
     const Eigen::Vector2d direction(std::cos(angle), std::sin(angle));
     double before = value_at(intensity, middle + from_px * direction);
-    for (double off = from_px - kStepPx; off > 0.0; off -= kStepPx) {
+    for (int step = 1; step * kStepPx < from_px; ++step) {
+      const double off = from_px - step * kStepPx;
       const double here = value_at(intensity, middle + off * direction);
       if (here >= level) {
         outline.emplace_back(middle + (off + kStepPx * (here - level) / std::max(here - before, 1e-9)) * direction);
