@@ -11,7 +11,8 @@
 
 namespace isoshift {
 
-// Where jaws and leaves leave the treatment beam open, as a file says it: a rectangle along the collimator's axes.
+// Where jaws and leaves leave the treatment beam open, as a file says it: a polygon with sides along the collimator's
+// axes; jaws alone make a rectangle.
 struct DeclaredAperture {
   std::vector<Eigen::Vector2d> corners_px;  // on the image, one after the other; may lie beyond its rim
   bool is_of_exposure = true;               // false: the X-ray need not have been taken through it (kV, a plan's beam)

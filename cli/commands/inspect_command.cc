@@ -52,26 +52,28 @@ std::string describe_rt_image(RtImage image, const std::optional<std::string>& p
   if (!image.patient_position) image.patient_position = planned_position;
   std::string text =
       fmt::format("{} \"{}\", {}\n", image.is_rt_image() ? "RT Image" : "X-ray", image.label, image.path.string());
-  text += line("image type", image.image_type) + line("pixels", fmt::format("{} x {}", image.columns, image.rows)) +
-          line("values origin", or_missing(image.reported_values_origin)) +
-          line("SAD, SID", or_missing(image.sad_mm, "mm") + ", " + or_missing(image.sid_mm, "mm")) +
-          line("gantry angle", or_missing(image.gantry_angle_deg, "deg")) +
-          line("couch angle", or_missing(image.table.support_angle_deg, "deg")) +
-          line("couch pitch", or_taken_as_0(image.table.pitch_deg, "--couch-pitch")) +
-          line("couch roll", or_taken_as_0(image.table.roll_deg, "--couch-roll")) +
-          line("receptor translation", or_missing(image.receptor_translation_mm, "mm")) +
-          line("receptor angle", or_missing(image.receptor_angle_deg, "deg")) +
-          line("pixel spacing", or_missing(image.pixel_spacing_mm, "mm, rows then columns")) +
-          line("RT Image Position", or_missing(image.position_mm, "mm")) +
-          line("patient position", or_missing(image.patient_position)) +
-          line("intensity",
-               or_missing(image.intensity_relationship) + ", sign " +
-                   (image.intensity_sign ? fmt::format("{:+}", *image.intensity_sign) : std::string("missing"))) +
-          line("KVP", or_missing(image.kvp, "kV")) +
-          line("frame of reference", or_missing(image.frame_of_reference_uid)) +
-          line("isocenter in that frame", or_missing(image.isocenter_mm, "mm")) +
-          line("acquired", or_missing(image.acquisition_date) + " " + or_missing(image.acquisition_time));
+  text +=
+      line("image type", image.image_type) + line("pixels", fmt::format("{} x {}", image.columns, image.rows)) +
+      line("values origin", or_missing(image.reported_values_origin)) +
+      line("SAD, SID", or_missing(image.sad_mm, "mm") + ", " + or_missing(image.sid_mm, "mm")) +
+      line("gantry angle", or_missing(image.gantry_angle_deg, "deg")) +
+      line("couch angle", or_missing(image.table.support_angle_deg, "deg")) +
+      line("couch pitch", or_taken_as_0(image.table.pitch_deg, "--couch-pitch")) +
+      line("couch roll", or_taken_as_0(image.table.roll_deg, "--couch-roll")) +
+      line("receptor translation", or_missing(image.receptor_translation_mm, "mm")) +
+      line("receptor angle", or_missing(image.receptor_angle_deg, "deg")) +
+      line("pixel spacing", or_missing(image.pixel_spacing_mm, "mm, rows then columns")) +
+      line("RT Image Position", or_missing(image.position_mm, "mm")) +
+      line("collimator angle", or_missing(image.collimator_angle_deg, "deg")) +
+      line("jaws and leaves", described(image.jaws)) + line("patient position", or_missing(image.patient_position)) +
+      line("intensity",
+           or_missing(image.intensity_relationship) + ", sign " +
+               (image.intensity_sign ? fmt::format("{:+}", *image.intensity_sign) : std::string("missing"))) +
+      line("KVP", or_missing(image.kvp, "kV")) + line("frame of reference", or_missing(image.frame_of_reference_uid)) +
+      line("isocenter in that frame", or_missing(image.isocenter_mm, "mm")) +
+      line("acquired", or_missing(image.acquisition_date) + " " + or_missing(image.acquisition_time));
   for (const std::string& applied_override : applied.overrides) text += line("profile", applied_override);
+  for (const std::string& problem : image.jaws.problems) text += line("note", problem);
   const auto missing = missing_attributes(image);
   for (const MissingAttribute& attribute : missing)
     text += line("MISSING", fmt::format("{}; {}", described(attribute.tag),
@@ -97,8 +99,11 @@ std::string describe_plan(const std::filesystem::path& path) {
                      line("frame of reference", or_missing(plan.frame_of_reference_uid));
   for (const RtPlan::Beam& beam : plan.beams)
     text += line(fmt::format("beam {} \"{}\"", beam.number, beam.name),
-                 fmt::format("isocenter {}, {}, couch {}", or_missing(beam.isocenter_patient_mm, "mm"),
-                             or_missing(beam.patient_position), or_missing(beam.support_angle_deg, "deg")));
+                 fmt::format("isocenter {}, {}, couch {}; jaws and leaves {}",
+                             or_missing(beam.isocenter_patient_mm, "mm"), or_missing(beam.patient_position),
+                             or_missing(beam.support_angle_deg, "deg"), described(beam.jaws)));
+  for (const RtPlan::Beam& beam : plan.beams)
+    for (const std::string& problem : beam.jaws.problems) text += line("note", problem);
   return text + "\n";
 }
 

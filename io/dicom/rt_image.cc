@@ -7,6 +7,7 @@
 #include <charconv>
 #include <chrono>
 #include <cmath>
+#include <iterator>
 #include <numeric>
 
 #include "base/error.h"
@@ -15,7 +16,6 @@
 namespace isoshift {
 namespace {
 
-constexpr double kOpenMm = 500.0;          // beyond any receptor, at the isocenter
 constexpr double kMaxReadOutNoise = 0.01;  // degrees or mm, between exposures of one image
 
 // The items of the Exposure Sequence that speak of one frame: of several frames those that name it.
@@ -90,17 +90,20 @@ std::optional<double> frame_offset_s(const DicomItem& d, int frame) {
   return increment_ms && *increment_ms > 0.0 ? std::optional(frame * *increment_ms / 1000.0) : std::nullopt;
 }
 
-// Jaws of several exposures of one image: the largest opening was irradiated.
+// Jaws and leaves of several exposures of one image: what any of them left open was irradiated. Leaves count only if
+// there is one exposure.
 JawOpenings jaws_of(const std::vector<DicomItem>& exposures) {
   JawOpenings all;
   const auto widen = [](std::optional<JawOpening>& wide, const std::optional<JawOpening>& by) {
     if (by) wide = wide ? JawOpening{std::min(wide->from_mm, by->from_mm), std::max(wide->to_mm, by->to_mm)} : *by;
   };
   for (const DicomItem& exposure : exposures) {
-    JawOpenings of_one;
-    for (const DicomItem& device : exposure.items(DCM_BeamLimitingDeviceSequence)) add_jaws(device, of_one);
+    const std::vector<DicomItem> devices = exposure.items(DCM_BeamLimitingDeviceSequence);
+    JawOpenings of_one = read_jaws(devices, devices);
+    if (exposures.size() == 1) return of_one;
     widen(all.x, of_one.x);
     widen(all.y, of_one.y);
+    std::ranges::move(of_one.problems, std::back_inserter(all.problems));
   }
   return all;
 }
@@ -202,23 +205,23 @@ std::vector<RtImage> read_rt_images(const DicomFile& file, Notes& notes) {
     else
       images.push_back(read_frame(path, dataset, format, frame, std::move(of_frame)));
   }
-  for (RtImage& image : images) image.sha256 = file.sha256();
+  for (RtImage& image : images) {
+    image.sha256 = file.sha256();
+    for (const std::string& problem : image.jaws.problems) notes.warnings.push_back(problem);
+  }
   return images;
 }
 
 std::optional<DeclaredAperture> declared_aperture(const RtImage& image, const JawOpenings& jaws, const XrayView& view) {
-  if (image.pixel_from_room || !image.gantry_angle_deg || (!jaws.x && !jaws.y)) return std::nullopt;
-  // Axes on which nothing is said are open beyond any receptor.
-  const JawOpening x = jaws.x.value_or(JawOpening{-kOpenMm, kOpenMm}),
-                   y = jaws.y.value_or(JawOpening{-kOpenMm, kOpenMm});
+  const std::vector<Eigen::Vector2d> outline_mm = outline_of(jaws);
+  if (image.pixel_from_room || !image.gantry_angle_deg || outline_mm.empty()) return std::nullopt;
   const Eigen::Isometry3d fixed_from_collimator(
       Eigen::AngleAxisd(rad_from_deg(*image.gantry_angle_deg), Eigen::Vector3d::UnitY()) *
       Eigen::AngleAxisd(rad_from_deg(image.collimator_angle_deg.value_or(0.0)), Eigen::Vector3d::UnitZ()));
   // Jaws are those of the treatment beam: an X-ray of the kV imager may name them, and does not pass them.
   DeclaredAperture aperture{.corners_px = {}, .is_of_exposure = view.beam == Beam::kMegavoltage};
-  for (const auto& [at_x, at_y] :
-       {std::pair{x.from_mm, y.from_mm}, {x.to_mm, y.from_mm}, {x.to_mm, y.to_mm}, {x.from_mm, y.to_mm}}) {
-    const auto corner_px = view.project(fixed_from_collimator * Eigen::Vector3d(at_x, at_y, 0.0));
+  for (const Eigen::Vector2d& point_mm : outline_mm) {
+    const auto corner_px = view.project(fixed_from_collimator * Eigen::Vector3d(point_mm.x(), point_mm.y(), 0.0));
     if (!corner_px) return std::nullopt;
     aperture.corners_px.push_back(*corner_px);
   }

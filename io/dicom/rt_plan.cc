@@ -30,8 +30,9 @@ RtPlan::Beam read_beam(const DicomItem& beam_item, const DcmTagKey& control_poin
   if (const auto points = beam_item.items(control_points); !points.empty()) {
     if (points.front().has_value(DCM_IsocenterPosition))
       beam.isocenter_patient_mm = Eigen::Vector3d(points.front().required_numbers(DCM_IsocenterPosition, 3).data());
-    for (const DicomItem& device : points.front().items(DCM_BeamLimitingDevicePositionSequence))
-      add_jaws(device, beam.jaws);
+    const bool is_ion = control_points == DCM_IonControlPointSequence;
+    beam.jaws = read_jaws(points.front().items(DCM_BeamLimitingDevicePositionSequence),
+                          beam_item.items(is_ion ? DCM_IonBeamLimitingDeviceSequence : DCM_BeamLimitingDeviceSequence));
     beam.support_angle_deg = points.front().number(DCM_PatientSupportAngle);
     for (const DicomItem& point : points)
       if (point.has_value(DCM_IsocenterPosition))

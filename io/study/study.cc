@@ -313,13 +313,14 @@ void place_patient(const StudyRequest& request, const std::vector<RtPlan::Beam>&
 }
 
 // Where an X-ray says nothing of jaws, those of the planned beam that it names are a hint.
-void declare_planned_apertures(Study& study) {
+void declare_planned_apertures(Study& study, Notes& notes) {
   for (std::size_t n = 0; n < study.xrays.size(); ++n) {
     const RtImage& image = study.rt_images[n];
     if (study.xrays[n].declared_aperture || !study.plan || !image.beam_number ||
         image.plan_sop_instance_uid != study.plan->sop_instance_uid)
       continue;
     const std::vector<RtPlan::Beam> beams = selected_beams(*study.plan, std::span(&*image.beam_number, 1));
+    for (const std::string& problem : beams.front().jaws.problems) notes.warnings.push_back(problem);
     study.xrays[n].declared_aperture = declared_aperture(image, beams.front().jaws, study.xrays[n].view);
     if (study.xrays[n].declared_aperture) study.xrays[n].declared_aperture->is_of_exposure = false;
   }
@@ -352,7 +353,7 @@ Study load_study(const StudyRequest& request, Notes& notes, const Progress& prog
   for (const RtImage& image : study.rt_images)
     study.xrays.push_back(
         read_xray_image(files.whole(image.path), image, xray_view(image, beam_of(image, notes), notes)));
-  declare_planned_apertures(study);
+  declare_planned_apertures(study, notes);
   check_isocenter(study);
   return study;
 }

@@ -24,6 +24,9 @@ constexpr double kMinEvidence = 0.3;  // of a side
 constexpr int kMostCandidates = 16;   // per direction
 constexpr double kCornerMm = 2.5;     // of a side, that the penumbra of the next one shades
 constexpr double kNearMm = 3.0;       // jaws stand so near to where a file says
+constexpr double kUnbroken = 0.75;    // mean evidence all the way from jaws to the leaves before them
+constexpr double kJawsMm = 12.0;      // jaws stand no farther behind leaves, if the image darkens all the way
+constexpr double kHalfEdgeMm = 3.0;   // from the inner end of an edge to where the logarithm falls most
 
 // Steps of the logarithm from left to right.
 cv::Mat steps_of(const UprightXray& xray) {
@@ -224,23 +227,43 @@ FieldEdges::Axis FieldEdges::axis_of(const UprightXray& xray) {
 FieldEdges::FieldEdges(const UprightXray& xray)
     : mm_(xray.mm), across_(axis_of(xray)), down_(axis_of(xray.transposed())) {}
 
+FieldEdges::Place FieldEdges::place_of_edge(const EdgeMap& map, int at, int inward, int first, int end) const {
+  const auto end_of = [&](int direction, double least, int most) {
+    int place = at;
+    while (std::abs(place - at) < most && place + direction >= 0 && place + direction < map.columns() &&
+           map.mean(place + direction, first, end) >= least)
+      place += direction;
+    return place;
+  };
+  constexpr double kSame = 0.02;
+  const double evidence = map.mean(at, first, end);
+  const int most = static_cast<int>(std::lround(2.0 * kReachMm / mm_));
+  const int middle = (end_of(-1, evidence - kSame, most) + end_of(1, evidence - kSame, most)) / 2;
+  if (evidence < kUnbroken) return {middle};
+  const int inner = end_of(inward, kUnbroken, static_cast<int>(std::lround(kJawsMm / mm_)));
+  const int of_leaves = inner - inward * static_cast<int>(std::lround(kHalfEdgeMm / mm_));
+  return inward * (of_leaves - middle) > 0 ? Place{of_leaves, true} : Place{middle};
+}
+
 FieldRectangle FieldEdges::with(int left, int right, int top, int bottom, double score) const {
   const int corner = corner_px(mm_), end = static_cast<int>(std::lround(12.0 / mm_));
-  const auto side = [&](const EdgeMap& map, int at, bool is_open, int first, int last, int rim) {
+  const auto side = [&](const EdgeMap& map, int at, int inward, bool is_open, int first, int last, int rim) {
     if (is_open) return FieldSide{.at = at};
     if (first > 0) first += corner;
     if (last < rim) last -= corner;
     if (last - first < 2) return FieldSide{.at = at, .is_open = false, .evidence = -1.0, .at_ends = -1.0};
-    return FieldSide{.at = at,
+    const Place place = place_of_edge(map, at, inward, first, last);
+    return FieldSide{.at = place.at,
                      .is_open = false,
                      .evidence = map.mean(at, first, last),
                      .at_ends = std::min(map.mean(at, first, std::min(last, first + end)),
-                                         map.mean(at, std::max(first, last - end), last))};
+                                         map.mean(at, std::max(first, last - end), last)),
+                     .has_slope = place.has_slope};
   };
-  return {.sides = {side(across_.low, left, left == 0, top, bottom, down_.size),
-                    side(across_.high, right, right == across_.size, top, bottom, down_.size),
-                    side(down_.low, top, top == 0, left, right, across_.size),
-                    side(down_.high, bottom, bottom == down_.size, left, right, across_.size)},
+  return {.sides = {side(across_.low, left, 1, left == 0, top, bottom, down_.size),
+                    side(across_.high, right, -1, right == across_.size, top, bottom, down_.size),
+                    side(down_.low, top, 1, top == 0, left, right, across_.size),
+                    side(down_.high, bottom, -1, bottom == down_.size, left, right, across_.size)},
           .score = score};
 }
 

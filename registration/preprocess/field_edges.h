@@ -46,10 +46,11 @@ class EdgeMap {
 };
 
 struct FieldSide {
-  int at = 0;             // pixels of the upright image; at the rim where the side is open
-  bool is_open = true;    // no edge: the field reaches to the rim
-  double evidence = 0.0;  // EdgeMap::mean() along it
-  double at_ends = 0.0;   // the same along the 12 mm at one end, the lesser of the two
+  int at = 0;              // pixels of the upright image; at the rim where the side is open
+  bool is_open = true;     // no edge: the field reaches to the rim
+  double evidence = 0.0;   // EdgeMap::mean() along it
+  double at_ends = 0.0;    // the same along the 12 mm at one end, the lesser of the two
+  bool has_slope = false;  // beyond it the image darkens all the way to another edge, as from leaves to jaws
 };
 
 // Left, right, top, bottom.
@@ -76,6 +77,13 @@ class FieldEdges {
     int size;                      // of the image across
   };
   static Axis axis_of(const UprightXray& xray);
+  // An edge is as clear at several places about its own: their middle. But the light beyond leaves falls all the way to
+  // jaws that stand a few millimeters behind, whose edge is clear, too: the inner end of such a slope is the leaves'.
+  struct Place {
+    int at = 0;
+    bool has_slope = false;
+  };
+  Place place_of_edge(const EdgeMap& map, int at, int inward, int first, int end) const;
   FieldRectangle with(int left, int right, int top, int bottom, double score) const;
 
   double mm_;

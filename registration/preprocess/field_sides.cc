@@ -2,24 +2,32 @@
 
 #include <Eigen/Dense>
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <numbers>
-#include <vector>
+#include <span>
 
 namespace isoshift {
 namespace {
 
-constexpr double kBlockMm = 5.0;   // along the side
-constexpr double kWindowMm = 8.0;  // across it, to either side
-constexpr double kWeightMm = 4.0;  // sigma of the weights in the window: what is near the edge tells its place
-constexpr double kPlacesMm = 3.5;  // the edge lies so near to where it is looked for
-constexpr double kPlaceStepMm = 0.35;
-constexpr double kBestSigmaMm = 0.05;  // what no edge is measured better than
-constexpr double kMaxSlope = 0.035;    // 2 degrees
-constexpr double kSlopeSigma = 0.003;  // what no slope is measured better than: what lies behind an edge may slope
-constexpr double kSameMm = 0.06;       // blocks of one edge differ by so much
-constexpr double kFarMm = 0.4;         // and hardly by more
+constexpr double kBlockMm = 5.0;           // along the side
+constexpr double kOutwardMm = 8.0;         // the window across it, from where the logarithm of the intensity falls most
+constexpr double kInwardMm = 12.0;         // where half the beam arrives lies further in
+constexpr double kWeightMm = 5.0;          // sigma of the weights in the window: what is near the edge tells its place
+constexpr double kDarkShare = 0.03;        // of the brightest intensity of a block: what is darker counts less;
+constexpr double kDarkShareOfSlope = 0.3;  // the same where it darkens all the way to another edge
+constexpr double kFirstPlaceMm = -1.2;     // places from so far outside of where the logarithm falls most
+constexpr double kLastPlaceMm = 1.0;       // to so far inside,
+constexpr double kLastPlaceSigmas = 1.7;   // and so many sigmas of the penumbra
+constexpr double kPlaceStepMm = 0.3;       // of the places
+constexpr double kFinePlaceStepMm = 0.06;  // of those near the line
+constexpr double kBestSigmaMm = 0.05;      // what no side is measured better than
+constexpr double kTurnStep = 0.0015;       // radians, 0.09 degrees
+constexpr int kTurns = 8;                  // steps to either side
+constexpr double kMisfitFloor = 1e-4;      // mean square of the relative misfit: no block fits better than 1 %
+constexpr double kMostMisfit = 3.0;        // logarithm: a block that the line misfits by more speaks no louder
+constexpr double kNearlyMisfit = 0.5;      // mean logarithm: what fits worse by less fits nearly as well
+// Sigmas of the penumbra.
+constexpr double kFirstPenumbraMm = 0.9, kLeastPenumbraMm = 0.25, kMostPenumbraMm = 2.5;
 
 double middle_value(std::vector<double> values) {
   if (values.empty()) return 0.0;
@@ -28,157 +36,250 @@ double middle_value(std::vector<double> values) {
   return *middle;
 }
 
-// The mean profile of a block of rows.
+// The mean profile of a block of rows, outside first.
 struct Block {
   double row = 0.0;  // its middle
-  Eigen::VectorXd intensity;
+  Eigen::VectorXd intensity, weight;
 };
 
-std::vector<Block> blocks_of(const UprightXray& xray, int from, int count, int first_row, int end_row) {
+std::vector<Block> blocks_of(const SideToMeasure& side, int outward, int count) {
+  const UprightXray& xray = *side.xray;
   const int rows = std::max(1, static_cast<int>(std::lround(kBlockMm / xray.mm)));
   std::vector<Block> blocks;
-  for (int row = first_row; row + rows <= end_row; row += rows) {
-    Block block{.row = row + 0.5 * rows, .intensity = Eigen::VectorXd::Zero(count)};
-    bool is_valid = true;
-    for (int r = row; r < row + rows; ++r)
-      for (int n = 0; n < count; ++n) {
-        is_valid = is_valid && xray.valid.at<std::uint8_t>(r, from + n) != 0;
-        block.intensity[n] += xray.intensity.at<float>(r, from + n) / rows;
+  for (int row = side.first; row + rows <= side.end; row += rows) {
+    Block block{
+        .row = row + 0.5 * rows, .intensity = Eigen::VectorXd::Zero(count), .weight = Eigen::VectorXd::Zero(count)};
+    for (int n = 0; n < count; ++n) {
+      const int column = side.sign > 0 ? side.near - outward + n : side.near - 1 + outward - n;
+      if (column < 0 || column >= xray.intensity.cols) continue;
+      bool is_valid = true;
+      for (int r = row; r < row + rows; ++r) {
+        is_valid = is_valid && xray.valid.at<std::uint8_t>(r, column) != 0;
+        block.intensity[n] += xray.intensity.at<float>(r, column) / rows;
       }
-    if (is_valid) blocks.push_back(std::move(block));
+      const double off_mm = (n + 0.5 - outward) * xray.mm - 1.0;
+      if (is_valid) block.weight[n] = std::exp(-0.5 * std::pow(off_mm / kWeightMm, 2));
+    }
+    const double floor =
+        (side.has_slope ? kDarkShareOfSlope : kDarkShare) * block.intensity.cwiseProduct(block.weight).maxCoeff();
+    if (!(floor > 0.0)) continue;
+    double sum = block.weight.sum();
+    if (sum * xray.mm < kWeightMm) continue;
+    for (int n = 0; n < count; ++n) block.weight[n] /= sum * std::pow(std::max(block.intensity[n], 0.0) + floor, 2);
+    blocks.push_back(std::move(block));
   }
   return blocks;
 }
 
-// The model of an edge at one place with one blur, in which the intensity is linear: inside a + b x, outside c, d x.
-class EdgeModel {
+// What passes an edge, sample by sample of a profile: one place, one penumbra.
+using Basis = Eigen::Matrix<double, Eigen::Dynamic, 5>;
+
+Basis basis_of(int count, int outward, double pixel_mm, double place_mm, double penumbra_mm) {
+  constexpr double kUnitMm = 5.0;
+  Basis basis(count, 5);
+  for (int n = 0; n < count; ++n) {
+    const double x = (n + 0.5 - outward) * pixel_mm - place_mm;
+    const double passing = 0.5 * std::erfc(-x / (penumbra_mm * std::numbers::sqrt2)), u = x / kUnitMm;
+    basis.row(n) << passing, passing * u, passing * u * u, 1.0 - passing, (1.0 - passing) * u;
+  }
+  return basis;
+}
+
+// The logarithm of what the model leaves of a block: inside a + b x + c x^2, outside d + e x. Large where it is darker
+// inside.
+double misfit_of(const Block& block, const Basis& basis) {
+  using Matrix = Eigen::Matrix<double, 5, 5>;
+  using Vector = Eigen::Matrix<double, 5, 1>;
+  const Basis weighted = block.weight.asDiagonal() * basis;
+  Matrix normal = basis.transpose() * weighted;
+  const Vector right = weighted.transpose() * block.intensity;
+  const double square = block.intensity.dot(block.weight.cwiseProduct(block.intensity));
+  normal.diagonal() += 1e-6 * normal.trace() * Vector(0.01, 1.0, 1.0, 0.01, 1.0);
+  const Vector solution = normal.ldlt().solve(right);
+  const double left = std::max(0.0, square - 2.0 * solution.dot(right) + solution.dot(normal * solution));
+  return std::log(left + kMisfitFloor);
+}
+
+// How well edges at several places explain the blocks of a side.
+class SideMisfits {
  public:
-  EdgeModel(int count, double pixel_mm, double middle_mm, double at_mm, double blur_mm, int sign)
-      : design_(count, 4), passing_slope_(count), weight_(count) {
-    for (int n = 0; n < count; ++n) {
-      const double x = (n + 0.5) * pixel_mm - at_mm;
-      const double passing = 0.5 * std::erfc(-sign * x / (blur_mm * std::numbers::sqrt2));
-      weight_[n] = std::exp(-0.5 * std::pow(((n + 0.5) * pixel_mm - middle_mm) / kWeightMm, 2));
-      design_.row(n) << passing, passing * x, 1.0 - passing, (1.0 - passing) * x;
-      design_.row(n) *= weight_[n];
-      passing_slope_[n] = std::exp(-0.5 * x * x / (blur_mm * blur_mm)) / (blur_mm * std::sqrt(2.0 * std::numbers::pi));
-    }
-    solver_.compute(design_);
+  SideMisfits(const SideToMeasure& side)
+      : side_(side),
+        mm_(side.xray->mm),
+        outward_(static_cast<int>(std::lround(kOutwardMm / mm_))),
+        count_(outward_ + static_cast<int>(std::lround(kInwardMm / mm_))),
+        blocks_(blocks_of(side, outward_, count_)),
+        best_(blocks_.size(), 1e9) {
+    for (const Block& block : blocks_) middle_ += block.row / static_cast<double>(blocks_.size());
   }
 
-  // Sum of squares that it leaves.
-  double left(const Eigen::VectorXd& intensity) const {
-    const Eigen::VectorXd weighted = weight_.cwiseProduct(intensity);
-    return (weighted - design_ * solver_.solve(weighted)).squaredNorm();
+  bool is_empty() const { return blocks_.empty(); }
+  int blocks() const { return static_cast<int>(blocks_.size()); }
+  double middle() const { return middle_; }
+
+  // Misfits at places `first_mm + n * step_mm` inward of `near`.
+  void look(double first_mm, double step_mm, int places, double penumbra_mm) {
+    first_mm_ = first_mm;
+    step_mm_ = step_mm;
+    misfits_.resize(places, blocks());
+    for (int n = 0; n < places; ++n) {
+      const Basis basis = basis_of(count_, outward_, mm_, first_mm + n * step_mm, penumbra_mm);
+      for (int b = 0; b < blocks(); ++b) misfits_(n, b) = misfit_of(blocks_[static_cast<std::size_t>(b)], basis);
+    }
+    for (int b = 0; b < blocks(); ++b) {
+      double& best = best_[static_cast<std::size_t>(b)];
+      best = std::min(best, misfits_.col(b).minCoeff());
+    }
   }
-  // Step from outside to inside.
-  double step(const Eigen::VectorXd& intensity) const {
-    const Eigen::VectorXd solution = solver_.solve(weight_.cwiseProduct(intensity));
-    return solution[0] - solution[2];
+
+  // The sum over all blocks for a line at `place_mm` (of its middle) with this slope.
+  double of_line(double place_mm, double slope) const {
+    double sum = 0.0;
+    for (int b = 0; b < blocks(); ++b) {
+      const auto number = static_cast<std::size_t>(b);
+      const double off_mm = side_.sign * slope * (blocks_[number].row - middle_) * mm_;
+      const double at = std::clamp((place_mm + off_mm - first_mm_) / step_mm_, 0.0, misfits_.rows() - 1.000001);
+      const int below = static_cast<int>(at);
+      const double misfit = misfits_(below, b) + (at - below) * (misfits_(below + 1, b) - misfits_(below, b));
+      sum += std::min(misfit - best_[number], kMostMisfit) + best_[number];
+    }
+    return sum;
   }
-  double passing_slope_squared() const { return passing_slope_.squaredNorm(); }
+
+  // The place of the best line with this slope.
+  struct Best {
+    double place_mm = 0.0, misfit = 1e30;
+  };
+  Best best_line(double slope) const {
+    Best best;
+    for (int n = 0; n < misfits_.rows(); ++n) {
+      const double misfit = of_line(place(n), slope);
+      if (misfit < best.misfit) best = {place(n), misfit};
+    }
+    return best;
+  }
+
+  // How far from `best` a line with this slope fits nearly as well.
+  double reach_mm(const Best& best, double slope) const {
+    double reach = 0.0;
+    const int places =
+        1 + static_cast<int>((place(static_cast<int>(misfits_.rows()) - 1) - first_mm_) / kFinePlaceStepMm);
+    for (int n = 0; n < places; ++n) {
+      const double at = first_mm_ + n * kFinePlaceStepMm;
+      if (of_line(at, slope) < best.misfit + kNearlyMisfit * blocks())
+        reach = std::max(reach, std::abs(at - best.place_mm));
+    }
+    return reach;
+  }
+
+  // How far the blocks by themselves lie from a line: of those with an edge within the places.
+  std::vector<double> off_line(double place_mm, double slope) const {
+    std::vector<double> off;
+    for (int b = 0; b < blocks(); ++b) {
+      Eigen::Index least = 0;
+      misfits_.col(b).minCoeff(&least);
+      if (least == 0 || least + 1 == misfits_.rows()) continue;
+      const double line_mm = place_mm + side_.sign * slope * (blocks_[static_cast<std::size_t>(b)].row - middle_) * mm_;
+      const double below = misfits_(least - 1, b), above = misfits_(least + 1, b);
+      const double curvature = below - 2.0 * misfits_(least, b) + above;
+      const double between = curvature > 0.0 ? 0.5 * (below - above) / curvature : 0.0;
+      off.push_back(std::abs(place(static_cast<int>(least)) + between * step_mm_ - line_mm));
+    }
+    return off;
+  }
+
+  // Pixels of the image.
+  double at(double place_mm) const { return side_.near + side_.sign * place_mm / mm_; }
+  int slope_sign() const { return side_.slope_sign; }
 
  private:
-  Eigen::MatrixXd design_;
-  Eigen::VectorXd passing_slope_, weight_;
-  Eigen::HouseholderQR<Eigen::MatrixXd> solver_;
+  double place(int n) const { return first_mm_ + n * step_mm_; }
+
+  const SideToMeasure& side_;
+  double mm_;
+  int outward_, count_;
+  std::vector<Block> blocks_;
+  std::vector<double> best_;  // misfit of every block at its best place, of all that were looked at
+  double middle_ = 0.0, first_mm_ = 0.0, step_mm_ = 1.0;
+  Eigen::MatrixXd misfits_;  // places x blocks
 };
 
-// All places of one blur.
-struct BlurFit {
-  std::vector<Sighting> seen;
-  double left = 0.0;  // relative to the steps
+// The turn that all sides share, and what the best lines leave with it.
+struct Turned {
+  double turn = 0.0, misfit = 1e30;
 };
 
-BlurFit fit_with(const std::vector<Block>& blocks, int count, double pixel_mm, double middle_mm, double blur_mm,
-                 int sign) {
-  std::vector<EdgeModel> models;
-  std::vector<double> places;
-  const int steps = static_cast<int>(std::lround(2.0 * kPlacesMm / kPlaceStepMm));
-  for (int n = 0; n <= steps; ++n) {
-    places.push_back(middle_mm - kPlacesMm + n * kPlaceStepMm);
-    models.emplace_back(count, pixel_mm, middle_mm, places.back(), blur_mm, sign);
-  }
-  BlurFit fit;
-  for (const Block& block : blocks) {
-    std::vector<double> left(models.size());
-    std::ranges::transform(models, left.begin(), [&](const EdgeModel& m) { return m.left(block.intensity); });
-    const auto best = static_cast<std::size_t>(std::ranges::min_element(left) - left.begin());
-    const double step = models[best].step(block.intensity);
-    const double brightest = std::max(block.intensity.maxCoeff(), 1e-9);
-    fit.left += std::log(left[best] / (brightest * brightest) + 1e-7);
-    if (best == 0 || best + 1 == models.size() || step < 0.1 * brightest) continue;
-    const double curvature = left[best - 1] - 2.0 * left[best] + left[best + 1];
-    const double off = curvature > 0.0 ? 0.5 * (left[best - 1] - left[best + 1]) / curvature : 0.0;
-    const double noise_squared = left[best] / std::max(1, count - 6);
-    const double sigma = std::sqrt(noise_squared / models[best].passing_slope_squared()) / step;
-    fit.seen.push_back({.row = block.row,
-                        .at = (places[best] + std::clamp(off, -0.5, 0.5) * kPlaceStepMm) / pixel_mm,
-                        .sigma_mm = std::hypot(sigma, kBestSigmaMm)});
-  }
-  return fit;
-}
-
-SideSightings sightings_at(const UprightXray& xray, int near, int sign, int first, int end, double penumbra_mm) {
-  const int reach = static_cast<int>(std::lround(kWindowMm / xray.mm));
-  const int from = std::max(0, near - reach), count = std::min(xray.intensity.cols, near + reach) - from;
-  if (count < reach) return {};
-  const std::vector<Block> blocks = blocks_of(xray, from, count, first, end);
-  BlurFit best = fit_with(blocks, count, xray.mm, (near - from) * xray.mm, penumbra_mm, sign);
-  for (Sighting& sighting : best.seen) sighting.at += from;
-  return {.seen = std::move(best.seen), .blocks = static_cast<int>(blocks.size()), .misfit = best.left};
-}
-
-}  // namespace
-
-SideSightings sightings_of_side(const UprightXray& xray, int near, int sign, int first, int end, double penumbra_mm) {
-  // The logarithm falls most outside of where half the beam arrives: by 1 mm, or by more where the penumbra is wide.
-  SideSightings best;
-  for (const double inward_mm : {1.0, 3.0, 4.5}) {
-    SideSightings other = sightings_at(xray, near + sign * static_cast<int>(std::lround(inward_mm / xray.mm)), sign,
-                                       first, end, penumbra_mm);
-    if (other.seen.size() > best.seen.size() || best.blocks == 0) best = std::move(other);
-    if (4 * best.seen.size() >= 3 * static_cast<std::size_t>(best.blocks)) break;
+Turned best_turn(std::span<const SideMisfits> sides, double turn_sigma) {
+  Turned best;
+  for (int n = -kTurns; n <= kTurns; ++n) {
+    const double turn = n * kTurnStep;
+    double misfit = 0.5 * std::pow(turn / turn_sigma, 2);
+    for (const SideMisfits& side : sides)
+      if (!side.is_empty()) misfit += side.best_line(side.slope_sign() * turn).misfit;
+    if (misfit < best.misfit) best = {turn, misfit};
   }
   return best;
 }
 
-SideLine line_through(const std::vector<Sighting>& seen, double pixel_mm, double slope, double slope_sigma) {
-  const auto count = static_cast<double>(seen.size());
-  std::vector<double> places;
-  SideLine line{.slope = slope};
-  for (const Sighting& sighting : seen) {
-    places.push_back(sighting.at);
-    line.middle += sighting.row / count;
-  }
-  line.at = middle_value(places);
-  for (int round = 0; round < 10; ++round) {
-    Eigen::Matrix2d normal = Eigen::Matrix2d::Zero();
-    Eigen::Vector2d right = Eigen::Vector2d::Zero();
-    for (const Sighting& sighting : seen) {
-      const double y = (sighting.row - line.middle) * pixel_mm;
-      const double off = (sighting.at - line.x(sighting.row)) * pixel_mm;
-      const double weight =
-          1.0 / (std::pow(sighting.sigma_mm, 2) + std::pow(kSameMm, 2)) / (1.0 + std::pow(off / kFarMm, 2));
-      normal += weight * Eigen::Vector2d(1, y) * Eigen::RowVector2d(1, y);
-      right += weight * sighting.at * pixel_mm * Eigen::Vector2d(1, y);
+}  // namespace
+
+std::vector<SideLine> measured_lines(const std::vector<SideToMeasure>& sides, double turn_sigma) {
+  const auto places_of = [](double sigma_mm) {
+    return 1 +
+           static_cast<int>(std::lround((kLastPlaceMm + kLastPlaceSigmas * sigma_mm - kFirstPlaceMm) / kPlaceStepMm));
+  };
+  std::vector<SideMisfits> misfits(sides.begin(), sides.end());
+  const auto fit_with = [&](double sigma_mm) {
+    for (SideMisfits& side : misfits) side.look(kFirstPlaceMm, kPlaceStepMm, places_of(sigma_mm), sigma_mm);
+    return best_turn(misfits, turn_sigma);
+  };
+  double penumbra_mm = kFirstPenumbraMm;
+  Turned best = fit_with(penumbra_mm);
+  // One penumbra fits best, and the nearer the better.
+  for (const double ratio : {1.5, 1.22, 1.1, 1.05})
+    for (const bool is_up : {true, false}) {
+      bool is_better = true;
+      while (is_better) {
+        const double other_mm =
+            std::clamp(is_up ? penumbra_mm * ratio : penumbra_mm / ratio, kLeastPenumbraMm, kMostPenumbraMm);
+        const Turned other = fit_with(other_mm);
+        is_better = other.misfit < best.misfit;
+        if (is_better) {
+          best = other;
+          penumbra_mm = other_mm;
+        }
+      }
     }
-    normal(1, 1) += 1.0 / (slope_sigma * slope_sigma);
-    right[1] += slope / (slope_sigma * slope_sigma);
-    const Eigen::Vector2d solution = normal.ldlt().solve(right);
-    line.at = solution[0] / pixel_mm;
-    line.slope = std::clamp(solution[1], -kMaxSlope, kMaxSlope);
+  std::vector<SideLine> lines;
+  for (SideMisfits& side : misfits) {
+    SideLine line;
+    if (side.is_empty()) {
+      line.sigma_mm = line.scatter_mm = 1e3;
+      lines.push_back(line);
+      continue;
+    }
+    side.look(kFirstPlaceMm, kPlaceStepMm, places_of(penumbra_mm), penumbra_mm);
+    const double slope = side.slope_sign() * best.turn;
+    const auto coarse = side.best_line(slope);
+    const std::vector<double> off = side.off_line(coarse.place_mm, slope);
+    line.seen = static_cast<double>(off.size()) / side.blocks();
+    line.scatter_mm = off.empty() ? 1e3 : 1.48 * middle_value(off);
+    line.misfit = std::exp(0.5 * coarse.misfit / side.blocks());
+    line.wide_mm = side.reach_mm(coarse, slope);
+    const double reach_mm = kPlaceStepMm * 1.2;
+    side.look(coarse.place_mm - reach_mm - 1.0, kFinePlaceStepMm,
+              1 + static_cast<int>(2.0 * (reach_mm + 1.0) / kFinePlaceStepMm), penumbra_mm);
+    const auto fine = side.best_line(slope);
+    line.at = side.at(fine.place_mm);
+    line.slope = slope;
+    line.middle = side.middle();
+    // Blocks that are poorly explained scatter, and hardly count for the line.
+    line.sigma_mm =
+        std::hypot(std::min(line.scatter_mm, line.wide_mm) / std::sqrt(std::max(1.0, static_cast<double>(off.size()))),
+                   kBestSigmaMm);
+    lines.push_back(line);
   }
-  std::vector<double> off;
-  double square_mm2 = 0.0;
-  for (const Sighting& sighting : seen) {
-    off.push_back(pixel_mm * std::abs(sighting.at - line.x(sighting.row)));
-    square_mm2 += std::pow((sighting.row - line.middle) * pixel_mm, 2);
-  }
-  line.scatter_mm = 1.48 * middle_value(off);
-  line.sigma_mm = std::hypot(line.scatter_mm / std::sqrt(count), kBestSigmaMm);
-  line.slope_sigma = std::hypot(std::max(line.scatter_mm, kSameMm) / std::sqrt(square_mm2 + 1.0), kSlopeSigma);
-  return line;
+  return lines;
 }
 
 double brightness_beyond(const UprightXray& xray, int at, int sign, int first, int end) {

@@ -5,11 +5,14 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numbers>
 #include <utility>
 
 #include "geometry/rotation.h"
 #include "registration/preprocess/field_edges.h"
 #include "registration/preprocess/field_sides.h"
+#include "registration/preprocess/leaf_outline.h"
+#include "registration/preprocess/small_field.h"
 
 namespace isoshift {
 namespace {
@@ -22,23 +25,27 @@ constexpr double kDeclaredEvidence = 0.3;  // of a side where a file says that t
 constexpr double kEndEvidence = 0.2;       // of the last 12 mm of a side, if it does not end there
 constexpr double kMaxScatterMm = 1.0;      // of a straight edge; the true ones had 0.6, over bone 1.0
 constexpr double kMaxSigmaMm = 0.5;
-constexpr double kRodBrightness = -0.5;  // beyond a rod; beyond a field's side the image has less than half
-constexpr double kJawToleranceMm = 3.0;  // a side and a declared jaw
-constexpr double kInnerMarginMm = 4.0;   // of a side's penumbra, when edges further in are looked for
-constexpr double kTurnSigma = 0.003;     // of the collimator angle, 0.2 degrees
-constexpr double kMaxTurn = 0.0175;      // 1 degree
+constexpr double kMaxWideMm = 1.45;            // of the places that explain a side nearly as well
+constexpr double kMaxWideOfPoorMm = 0.8;       // the same of a side
+constexpr double kPoorMisfit = 0.12;           // that is explained no better than this
+constexpr double kCollimatorScatterMm = 0.45;  // of a collimator's edge; the outlines of air and patient have more
+constexpr double kRodBrightness = -0.5;        // beyond a rod; beyond a field's side the image has less than half
+constexpr double kJawToleranceMm = 3.0;        // a side and a declared jaw
+constexpr double kInnerMarginMm = 4.0;         // of a side's penumbra, when edges further in are looked for
+constexpr double kShadedCornerMm = 4.0;        // of a side, that the penumbra of the next one shades
+constexpr double kTurnSigma = 0.003;           // of the collimator angle, 0.2 degrees
+constexpr double kMaxTurn = 0.0175;            // 1 degree
 constexpr std::array kNames = {"left", "right", "upper", "lower"};
 
 struct Side {
   FieldSide edge;
   SideLine line;
   double brightness_beyond = -10.0;
-  double seen = 0.0;  // share of its blocks
   // Without the scale of the intensity, half of it is not where half the beam arrives.
   double least_seen = 0.5, max_scatter_mm = kMaxScatterMm;
 
   bool is_open() const { return edge.is_open; }
-  bool is_straight() const { return seen > least_seen && line.scatter_mm <= max_scatter_mm; }
+  bool is_straight() const { return line.seen > least_seen && line.scatter_mm <= max_scatter_mm; }
   bool is_clear() const { return edge.evidence >= kClear && is_straight(); }
 };
 
@@ -52,36 +59,12 @@ struct Upright {
   const UprightXray& of(std::size_t side) const { return side < 2 ? xray : transposed; }
 };
 
-// All sides seen with the penumbra that fits them best.
-std::array<SideSightings, 4> sightings_of(const Upright& upright, const FieldRectangle& rectangle) {
-  const int corner = static_cast<int>(std::lround(4.0 / upright.xray.mm));
-  std::array<SideSightings, 4> best;
-  double least = 1e30;
-  for (const double penumbra_mm : kPenumbraSigmasMm) {
-    std::array<SideSightings, 4> all;
-    double misfit = 0.0;
-    for (std::size_t n = 0; n < 4; ++n) {
-      if (rectangle.sides[n].is_open) continue;
-      const std::size_t across = n < 2 ? 2 : 0;
-      const FieldSide &before = rectangle.sides[across], &after = rectangle.sides[across + 1];
-      all[n] = sightings_of_side(upright.of(n), rectangle.sides[n].at, n % 2 == 0 ? 1 : -1,
-                                 before.at + (before.is_open ? 0 : corner), after.at - (after.is_open ? 0 : corner),
-                                 penumbra_mm);
-      misfit += all[n].misfit;
-    }
-    if (misfit >= least) continue;
-    least = misfit;
-    best = std::move(all);
-  }
-  return best;
-}
-
-// The four sides measured: each by itself, then all with the turn that they share.
+// The four sides measured, all with the turn and the penumbra that they share.
 Sides measured(const Upright& upright, const FieldRectangle& rectangle) {
   Sides sides;
-  const double mm = upright.xray.mm;
-  const std::array<SideSightings, 4> sightings = sightings_of(upright, rectangle);
-  double turn = 0.0, weights = 1.0 / (kTurnSigma * kTurnSigma);
+  const int corner = static_cast<int>(std::lround(kShadedCornerMm / upright.xray.mm));
+  const bool has_slope = std::ranges::any_of(rectangle.sides, &FieldSide::has_slope);
+  std::vector<SideToMeasure> to_measure;
   for (std::size_t n = 0; n < 4; ++n) {
     Side& side = sides[n];
     side.edge = rectangle.sides[n];
@@ -89,22 +72,21 @@ Sides measured(const Upright& upright, const FieldRectangle& rectangle) {
     if (!upright.xray.has_scale) side.least_seen = 0.3, side.max_scatter_mm = 2.0 * kMaxScatterMm;
     if (side.is_open()) continue;
     const std::size_t across = n < 2 ? 2 : 0;
-    const int first = rectangle.sides[across].at, end = rectangle.sides[across + 1].at;
-    side.brightness_beyond = brightness_beyond(upright.of(n), side.edge.at, n % 2 == 0 ? 1 : -1, first, end);
-    side.line.middle = 0.5 * (first + end);
-    side.seen = static_cast<double>(sightings[n].seen.size()) / std::max(1, sightings[n].blocks);
-    if (sightings[n].seen.empty()) {
-      side.line.sigma_mm = side.line.scatter_mm = 1e3;
-      continue;
-    }
-    const SideLine alone = line_through(sightings[n].seen, mm, 0.0, 2.0 * kTurnSigma);
-    const double weight = 1.0 / (alone.slope_sigma * alone.slope_sigma);
-    weights += weight;
-    turn += weight * (n < 2 ? -alone.slope : alone.slope);
+    const FieldSide &before = rectangle.sides[across], &after = rectangle.sides[across + 1];
+    const int sign = n % 2 == 0 ? 1 : -1;
+    side.brightness_beyond = brightness_beyond(upright.of(n), side.edge.at, sign, before.at, after.at);
+    to_measure.push_back({.xray = &upright.of(n),
+                          .near = side.edge.at,
+                          .sign = sign,
+                          .first = before.at + (before.is_open ? 0 : corner),
+                          .end = after.at - (after.is_open ? 0 : corner),
+                          .slope_sign = n < 2 ? -1 : 1,
+                          .has_slope = has_slope});
   }
-  turn /= weights;
-  for (std::size_t n = 0; n < 4; ++n)
-    if (!sightings[n].seen.empty()) sides[n].line = line_through(sightings[n].seen, mm, n < 2 ? -turn : turn, 1e-5);
+  const std::vector<SideLine> lines = measured_lines(to_measure, kTurnSigma);
+  auto line = lines.begin();
+  for (Side& side : sides)
+    if (!side.is_open()) side.line = *line++;
   return sides;
 }
 
@@ -138,6 +120,20 @@ std::vector<Eigen::Vector2d> corners_of(const Mapping& mapping, const Sides& sid
   return corners;
 }
 
+// Of a circle: a polygon that leaves it by less than a hundredth of its radius.
+std::vector<Eigen::Vector2d> circle_of(const Mapping& mapping, const Sides& sides) {
+  constexpr int kCorners = 32;
+  const double radius = 0.25 * (sides[1].line.at - sides[0].line.at + sides[3].line.at - sides[2].line.at);
+  const Eigen::Vector2d middle =
+      0.5 * Eigen::Vector2d(sides[0].line.at + sides[1].line.at, sides[2].line.at + sides[3].line.at);
+  std::vector<Eigen::Vector2d> corners;
+  for (int n = 0; n < kCorners; ++n) {
+    const double angle = 2.0 * std::numbers::pi * n / kCorners;
+    corners.push_back(mapping.image(middle + radius * Eigen::Vector2d(std::cos(angle), std::sin(angle))));
+  }
+  return corners;
+}
+
 int sides_found(const Sides& sides) { return static_cast<int>(std::ranges::count(sides, false, &Side::is_open)); }
 int sides_clear(const Sides& sides) { return static_cast<int>(std::ranges::count(sides, true, &Side::is_clear)); }
 
@@ -151,6 +147,8 @@ std::string doubt_about(const Sides& sides) {
     if (side.edge.at_ends < kEndEvidence) return fmt::format("its {} edge ends before the corner", kNames[n]);
     if (side.line.sigma_mm > kMaxSigmaMm)
       return fmt::format("its {} edge is uncertain by {:.1f} mm", kNames[n], side.line.sigma_mm);
+    if (side.line.wide_mm > (side.line.misfit > kPoorMisfit ? kMaxWideOfPoorMm : kMaxWideMm))
+      return fmt::format("its {} edge may lie {:.1f} mm farther in or out", kNames[n], side.line.wide_mm);
     if (std::abs(side.line.slope) > kMaxTurn)
       return fmt::format("its edges are turned by {:.1f} degrees against the collimator angle",
                          deg_from_rad(std::abs(side.line.slope)));
@@ -177,11 +175,33 @@ bool is_beside(const Sides& sides, const Eigen::Vector2d& isocenter_upright_px, 
          std::max(beyond_mm(0, isocenter_upright_px.x()), beyond_mm(2, isocenter_upright_px.y())) > kToleranceMm;
 }
 
+// Whether an edge is as clear, as straight and as dark beyond as only a collimator's is.
+bool is_collimator(const Side& side) {
+  constexpr double kBeyond = -1.5, kEnds = 0.9, kSeen = 0.9;
+  return !side.is_open() && side.edge.evidence >= kClear && side.edge.at_ends >= kEnds && side.line.seen >= kSeen &&
+         side.line.scatter_mm <= kCollimatorScatterMm && side.brightness_beyond < kBeyond;
+}
+
 // The field as the image alone shows it.
 struct Finding {
   Sides sides;
   std::string doubt = {};
+  bool is_round = false;  // the circle that touches the sides
 };
+
+// What a cone or stereotactic leaves leave of the treatment beam.
+std::optional<Finding> small_finding(const XrayImage& xray, const UprightXray& upright) {
+  if (xray.view.beam != Beam::kMegavoltage) return std::nullopt;
+  const std::optional<SmallField> field = find_small_field(upright);
+  if (!field) return std::nullopt;
+  Finding finding{.sides = {}, .is_round = field->is_round};
+  for (std::size_t n = 0; n < 4; ++n) {
+    const double at = field->sides[n];
+    finding.sides[n].edge = {.at = static_cast<int>(std::lround(at)), .is_open = false};
+    finding.sides[n].line = {.at = at, .sigma_mm = field->sigma_mm};
+  }
+  return finding;
+}
 
 Finding find_in(const Upright& upright, const FieldEdges& edges, const Eigen::Vector2d& isocenter_upright_px) {
   Finding finding{.sides = measured(upright, edges.best())};
@@ -189,6 +209,13 @@ Finding find_in(const Upright& upright, const FieldEdges& edges, const Eigen::Ve
   const bool is_anatomy = may_be_rod(sides) || is_beside(sides, isocenter_upright_px, upright.xray.mm);
   if (sides_clear(sides) > 0 && !is_anatomy) {
     finding.doubt = doubt_about(sides);
+    return finding;
+  }
+  if (is_anatomy && std::ranges::any_of(sides, is_collimator)) {
+    finding.doubt = "a collimator's edge leaves the isocenter out";
+    if (std::ranges::all_of(sides, [](const Side& side) { return side.is_open() || is_collimator(side); }))
+      return finding;
+    finding.sides = measured(upright, edges.whole());
     return finding;
   }
   // No field. Edges that are not clear enough, straight and dark beyond all the same, are a reason to ask.
@@ -265,6 +292,14 @@ bool reaches_rim(const std::array<double, 4>& declared, const cv::Size& size, do
          (size.width - declared[1]) * mm <= kJawToleranceMm && (size.height - declared[3]) * mm <= kJawToleranceMm;
 }
 
+// Whether a clear side lies so far within the declared one that this cannot be the field's: leaves or a cone closed it.
+bool is_closed_further(const Sides& sides, const std::array<double, 4>& declared, double mm) {
+  for (std::size_t n = 0; n < 4; ++n)
+    if (sides[n].is_clear() && (n % 2 == 0 ? 1.0 : -1.0) * (sides[n].line.at - declared[n]) * mm > kJawToleranceMm)
+      return true;
+  return false;
+}
+
 // What is found, against what the file declares.
 Finding reconciled(Finding in_image, const DeclaredAperture& aperture, const Upright& upright, const FieldEdges& edges,
                    IrradiatedField::Origin& origin) {
@@ -281,13 +316,15 @@ Finding reconciled(Finding in_image, const DeclaredAperture& aperture, const Upr
     if (is_same) origin = IrradiatedField::Origin::kDeclared;
     return in_image;
   }
-  // Where a side is to be is known: fainter evidence will do.
-  Finding there{.sides = measured(upright, edges.near(declared))};
-  if (is_confirmed(there.sides)) {
-    origin = IrradiatedField::Origin::kDeclared;
-    return there;
+  if (!is_closed_further(in_image.sides, declared, mm)) {
+    // Where a side is to be is known: fainter evidence will do.
+    Finding there{.sides = measured(upright, edges.near(declared))};
+    if (is_confirmed(there.sides)) {
+      origin = IrradiatedField::Origin::kDeclared;
+      return there;
+    }
   }
-  if (aperture.is_of_exposure && !is_all)
+  if (aperture.is_of_exposure && !is_all && !is_inside)
     in_image.doubt = "the file declares a smaller aperture than the image shows" +
                      (in_image.doubt.empty() ? std::string() : "; " + in_image.doubt);
   return in_image;
@@ -311,26 +348,53 @@ std::vector<Eigen::Vector2d> on_receptor(std::vector<Eigen::Vector2d> polygon, i
   return polygon;
 }
 
+// The field that leaves make, where the file declares it and the image shows it.
+std::optional<IrradiatedField> field_of_leaves(const XrayImage& xray, const UprightXray& upright) {
+  constexpr double kShiftSigmaMm = 0.3;
+  const Mapping mapping(upright);
+  std::vector<Eigen::Vector2d> outline_px;
+  for (const Eigen::Vector2d& corner : xray.declared_aperture->corners_px)
+    outline_px.push_back(mapping.upright(corner));
+  const auto shift_px = shift_to_seen_outline(upright, outline_px);
+  if (!shift_px) return std::nullopt;
+  IrradiatedField field{.origin = IrradiatedField::Origin::kDeclared, .sigma_mm = kShiftSigmaMm};
+  for (const Eigen::Vector2d& corner : outline_px) field.corners_px.push_back(mapping.image(corner + *shift_px));
+  field.corners_px = on_receptor(field.corners_px, xray.values.columns, xray.values.rows);
+  return field;
+}
+
+// Whether the file declares leaves that make no rectangle, of the exposure itself.
+bool has_leaves(const XrayImage& xray) {
+  return xray.declared_aperture && xray.declared_aperture->is_of_exposure &&
+         xray.declared_aperture->corners_px.size() > 4;
+}
+
 }  // namespace
 
 IrradiatedField find_irradiated_field(const XrayImage& xray, double pixels_per_mm) {
   using Origin = IrradiatedField::Origin;
   const Upright upright(upright_xray(xray, pixels_per_mm));
+  if (has_leaves(xray))
+    if (auto field = field_of_leaves(xray, upright.xray)) return *field;
   const FieldEdges edges(upright.xray);
   const Eigen::Vector2d isocenter_px =
       Mapping(upright.xray).upright(xray.view.project(Eigen::Vector3d::Zero()).value());
-  Finding finding = innermost(upright, find_in(upright, edges, isocenter_px));
+  const std::optional<Finding> small = small_finding(xray, upright.xray);
+  Finding finding = small ? *small : innermost(upright, find_in(upright, edges, isocenter_px));
   IrradiatedField field{.origin = sides_found(finding.sides) > 0 ? Origin::kFound : Origin::kWholeReceptor};
   if (xray.declared_aperture)
     finding = reconciled(std::move(finding), *xray.declared_aperture, upright, edges, field.origin);
   field.doubt = finding.doubt;
+  if (field.is_sure() && has_leaves(xray)) field.doubt = "the file declares leaves that the image does not show";
   for (Side& side : finding.sides) {
     if (!side.is_open()) field.sigma_mm = std::max(field.sigma_mm, side.line.sigma_mm);
     // Blocks of pixels may not reach the rim.
     if (side.is_open()) side.line.at += side.line.at > 0.0 ? 1e3 : -1e3;
   }
+  const Mapping mapping(upright.xray);
   field.corners_px =
-      on_receptor(corners_of(Mapping(upright.xray), finding.sides), xray.values.columns, xray.values.rows);
+      on_receptor(finding.is_round ? circle_of(mapping, finding.sides) : corners_of(mapping, finding.sides),
+                  xray.values.columns, xray.values.rows);
   return field;
 }
 

@@ -15,12 +15,45 @@ namespace {
 
 constexpr double kRimMm = 2.0;  // left out at the panel's rim and along the collimator's penumbra, at the isocenter
 
-// The pixels of a field, a convex polygon, that lie off its sides and off the panel's rim.
+bool is_convex(const std::vector<Eigen::Vector2d>& polygon) {
+  constexpr double kStraight = 1e-3;
+  double least = 0.0, largest = 0.0;  // of the turns from side to side
+  for (std::size_t n = 0; n < polygon.size(); ++n) {
+    const Eigen::Vector2d here = polygon[(n + 1) % polygon.size()] - polygon[n],
+                          next = polygon[(n + 2) % polygon.size()] - polygon[(n + 1) % polygon.size()];
+    const double turn = here.x() * next.y() - here.y() * next.x();
+    least = std::min(least, turn);
+    largest = std::max(largest, turn);
+  }
+  return least > -kStraight || largest < kStraight;
+}
+
+// The pixels of a field that leaves make, which need not be convex.
+Image<std::uint8_t> mask_of_leaves(const IrradiatedField& field, int columns, int rows, double rim_px) {
+  constexpr int kFraction = 4;  // bits of a pixel's fraction
+  std::vector<cv::Point> corners;
+  for (const Eigen::Vector2d& corner : field.corners_px)
+    corners.emplace_back(static_cast<int>(std::lround(corner.x() * (1 << kFraction))),
+                         static_cast<int>(std::lround(corner.y() * (1 << kFraction))));
+  // Drawn with a margin of one pixel: the panel's rim is a side, too.
+  cv::Mat open(rows + 2, columns + 2, CV_8U, cv::Scalar(0)), distance;
+  cv::fillPoly(open(cv::Rect(1, 1, columns, rows)), std::vector<std::vector<cv::Point>>{corners}, cv::Scalar(1),
+               cv::LINE_8, kFraction);
+  cv::distanceTransform(open, distance, cv::DIST_L2, cv::DIST_MASK_PRECISE);
+  Image<std::uint8_t> mask(columns, rows, 0);
+  for (int row = 0; row < rows; ++row)
+    for (int column = 0; column < columns; ++column)
+      mask.at(column, row) = distance.at<float>(row + 1, column + 1) >= rim_px;
+  return mask;
+}
+
+// The pixels of a field, a convex polygon but for leaves, that lie off its sides and off the panel's rim.
 Image<std::uint8_t> mask_of(const IrradiatedField& field, int columns, int rows, double rim_px) {
   Eigen::Vector2d middle = Eigen::Vector2d::Zero();
   for (const Eigen::Vector2d& corner : field.corners_px)
     middle += corner / static_cast<double>(field.corners_px.size());
   std::vector<Eigen::Vector3d> sides;  // distance inside of (column, row, 1)
+  if (!is_convex(field.corners_px)) return mask_of_leaves(field, columns, rows, rim_px);
   for (std::size_t n = 0; n < field.corners_px.size(); ++n) {
     const Eigen::Vector2d &here = field.corners_px[n], &next = field.corners_px[(n + 1) % field.corners_px.size()];
     if ((next - here).norm() < 1e-6) continue;

@@ -128,13 +128,28 @@ double passing(double inside_mm, double penumbra_mm) {
   return 0.5 * std::erfc(-inside_mm / (penumbra_mm / 1.683 * std::numbers::sqrt2));
 }
 
-double open_share(const CollimatedXray& scene, const Eigen::Vector2d& point_mm) {
-  const Eigen::Vector2d q = Eigen::Rotation2Dd(-rad_from_deg(scene.collimator_deg)) * point_mm;
+// The share of the beam that passes an opening: a circle or a rectangle.
+double share_within(const Eigen::Vector2d& lower_mm, const Eigen::Vector2d& upper_mm, bool is_circle,
+                    const Eigen::Vector2d& q, double penumbra_mm) {
+  if (is_circle) {
+    const double radius_mm = 0.5 * (upper_mm - lower_mm).minCoeff();
+    return passing(radius_mm - (q - 0.5 * (lower_mm + upper_mm)).norm(), penumbra_mm);
+  }
   double share = 1.0;
   for (int axis = 0; axis < 2; ++axis)
-    share *= passing(q[axis] - scene.lower_mm[axis], scene.penumbra_mm) *
-             passing(scene.upper_mm[axis] - q[axis], scene.penumbra_mm);
+    share *= passing(q[axis] - lower_mm[axis], penumbra_mm) * passing(upper_mm[axis] - q[axis], penumbra_mm);
   return share;
+}
+
+// What passes leaves or a cone, and the jaws behind.
+double open_share(const CollimatedXray& scene, const Eigen::Vector2d& point_mm) {
+  constexpr double kHaloMm = 3.5 * 1.683, kJawPenumbraMm = 2.5;  // from 20 % to 80 %
+  const Eigen::Vector2d q = Eigen::Rotation2Dd(-rad_from_deg(scene.collimator_deg)) * point_mm;
+  double share = share_within(scene.lower_mm, scene.upper_mm, scene.is_cone, q, scene.penumbra_mm);
+  if (scene.halo_share > 0.0)
+    share += scene.halo_share * (share_within(scene.lower_mm, scene.upper_mm, scene.is_cone, q, kHaloMm) - share);
+  return (scene.leakage + (1.0 - scene.leakage) * share) *
+         share_within(scene.jaw_lower_mm, scene.jaw_upper_mm, false, q, kJawPenumbraMm);
 }
 
 // Blurred by Gaussians of 30 and 80 mm, in blocks: scatter has no detail.
@@ -158,8 +173,8 @@ XrayImage xray_of(const CollimatedXray& scene) {
   for (int row = 0; row < pixels; ++row)
     for (int column = 0; column < pixels; ++column) {
       const Eigen::Vector2d point_mm((column + 0.5) * pixel_mm - kHalfMm, kHalfMm - (row + 0.5) * pixel_mm);
-      const double open = scene.leakage + (1.0 - scene.leakage) * open_share(scene, point_mm);
-      primary.at<float>(row, column) = static_cast<float>(open * std::exp(-contents.at(point_mm)));
+      primary.at<float>(row, column) =
+          static_cast<float>(open_share(scene, point_mm) * std::exp(-contents.at(point_mm)));
     }
   const cv::Mat scattered = scene.scatter * scatter_of(primary, pixel_mm);
 
@@ -171,7 +186,7 @@ XrayImage xray_of(const CollimatedXray& scene) {
   geometry.columns = geometry.rows = pixels;
   XrayImage xray;
   xray.label = "X";
-  xray.view = make_xray_view(geometry, Beam::kKilovoltage);
+  xray.view = make_xray_view(geometry, scene.beam);
   xray.collimator_angle_rad = rad_from_deg(scene.collimator_deg);
   xray.values = Image<float>(pixels, pixels);
   Random random(scene.seed + 77);

@@ -27,6 +27,12 @@ struct CollimatedXray {
   double gain_slope = 0.05;     // of the receptor, from its middle to its rim
   int pixels = 512;             // along an edge of a panel of 400 mm, at the isocenter 267 mm
   std::uint64_t seed = 1;       // of the body and the noise
+  bool is_cone = false;         // the field is the circle in the middle of its rectangle, as wide as its shorter side
+  double halo_share = 0.0;  // of the field's light that is blurred by 3.5 mm: rounded leaf ends, light spread in the
+                            // receptor
+  // Jaws behind the field, wherever they let the beam through.
+  Eigen::Vector2d jaw_lower_mm = Eigen::Vector2d(-1000, -1000), jaw_upper_mm = Eigen::Vector2d(1000, 1000);
+  Beam beam = Beam::kKilovoltage;  // named in the view; the body attenuates as for kilovolts
 };
 
 XrayImage xray_of(const CollimatedXray& scene);
