@@ -35,6 +35,7 @@ struct SiteRules {
   std::string name, sha256;  // of the site's file
   std::string anatomy;       // whose action level it is
   std::string target;        // of the anatomy: the name of a structure, or "isocenter"; empty: the plan names it
+  std::string surrogate;     // the structure whose bones carry the target; empty: bones near it
   std::optional<ActionLevel> level;  // unset: none
   CouchDof couch_dof = CouchDof::kSix;
   std::optional<ValidatedScale> couch_scale;  // shown beside IEC 61217

@@ -14,6 +14,7 @@ namespace isoshift {
 struct Target {
   std::string name;       // of the structure, or "the isocenter's surroundings"
   std::string chosen_by;  // in words: "dose reference 1 of the plan", "--target"
+  std::string surrogate;  // what of it X-rays show, in words: "bone within 20 mm"; empty: not looked for
   Eigen::Vector3d center_room_mm = Eigen::Vector3d::Zero();
   std::vector<Eigen::Vector3d> extent_room_mm;  // points of its surface, farthest in directions all around
 };

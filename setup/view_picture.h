@@ -11,6 +11,8 @@
 
 namespace isoshift {
 
+inline constexpr double kMotionMagnified = 5.0;
+
 using Polygon = std::vector<Eigen::Vector2d>;  // closed, pixels of the picture
 
 struct ViewPicture {
@@ -22,6 +24,7 @@ struct ViewPicture {
   Image<std::uint8_t> xray, drr_planned, drr_found;  // of the same size; dense is bright, dimmed outside the field
   std::vector<Polygon> field;                        // edges of what was compared
   std::vector<Outline> structures;
+  std::vector<Polygon> moved;  // arrows: how bones lie off once the target is right, kMotionMagnified times as long
   Eigen::Vector2d isocenter_px = Eigen::Vector2d::Zero();
   double pixels_per_mm = 0.0;             // at the isocenter
   std::array<std::string, 4> directions;  // of the patient, at the left, right, upper and lower edge: "L", "HA", ...

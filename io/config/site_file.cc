@@ -82,6 +82,27 @@ SiteFile::Sessions sessions_from(JsonSection section) {
   return sessions;
 }
 
+// Of an object with a name per anatomy; empty if the file has none.
+NameByAnatomy names_by_anatomy(JsonSection& section, const char* key, const char* expected) {
+  NameByAnatomy names;
+  const auto named = section.section(key);
+  if (!named) return names;
+  using Names = std::map<std::string, std::string>;
+  for (const auto& [anatomy, name] : section.required<Names>(key, "an object of structure names by anatomy")) {
+    if (name.find_first_not_of(' ') == std::string::npos)
+      throw Error(fmt::format("{}: {} is empty, expected {}", named->where(), anatomy, expected));
+    names.emplace(anatomy, name);
+  }
+  return names;
+}
+
+// Of an anatomy, or else of "default".
+std::string name_for(const NameByAnatomy& names, std::string_view anatomy) {
+  for (const std::string_view whose : {anatomy, std::string_view("default")})
+    if (const auto name = names.find(whose); name != names.end()) return name->second;
+  return "";
+}
+
 }  // namespace
 
 SiteFile read_site_file(const std::filesystem::path& path) {
@@ -96,16 +117,8 @@ SiteFile read_site_file(const std::filesystem::path& path) {
       site.action_levels.emplace(anatomy,
                                  level_from(JsonSection(json, fmt::format("{}: {}", levels->where(), anatomy))));
   }
-  if (const auto targets = section.section("targets")) {
-    using Targets = std::map<std::string, std::string>;
-    for (const auto& [anatomy, name] :
-         section.required<Targets>("targets", "an object of structure names by anatomy")) {
-      if (name.find_first_not_of(' ') == std::string::npos)
-        throw Error(
-            fmt::format("{}: {} is empty, expected the name of a structure, or isocenter", targets->where(), anatomy));
-      site.targets.emplace(anatomy, name);
-    }
-  }
+  site.targets = names_by_anatomy(section, "targets", "the name of a structure, or isocenter");
+  site.surrogates = names_by_anatomy(section, "surrogates", "the name of a structure");
   if (auto couch = section.section("couch")) read_couch(std::move(*couch), site);
   if (const auto unit = section.find<std::string>("length_unit", "mm or cm")) {
     if (unit != "mm" && unit != "cm") section.refuse("length_unit", "mm or cm");
@@ -120,17 +133,17 @@ SiteFile read_site_file(const std::filesystem::path& path) {
 std::optional<ActionLevel> action_level(const SiteFile& site, std::string_view anatomy) {
   const auto level = site.action_levels.find(anatomy.empty() ? "default" : anatomy);
   if (level != site.action_levels.end()) return level->second;
-  if (anatomy.empty() || site.targets.contains(anatomy)) return std::nullopt;
+  if (anatomy.empty() || site.targets.contains(anatomy) || site.surrogates.contains(anatomy)) return std::nullopt;
   std::string names;
   for (const auto& [name, unused] : site.action_levels) names += (names.empty() ? "" : ", ") + name;
   throw UsageError(fmt::format("--anatomy {}: site file \"{}\" has action levels for {}", anatomy, site.name,
                                names.empty() ? "none" : names));
 }
 
-std::string target_named(const SiteFile& site, std::string_view anatomy) {
-  for (const std::string_view name : {anatomy, std::string_view("default")})
-    if (const auto target = site.targets.find(name); target != site.targets.end()) return target->second;
-  return "";
+std::string target_named(const SiteFile& site, std::string_view anatomy) { return name_for(site.targets, anatomy); }
+
+std::string surrogate_named(const SiteFile& site, std::string_view anatomy) {
+  return name_for(site.surrogates, anatomy);
 }
 
 }  // namespace isoshift

@@ -14,6 +14,8 @@ namespace isoshift {
 constexpr double kMaxTimeSpanS = 600.0;        // between the views of one session
 constexpr double kDefaultUntoldSpanS = 120.0;  // between those without table read-outs, where no site file says other
 
+using NameByAnatomy = std::map<std::string, std::string, std::less<>>;
+
 struct SiteFile {
   // When a session of X-rays is complete.
   struct Sessions {
@@ -26,7 +28,8 @@ struct SiteFile {
   std::string name;
   std::string sha256;                                             // of the file, hexadecimal
   std::map<std::string, ActionLevel, std::less<>> action_levels;  // by anatomy; "default" where none is named
-  std::map<std::string, std::string, std::less<>> targets;        // by anatomy: the name of a structure, or "isocenter"
+  NameByAnatomy targets;                                          // by anatomy: the name of a structure, or "isocenter"
+  NameByAnatomy surrogates;                                       // by anatomy: the structure whose bones carry it
   CouchDof couch_dof = CouchDof::kSix;
   std::optional<ValidatedScale> couch_scale;  // shown beside IEC 61217
   LengthUnit length_unit = LengthUnit::kMm;
@@ -38,11 +41,14 @@ struct SiteFile {
 SiteFile read_site_file(const std::filesystem::path& path);
 
 // The action level of an anatomy. If `anatomy` is empty: the level "default", or nothing if the file has no such level.
-// Throws UsageError, with the names in the file, for any other anatomy of which the file has neither an action level
-// nor a target.
+// Throws UsageError, with the names in the file, for any other anatomy of which the file has no action level, target or
+// surrogate.
 std::optional<ActionLevel> action_level(const SiteFile& site, std::string_view anatomy);
 
 // The target of an anatomy, or else that of "default"; empty if the file names none.
 std::string target_named(const SiteFile& site, std::string_view anatomy);
+
+// The same of the structure whose bones carry the target.
+std::string surrogate_named(const SiteFile& site, std::string_view anatomy);
 
 }  // namespace isoshift

@@ -137,6 +137,7 @@ std::string caption_of(ViewTile tile) {
 
 MismatchMarks mismatch_marks(const SetupResult::View& view) {
   MismatchMarks marks;
+  if (!view.picture.moved.empty()) return marks;  // of the whole patient; bodies say it better
   const double shrink = view.picture.xray.columns / static_cast<double>(view.columns);
   for (const ViewPart& part : view.match.consistency.parts) {
     if (!part.disagrees) continue;
@@ -172,7 +173,7 @@ double draw_view_tile(Canvas& canvas, double x, double y, double width, const Se
     for (const ViewPicture::Outline& outline : picture.structures)
       draw(is_found ? outline.found : outline.planned, {.color = color::kOrange, .width = fine});
   if (tile == ViewTile::kOverlayFound)
-    for (const auto& marks = mismatch_marks(view); const auto* polygons : {&marks.squares, &marks.ways})
+    for (const auto& marks = mismatch_marks(view); const auto* polygons : {&marks.squares, &marks.ways, &picture.moved})
       draw(*polygons, {.color = color::kYellow, .width = fine});
   draw_isocenter(canvas, place(picture.isocenter_px), 0.05 * width);
   if (tile == ViewTile::kXray)

@@ -24,8 +24,8 @@ struct MismatchMarks {
 MismatchMarks mismatch_marks(const SetupResult::View& view);
 
 // Draws a tile of that width with its upper left corner at (x, y): the picture with isocenter, field, structures, scale
-// bar and the patient's directions. The overlay at the pose found also marks the parts that match elsewhere. Returns
-// the height of the tile.
+// bar and the patient's directions. The overlay at the pose found also marks the parts that match elsewhere or, of a
+// bent patient, how bones moved. Returns the height of the tile.
 double draw_view_tile(Canvas& canvas, double x, double y, double width, const SetupResult::View& view, ViewTile tile);
 
 // Draws all tiles of a view side by side, each below its caption. Returns their height.

@@ -123,6 +123,7 @@ Json view_data(const SetupResult::View& view, std::size_t number) {
           {"field", polygons_json(view.picture.field)},
           {"is_field_sure", view.match.field.is_sure()},
           {"structures", structures},
+          {"moved", polygons_json(view.picture.moved)},
           {"squares", polygons_json(marks.squares)},
           {"ways", polygons_json(marks.ways)}};
 }

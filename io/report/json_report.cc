@@ -107,15 +107,21 @@ Json picture_json(const ViewPicture& picture) {
           {"pixels_per_mm", picture.pixels_per_mm},
           {"directions", picture.directions},
           {"field", polygons_json(picture.field)},
-          {"structures", structures}};
+          {"structures", structures},
+          {"moved", polygons_json(picture.moved)}};
 }
 
 Json site_json(const std::optional<SiteRules>& site) {
   if (!site) return nullptr;
-  Json json = {{"name", site->name},          {"sha256", site->sha256},
-               {"anatomy", site->anatomy},    {"target", or_null(site->target)},
-               {"action_level", nullptr},     {"couch_degrees_of_freedom", static_cast<int>(site->couch_dof)},
-               {"couch_scale", nullptr},      {"length_unit", site->length_unit == LengthUnit::kCm ? "cm" : "mm"},
+  Json json = {{"name", site->name},
+               {"sha256", site->sha256},
+               {"anatomy", site->anatomy},
+               {"target", or_null(site->target)},
+               {"surrogate", or_null(site->surrogate)},
+               {"action_level", nullptr},
+               {"couch_degrees_of_freedom", static_cast<int>(site->couch_dof)},
+               {"couch_scale", nullptr},
+               {"length_unit", site->length_unit == LengthUnit::kCm ? "cm" : "mm"},
                {"automatic_release", nullptr}};
   if (site->automatic_release)
     json["automatic_release"] = {{"by", site->automatic_release->by}, {"on", site->automatic_release->on}};
@@ -138,6 +144,7 @@ Json target_json(const SetupResult& report, const ShownShift& shown) {
   for (const auto& component : shown.target_mm) displacement.push_back(or_null(component));
   return {{"name", target.name},
           {"chosen_by", target.chosen_by},
+          {"surrogate", target.surrogate},
           {"center_room_mm", array_of(target.center_room_mm)},
           {"extent_room_mm", extent},
           {"displacement_mm", displacement},

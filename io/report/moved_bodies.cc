@@ -111,6 +111,8 @@ ReportPage::Section moved_section(const ShownShift& shown, LengthUnit unit) {
   section.rows.push_back(
       {"Bone", "how far its center lies off once the target is right, +/- two sigma; how it is turned"});
   for (const Moved& body : shown.moved) section.rows.push_back({printable(body.name), value_of(body, unit)});
+  section.rows.push_back({"Arrows in the pictures",
+                          fmt::format("what lies off by 1 mm and more, {:.0f} times as long", kMotionMagnified)});
   return section;
 }
 

@@ -259,7 +259,8 @@ class PdfReport {
   static constexpr const char* kLegend =
       "Both: X-ray magenta, DRR green, gray where they match. Cross: isocenter. Dashed: compared field. Orange: "
       "structures. "
-      "Yellow squares: parts that match elsewhere.";
+      "Yellow squares: parts that match elsewhere. Yellow arrows: bones that lie off once the target is right, five "
+      "times as long.";
   static TextStyle legend_style() { return {.size = 6.2, .color = color::kGray, .width = kWidth}; }
 
   static double sign_off_height() { return 82.0; }

@@ -47,6 +47,7 @@ ViewPicture picture_from(const Json& json) {
     picture.structures.push_back({.name = outline.at("name"),
                                   .planned = polygons_from(outline.at("planned")),
                                   .found = polygons_from(outline.at("found"))});
+  if (json.contains("moved")) picture.moved = polygons_from(json.at("moved"));
   return picture;
 }
 
@@ -122,6 +123,7 @@ std::optional<Target> target_from(const Json& json) {
   if (json.is_null()) return std::nullopt;
   Target target{.name = json.at("name"),
                 .chosen_by = json.at("chosen_by"),
+                .surrogate = json.value("surrogate", ""),
                 .center_room_mm = vector_from<3>(json.at("center_room_mm"))};
   for (const Json& point : json.at("extent_room_mm")) target.extent_room_mm.push_back(vector_from<3>(point));
   return target;
@@ -166,6 +168,7 @@ std::optional<SiteRules> site_from(const Json& json) {
       .length_unit = json.at("length_unit") == "cm" ? LengthUnit::kCm : LengthUnit::kMm};
   // Results of before 2026-11-23 do not say.
   if (json.contains("target")) site.target = text_from(json.at("target"));
+  if (json.contains("surrogate")) site.surrogate = text_from(json.at("surrogate"));
   if (const Json& level = json.at("action_level"); !level.is_null())
     site.level = {.translation_mm = number_from(level.at("translation_mm")),
                   .vector_mm = number_from(level.at("vector_mm")),
@@ -247,7 +250,7 @@ SetupResult report_from(const Json& json) {
     report.alternatives.push_back({.description = alternative.at("description"),
                                    .similarity = alternative.at("similarity"),
                                    .as_is = alternative.at("as_is"),
-                                   .is_ruled_out = alternative.at("ruled_out")});
+                                   .is_ruled_out = alternative.value("ruled_out", false)});
   report.preset = json.at("preset");
   report.region = json.at("region");
   report.seed = json.at("seed");

@@ -112,7 +112,10 @@ std::vector<ReportPage::Row> who(const SetupResult& report, const std::string& b
                patient.patient_birth_date.empty() ? "" : "born " + day(printable(patient.patient_birth_date)),
                printable(patient.patient_sex)})});
   if (report.target)
-    rows.push_back({"Target", fmt::format("{} ({})", printable(report.target->name), report.target->chosen_by)});
+    rows.push_back(
+        {"Target",
+         fmt::format("{} ({}){}", printable(report.target->name), report.target->chosen_by,
+                     report.target->surrogate.empty() ? "" : "; seen by: " + printable(report.target->surrogate))});
   if (!bent.empty()) rows.push_back({kBent, bent});
   rows.push_back({"Plan", report.plan_uid.empty()
                               ? "none; isocenter given by hand"

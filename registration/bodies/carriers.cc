@@ -9,8 +9,6 @@
 namespace isoshift {
 namespace {
 
-constexpr double kNearMm = 20.0;
-
 double to_bone_mm(const Volume<float>& distances, const Eigen::Vector3d& place_patient_mm) {
   const Eigen::Vector3d voxel = distances.patient_from_voxel.inverse() * place_patient_mm;
   const Eigen::Vector3i at = voxel.array().round().cast<int>();
@@ -36,11 +34,16 @@ Carriers::Carriers(const PatientBodies& patient, const Target& target,
     : planned_(planned_room_from_patient),
       center_room_mm_(target.center_room_mm),
       extent_room_mm_(target.extent_room_mm) {
+  if (!patient.named_carriers.empty()) {
+    at_center_ = patient.named_carriers;
+    at_extent_.assign(extent_room_mm_.size(), at_center_);
+    return;
+  }
   const auto in_patient = [&](const Eigen::Vector3d& room_mm) -> Eigen::Vector3d {
     return planned_.inverse() * room_mm;
   };
   const auto is_near = [&](const Eigen::Vector3d& room_mm) {
-    return to_bone_mm(patient.to_bone_mm, in_patient(room_mm)) <= kNearMm;
+    return to_bone_mm(patient.to_bone_mm, in_patient(room_mm)) <= kCarriersNearMm;
   };
   if (!is_near(center_room_mm_) && std::ranges::none_of(extent_room_mm_, is_near)) return;
   at_center_ = carried_shares(patient, in_patient(center_room_mm_), {});

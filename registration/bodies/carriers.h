@@ -20,10 +20,12 @@ struct CarriedTarget {
   double left_mm = 0.0;         // how far the search would still move its center
 };
 
+inline constexpr double kCarriersNearMm = 20.0;
+
 class Carriers {
  public:
-  // Bones carry a target if they lie within 20 mm of its center or surface. The nearer they are, the larger their
-  // shares.
+  // Bones carry a target if they lie within 20 mm of its center or surface; the nearer they are, the larger their
+  // shares. Where a person names the carriers (PatientBodies::named_carriers), these alone do.
   Carriers(const PatientBodies& patient, const Target& target, const Eigen::Isometry3d& planned_room_from_patient);
 
   // Whether bones lie that near.

@@ -246,6 +246,29 @@ PatientBodies patient_bodies(const BodyMap& map, SoftMasks masks, const Vector3d
   return patient;
 }
 
+std::vector<double> shares_of_bone_in(const PatientBodies& patient, const Volume<std::uint8_t>& structure) {
+  std::vector<double> sums(patient.bodies.bodies.size());
+  double all = 0.0;
+  const Eigen::Affine3d structure_from_lattice =
+      structure.patient_from_voxel.inverse() * patient.to_bone_mm.patient_from_voxel;
+  for (int k = 0; k < patient.to_bone_mm.size.z(); ++k)
+    for (int j = 0; j < patient.to_bone_mm.size.y(); ++j)
+      for (int i = 0; i < patient.to_bone_mm.size.x(); ++i) {
+        if (patient.to_bone_mm.at(i, j, k) > 0.0F) continue;
+        const Eigen::Vector3i at = (structure_from_lattice * Vector3d(i, j, k)).array().round().cast<int>();
+        if ((at.array() < 0).any() || (at.array() >= structure.size.array()).any() ||
+            structure.at(at.x(), at.y(), at.z()) == 0)
+          continue;
+        for (std::size_t body = 0; body < patient.carried.size(); ++body) {
+          sums[body] += patient.carried[body].at(i, j, k);
+          all += patient.carried[body].at(i, j, k);
+        }
+      }
+  if (!(all > 0.0)) return {};
+  for (double& sum : sums) sum /= all;
+  return sums;
+}
+
 std::vector<double> shares_at(std::span<const BodyShare> shares, const Vector3d& place_patient_mm) {
   std::vector<double> values;
   values.reserve(shares.size());

@@ -14,6 +14,8 @@ struct PatientBodies {
   // bodies of soft tissue. And how far a place is from bone.
   std::vector<BodyShare> carried;
   Volume<float> to_bone_mm;
+  // The shares of all bodies in carrying the target, which add up to 1, where a person names what carries it.
+  std::vector<double> named_carriers;
 };
 
 // Every vertebra is a body. Other bones are taken together: in a CT with vertebrae by side of the spine (left, right,
@@ -22,6 +24,9 @@ struct PatientBodies {
 // diaphragm, bowel, brain) is divided in slabs of 80 mm, left and right, and breathes. The shares of all bodies add up
 // to 255 as `masks` do. Empty if the CT shows no body.
 PatientBodies patient_bodies(const BodyMap& map, SoftMasks masks, const Eigen::Vector3d& target_patient_mm);
+
+// How the bone within a structure (1 inside) is divided among the bodies: parts of 1. Empty if there is none.
+std::vector<double> shares_of_bone_in(const PatientBodies& patient, const Volume<std::uint8_t>& structure);
 
 // The values of shares at a place, as parts of 1.
 std::vector<double> shares_at(std::span<const BodyShare> shares, const Eigen::Vector3d& place_patient_mm);

@@ -203,10 +203,11 @@ EvaluationFolder evaluate_study(const EvaluateOptions& options, Notes& notes, Ob
   const int jobs = uses_gl(kind) ? 1 : options.jobs > 0 ? options.jobs : cores;
   const Study study = load(options.study, notes, observer);
   const TargetChoice choice = target_of(study, {.by_person = options.target});
+  const Surrogate surrogate = surrogate_of(study, choice.target, "");
   RendererStore renderers;
   BodyStore bodies;
   const RegistrationSetup setup(options.registration, study, beams_of(study), renderers);
-  const TargetRegistration registration(study, options.registration, setup, choice.target, bodies);
+  const TargetRegistration registration(study, options.registration, setup, choice.target, surrogate, bodies);
   EvaluationFolder folder(
       options.output, configuration_of(options.registration, options.study.intensity, study, setup.renderers().finest(),
                                        choice.target, options.truth, options.protocol));

@@ -85,6 +85,7 @@ std::optional<SiteRules> chosen_site(const std::optional<SiteFile>& file, const 
                    .sha256 = site.sha256,
                    .anatomy = whose,
                    .target = target_named(site, whose),
+                   .surrogate = surrogate_named(site, whose),
                    .level = action_level(site, whose),
                    .couch_dof = site.couch_dof,
                    .couch_scale = site.couch_scale,
@@ -98,7 +99,7 @@ SetupResult setup_result_of(const Study& study, std::span<const FixedImage> imag
   const RegistrationOptions& registration = setup.options();
   const std::vector<MarkedStructure> structures = marked_structures(study, request.region);
   std::vector<ViewPicture> pictures = view_pictures(study, restricted_to(registration.rectangles, images), renderer,
-                                                    structures, found.actual_room_from_patient);
+                                                    structures, found.actual_room_from_patient, found.bodies);
   std::vector<ViewMatch> matches = std::move(found.views);
   SetupResult result;
   static_cast<Registration&>(result) = std::move(found);

@@ -1,5 +1,9 @@
 #include "workflow/register/target_registration.h"
 
+#include <fmt/format.h>
+
+#include "base/error.h"
+
 namespace isoshift {
 
 std::shared_ptr<const CtBodies> BodyStore::get(const std::shared_ptr<const CtSeries>& ct) {
@@ -17,8 +21,13 @@ const BentPatient& TargetRegistration::bent_patient() const {
   std::call_once(bent_once_, [&] {
     const std::shared_ptr<const CtBodies> of_ct = bodies_.get(study_.ct);
     const Eigen::Vector3d center_patient_mm = study_.planned_room_from_patient.inverse() * target_.center_room_mm;
-    bent_.emplace(study_.ct->hu, request_.rendering.model(), beams_of(study_),
-                  patient_bodies(of_ct->map, of_ct->masks, center_patient_mm), target_);
+    PatientBodies parts = patient_bodies(of_ct->map, of_ct->masks, center_patient_mm);
+    if (surrogate_.drawn) {
+      parts.named_carriers = shares_of_bone_in(parts, *surrogate_.drawn);
+      if (parts.named_carriers.empty())
+        throw Error(fmt::format("surrogate: the CT shows no bone in it ({})", surrogate_.words));
+    }
+    bent_.emplace(study_.ct->hu, request_.rendering.model(), beams_of(study_), std::move(parts), target_);
   });
   return *bent_;
 }

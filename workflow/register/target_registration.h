@@ -4,12 +4,14 @@
 
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <span>
 
 #include "bodies/soft_masks.h"
 #include "registration/bodies/register_bodies.h"
 #include "workflow/observer.h"
 #include "workflow/register/registration_setup.h"
+#include "workflow/register/surrogate.h"
 
 namespace isoshift {
 
@@ -33,8 +35,8 @@ class BodyStore {
 class TargetRegistration {
  public:
   TargetRegistration(const Study& study, const RegistrationRequest& request, const RegistrationSetup& setup,
-                     const Target& target, BodyStore& bodies)
-      : study_(study), request_(request), setup_(setup), target_(target), bodies_(bodies) {}
+                     const Target& target, const Surrogate& surrogate, BodyStore& bodies)
+      : study_(study), request_(request), setup_(setup), target_(target), surrogate_(surrogate), bodies_(bodies) {}
 
   // Searches from this pose of the whole patient. Several threads may call it at a time.
   RegistrationResult from(const Eigen::Isometry3d& start_room_from_patient, std::span<const FixedImage> images,
@@ -47,6 +49,7 @@ class TargetRegistration {
   const RegistrationRequest& request_;
   const RegistrationSetup& setup_;
   const Target& target_;
+  const Surrogate& surrogate_;
   BodyStore& bodies_;
   mutable std::once_flag bent_once_;
   mutable std::optional<BentPatient> bent_;

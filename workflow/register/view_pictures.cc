@@ -31,11 +31,36 @@ std::vector<Polygon> silhouette(const ProjectedRegion& structure, const XrayView
   return outlines(shadow.field);
 }
 
+// An arrow as a closed line: its head is a triangle.
+Polygon arrow(const Eigen::Vector2d& from, const Eigen::Vector2d& tip) {
+  constexpr double kLongestHeadPx = 12.0;
+  const Eigen::Vector2d way = tip - from;
+  const Eigen::Vector2d back = -std::min(0.5, kLongestHeadPx / way.norm()) * way;
+  const Eigen::Vector2d aside = 0.4 * Eigen::Vector2d(-back.y(), back.x());
+  return {tip + back + aside, tip, from, tip, tip + back - aside};
+}
+
 }  // namespace
+
+std::vector<Polygon> motion_arrows(const XrayView& view, std::span<const BodyMotion> bodies,
+                                   const Eigen::Isometry3d& setup_error) {
+  constexpr double kLeastMm = 1.0;
+  std::vector<Polygon> arrows;
+  for (const BodyMotion& body : bodies) {
+    if (body.breathes || !body.is_determined() || body.displacement_mm.norm() < kLeastMm) continue;
+    const auto from = view.project(setup_error * body.center_room_mm);
+    const auto tip = view.project(setup_error * (body.center_room_mm + kMotionMagnified * body.displacement_mm));
+    // Motion toward the source is not seen.
+    if (from && tip && (*tip - *from).norm() > kLeastMm * kMotionMagnified * pixels_per_mm(view))
+      arrows.push_back(arrow(*from, *tip));
+  }
+  return arrows;
+}
 
 std::vector<ViewPicture> view_pictures(const Study& study, std::span<const FixedImage> images, Renderer& renderer,
                                        const std::vector<MarkedStructure>& structures,
-                                       const Eigen::Isometry3d& actual_room_from_patient) {
+                                       const Eigen::Isometry3d& actual_room_from_patient,
+                                       std::span<const BodyMotion> bodies) {
   std::vector<ProjectedRegion> regions;
   regions.reserve(structures.size());
   for (const MarkedStructure& structure : structures)
@@ -50,6 +75,8 @@ std::vector<ViewPicture> view_pictures(const Study& study, std::span<const Fixed
     put_grays(picture, image.line_integral, image_of(image.view, drrs.line_integrals(0, 0)),
               image_of(image.view, drrs.line_integrals(1, 0)), image.field);
     picture.field = outlines(image.field);
+    picture.moved = motion_arrows(image.view, bodies,
+                                  setup_error_from_poses(study.planned_room_from_patient, actual_room_from_patient));
     picture.isocenter_px = image.view.project(Eigen::Vector3d::Zero()).value();
     picture.pixels_per_mm = pixels_per_mm(image.view);
     picture.directions = directions_at_edges(image.view, study.planned_room_from_patient);

@@ -8,6 +8,7 @@
 #include "io/report/view_picture.h"
 #include "io/study/study.h"
 #include "registration/preprocess/preprocess.h"
+#include "setup/registration.h"
 
 namespace isoshift {
 
@@ -16,9 +17,17 @@ struct MarkedStructure {
   Volume<std::uint8_t> mask;  // in the CT's voxels
 };
 
+// How bones lie off once the target is right, seen in a view: arrows as closed lines, kMotionMagnified times as long as
+// the motion. What breathes lies elsewhere in every view and is left out, as is what is not determined or has hardly
+// moved.
+std::vector<Polygon> motion_arrows(const XrayView& view, std::span<const BodyMotion> bodies,
+                                   const Eigen::Isometry3d& setup_error);
+
 // One picture per view, reduced to at most 640 pixels along an edge. `images`: the prepared X-ray of each view.
+// `bodies`: what bones did against the target, whose pose `actual_room_from_patient` is.
 std::vector<ViewPicture> view_pictures(const Study& study, std::span<const FixedImage> images, Renderer& renderer,
                                        const std::vector<MarkedStructure>& structures,
-                                       const Eigen::Isometry3d& actual_room_from_patient);
+                                       const Eigen::Isometry3d& actual_room_from_patient,
+                                       std::span<const BodyMotion> bodies);
 
 }  // namespace isoshift

@@ -83,6 +83,15 @@ TEST_F(SiteFileTest, TargetsAreOfAnatomies) {
   EXPECT_THAT(error_of("\"targets\": {\"head\": \" \"}"), HasSubstr("targets: head is empty"));
 }
 
+TEST_F(SiteFileTest, SurrogatesAreOfAnatomies) {
+  const SiteFile site = read(R"({"site_file": 1, "name": "A", "surrogates": {"prostate": "Pelvis"}})");
+  EXPECT_EQ(surrogate_named(site, "prostate"), "Pelvis");
+  EXPECT_EQ(surrogate_named(site, "head"), "");
+  EXPECT_EQ(surrogate_named(site, ""), "");
+  EXPECT_FALSE(action_level(site, "prostate"));  // known by its surrogate
+  EXPECT_THAT(error_of("\"surrogates\": {\"prostate\": \"\"}"), HasSubstr("surrogates: prostate is empty"));
+}
+
 TEST_F(SiteFileTest, AnAnatomyItDoesNotKnowIsRefused) {
   const SiteFile site = read(R"({"site_file": 1, "name": "A", "action_levels": {"head": {"vector_mm": 2}}})");
   EXPECT_FALSE(action_level(site, ""));

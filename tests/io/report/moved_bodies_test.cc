@@ -67,7 +67,7 @@ TEST(MovedBodies, WhatIsNotDeterminedOrBreathesIsNotNamed) {
 
 TEST(MovedBodies, TheTableBeginsAtTheTarget) {
   const std::vector<ReportPage::Row> rows = rows_of(bent_report(Verdict::kAccepted));
-  ASSERT_EQ(rows.size(), 6U);
+  ASSERT_EQ(rows.size(), 7U);
   EXPECT_EQ(rows[1].name, "vertebra nearest to the target");
   EXPECT_EQ(rows[1].value, "0.1 +/- 0.4 mm, to the left; 0.1 deg, tilted forward; carries the target 62 %");
   EXPECT_EQ(rows[2].name, "vertebra 2 toward the head");
@@ -75,6 +75,7 @@ TEST(MovedBodies, TheTableBeginsAtTheTarget) {
   EXPECT_EQ(rows[3].value, "12.0 +/- 0.4 mm, to the front; 6.0 deg, turned to the left; breathes");
   EXPECT_EQ(rows[4].name, "vertebra 3 toward the feet");
   EXPECT_EQ(rows[5].value, "not determined");
+  EXPECT_EQ(rows[6].value, "what lies off by 1 mm and more, 5 times as long");
 }
 
 TEST(MovedBodies, NumbersAreRoundedAsTheirSigmaAllows) {

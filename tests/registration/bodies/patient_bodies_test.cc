@@ -108,6 +108,28 @@ TEST(Carriers, AreTheBonesNearTheTarget) {
   EXPECT_NEAR(sum, 1.0, 1e-9);
 }
 
+// A person may name what carries a target, however far it lies.
+TEST(Carriers, AreTheBonesInAStructureThatIsNamed) {
+  PatientBodies patient = small_patient({0, 0, 0});
+  const auto box = [&](const Vector3d& center, double half_mm) {
+    Volume<std::uint8_t> mask({120, 120, 60}, small_trunk().labels.patient_from_voxel);
+    for (int k = 0; k < mask.size.z(); ++k)
+      for (int j = 0; j < mask.size.y(); ++j)
+        for (int i = 0; i < mask.size.x(); ++i) {
+          const Vector3d from = mask.patient_from_voxel * Vector3d(i, j, k) - center;
+          mask.at(i, j, k) = from.cwiseAbs().maxCoeff() <= half_mm ? 1 : 0;
+        }
+    return mask;
+  };
+  patient.named_carriers = shares_of_bone_in(patient, box({0, 0, 15}, 30.0));
+  ASSERT_EQ(patient.named_carriers.size(), patient.bodies.bodies.size());
+  const Carriers named(patient, target_at({40, -60, 0}, 10.0), Eigen::Isometry3d::Identity());
+  ASSERT_TRUE(named.exist()) << "no bone is near, and none need be";
+  EXPECT_NEAR(named.shares()[1], 0.5, 0.1);
+  EXPECT_NEAR(named.shares()[2], 0.5, 0.1);
+  EXPECT_TRUE(shares_of_bone_in(patient, box({40, -60, 0}, 10.0)).empty()) << "soft tissue";
+}
+
 TEST(Carriers, MoveTheTargetAsTheyMove) {
   const PatientBodies patient = small_patient({0, 0, 0});
   const Eigen::Isometry3d planned = Eigen::Isometry3d::Identity();

@@ -1,0 +1,82 @@
+// A target that X-rays do not show is told, unless the site says which bones carry it.
+
+#include "workflow/register/surrogate.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "base/error.h"
+#include "tests/support/small_study.h"
+
+namespace isoshift {
+namespace {
+
+using Eigen::Vector3d;
+using testing::HasSubstr;
+
+// Water with a bone of 20 mm about the patient's (0, 0, -40); the isocenter at the origin.
+Study study_with_bone() {
+  Study study;
+  CtSeries ct;
+  Eigen::Affine3d lattice(Eigen::Translation3d(-80.0, -80.0, -80.0));
+  lattice.scale(2.0);
+  ct.hu = Volume<float>(Eigen::Vector3i(81, 81, 81), lattice);
+  for (int k = 0; k < 81; ++k)
+    for (int j = 0; j < 81; ++j)
+      for (int i = 0; i < 81; ++i)
+        if ((lattice * Vector3d(i, j, k) - Vector3d(0, 0, -40)).cwiseAbs().maxCoeff() <= 10.0)
+          ct.hu.at(i, j, k) = 700.0F;
+  ct.frame_of_reference_uid = "1.2.3";
+  study.ct = std::make_shared<const CtSeries>(std::move(ct));
+  study.planned_room_from_patient =
+      planned_room_from_patient(PatientPosition::kHfs, study.table, study.isocenter_patient_mm);
+  Structure pelvis{.number = 1, .name = "Pelvis", .interpreted_type = "ORGAN"};
+  for (double z = -60.0; z <= -20.0; z += 4.0)
+    pelvis.contours.push_back({.points_patient_mm = rectangle({0.0, 0.0, z}, 60.0, 60.0)});
+  study.structures = RtStructures{.structures = {pelvis}};
+  return study;
+}
+
+// At a place in the patient, with its surface that far toward the patient's feet.
+Target target_at(const Study& study, const Vector3d& patient_mm, double radius_mm) {
+  const Eigen::Isometry3d& room = study.planned_room_from_patient;
+  return {.name = "PTV",
+          .center_room_mm = room * patient_mm,
+          .extent_room_mm = {room * Vector3d(patient_mm - radius_mm * Vector3d::UnitZ())}};
+}
+
+TEST(Surrogate, BoneNearTheCenterOrTheSurfaceShowsTheTarget) {
+  const Study study = study_with_bone();
+  for (const Target& near :
+       {target_at(study, {0, 0, -40}, 5.0), target_at(study, {0, 0, -15}, 2.0), target_at(study, {0, 0, 20}, 35.0)}) {
+    const Surrogate surrogate = surrogate_of(study, near, "");
+    EXPECT_EQ(surrogate.words, "bone within 20 mm");
+    EXPECT_FALSE(surrogate.doubt);
+    EXPECT_FALSE(surrogate.drawn);
+  }
+}
+
+TEST(Surrogate, SoftTissueAloneIsADoubt) {
+  const Study study = study_with_bone();
+  for (const Target& far : {target_at(study, {0, 0, 20}, 10.0), target_at(study, {60, 0, -40}, 10.0)}) {
+    const Surrogate surrogate = surrogate_of(study, far, "");
+    ASSERT_TRUE(surrogate.doubt);
+    EXPECT_THAT(*surrogate.doubt, HasSubstr("no bone lies within 20 mm of the target"));
+  }
+}
+
+TEST(Surrogate, IsTheStructureThatTheSiteNames) {
+  Study study = study_with_bone();
+  const Target far = target_at(study, {0, 0, 60}, 5.0);
+  const Surrogate surrogate = surrogate_of(study, far, "Pelvis");
+  EXPECT_EQ(surrogate.words, "bones in Pelvis (the site file)");
+  EXPECT_FALSE(surrogate.doubt);
+  ASSERT_TRUE(surrogate.drawn);
+  EXPECT_GT(std::ranges::count(surrogate.drawn->voxels, 1), 1000);
+  EXPECT_THROW(surrogate_of(study, far, "Femur"), Error);
+  study.structures.reset();
+  EXPECT_THROW(surrogate_of(study, far, "Pelvis"), Error);
+}
+
+}  // namespace
+}  // namespace isoshift
