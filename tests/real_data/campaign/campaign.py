@@ -14,19 +14,21 @@ import pathlib
 import subprocess
 import sys
 
-TUNING, REPORT = range(1000, 2000), range(5000, 6000)
+# Of tuning, of breathing in steps of 1 mm, of patients who lie a vertebra off, of the report.
+KINDS = [range(1000, 2000), range(2000, 3000), range(3000, 4000), range(5000, 6000)]
 BOX_EDGE_MM = 15.0  # about the target's center
 STRATA = ["undisturbed", "bent", "breathing", "tissue", "small-field", "low-dose", "metal", "kv-mv", "view-angle"]
 
 
 def seeds_of(text):
-    """Seeds of "1000-1019,1050": all for tuning, or all for the report."""
+    """Seeds of "1000-1019,1050": all of one kind."""
     seeds = []
     for part in text.split(","):
         first, _, last = part.partition("-")
         seeds += range(int(first), int(last or first) + 1)
-    if not all(seed in TUNING for seed in seeds) and not all(seed in REPORT for seed in seeds):
-        raise argparse.ArgumentTypeError(f"{text}: seeds are 1000 to 1999 (tuning) or 5000 to 5999 (report), not both")
+    if not any(all(seed in kind for seed in seeds) for kind in KINDS):
+        raise argparse.ArgumentTypeError(f"{text}: seeds are 1000 to 1999 (tuning), 2000 to 2999 (breathing), 3000 to "
+                                         "3999 (a vertebra off) or 5000 to 5999 (report), of one kind in a call")
     return seeds
 
 
@@ -94,11 +96,20 @@ def target_error_mm(truth, result):
     return distance_mm(right, found, (0, 0, 0)), max(distance_mm(right, found, corner) for corner in corners)
 
 
+def sigmas_off(truth, result):
+    """How many sigmas the target's center lies off, per axis. None where the images do not determine that."""
+    sigma, found = result["uncertainty"]["translation_mm"], motion_of(result.get("setup_error"))
+    if found is None or sigma is None or not all(sigma):
+        return None
+    return [(there - here) / one
+            for here, there, one in zip(truth["setup_error_room"]["translation_mm"], found[1], sigma)]
+
+
 def row_of(name, truth, results):
     path = results / "batch" / "cases" / name / "result.json"
     row = {"case": name, "anatomy": truth["anatomy"], "stratum": truth["stratum"],
            "disturbances": "; ".join(truth.get("disturbances") or []), "verdict": "failed", "determined": False,
-           "center_mm": None, "box_mm": None, "reasons": ""}
+           "center_mm": None, "box_mm": None, "is_bodies": False, "sigmas_off": None, "reasons": ""}
     if not path.exists():
         return row
     result = json.loads(path.read_text())
@@ -107,7 +118,8 @@ def row_of(name, truth, results):
     # A rejected result answers nothing; a target of which a direction was not measured is not determined.
     row["determined"] = result["verdict"] != "rejected" and errors is not None
     if errors is not None:
-        row.update(center_mm=errors[0], box_mm=errors[1])
+        row.update(center_mm=errors[0], box_mm=errors[1], is_bodies=bool(result.get("bodies")),
+                   sigmas_off=sigmas_off(truth, result))
     return row
 
 
@@ -163,6 +175,13 @@ def summary_line(name, rows):
         share_text(sum(row["box_mm"] > 2.0 for row in accepted), len(accepted))]) + " |"
 
 
+def coverage_line(name, rows):
+    """The shares of axes of the determined cases within one and two sigma: 68 % and 95 % if sigmas are right."""
+    off = [abs(axis) for row in rows if row["determined"] and row["sigmas_off"] for axis in row["sigmas_off"]]
+    within = [share_text(sum(z <= sigmas for z in off), len(off)) for sigmas in (1, 2)]
+    return f"| {name} | {within[0]} | {within[1]} |"
+
+
 def table(options):
     rows = [row_of(name, truth, options.output) for name, truth in truths(options.cases).items()]
     if not rows:
@@ -177,6 +196,9 @@ def table(options):
     lines += [summary_line(name, [row for row in rows if row["stratum"] == name]) for name in STRATA]
     lines += [summary_line(name, [row for row in rows if row["anatomy"] == name]) for name in ("head", "chest")]
     lines.append(summary_line("all", rows))
+    lines += ["", "| answer of | axes within one sigma | within two sigma |", "| --- | --- | --- |",
+              coverage_line("bodies", [row for row in rows if row["is_bodies"]]),
+              coverage_line("the whole", [row for row in rows if not row["is_bodies"]])]
     text = "\n".join(lines) + "\n"
     (options.output / "table.md").write_text(text)
     print(text, end="")

@@ -127,5 +127,18 @@ TEST(Campaign, SameSeedSameCase) {
   }
 }
 
+TEST(Campaign, SeriesGoInSteps) {
+  for (std::uint64_t seed = 2000; seed < 2026; ++seed) {
+    const CasePlan plan = draw_case(seed, stratum_of(seed), anatomy_of(seed));
+    EXPECT_EQ(plan.stratum + " of a " + plan.anatomy, "breathing of a chest");
+    EXPECT_EQ(-plan.breath.amplitude_mm.z(), 2.0 + static_cast<double>(seed % 13));
+  }
+  for (std::uint64_t seed = 3000; seed < 3010; ++seed) {
+    const CasePlan plan = draw_case(seed, stratum_of(seed), anatomy_of(seed));
+    EXPECT_EQ(plan.anatomy, "chest");
+    EXPECT_NEAR(std::abs(plan.setup.translation_mm.y()), 25.0, 9.0);
+  }
+}
+
 }  // namespace
 }  // namespace isoshift::campaign

@@ -13,6 +13,11 @@ namespace {
 
 using Eigen::Vector3d;
 
+// Seeds of the two series.
+bool is_of_breathing(std::uint64_t seed) { return seed >= 2000 && seed < 3000; }
+bool is_of_levels(std::uint64_t seed) { return seed >= 3000 && seed < 4000; }
+constexpr std::array kStrataOfLevels = {"undisturbed", "bent", "breathing", "tissue", "small-field"};
+
 constexpr double kRadPerDeg = std::numbers::pi / 180.0;
 
 // Numbers that are the same with every standard library: std::uniform_real_distribution is not.
@@ -53,6 +58,9 @@ void draw_setup(CasePlan& plan, Draw& draw) {
     plan.target_radius_mm = draw.between(20, 30);
   }
   plan.setup.translation_mm = draw.between(0.0, kFarthestMm) * draw.direction();
+  // A vertebra along the couch, or a little more or less.
+  if (is_of_levels(plan.seed))
+    plan.setup.translation_mm = Vector3d(0.0, draw.sign() * draw.between(20.0, 30.0), 0.0) + 4.0 * draw.direction();
   plan.setup.rotation = rotation_of(
       {draw.between(-kMostDeg, kMostDeg), draw.between(-kMostDeg, kMostDeg), draw.between(-kMostDeg, kMostDeg)});
 }
@@ -85,7 +93,8 @@ void bend(CasePlan& plan, Draw& draw) {
 }
 
 void breathe(CasePlan& plan, Draw& draw) {
-  const double mm = draw.between(2.0, 14.0), forward = draw.between(0.2, 0.4);
+  const double drawn_mm = draw.between(2.0, 14.0), forward = draw.between(0.2, 0.4);
+  const double mm = is_of_breathing(plan.seed) ? 2.0 + static_cast<double>(plan.seed % 13) : drawn_mm;
   // Toward the feet and to the front.
   plan.breath = {.amplitude_mm = Vector3d(0.0, -forward * mm, -mm),
                  .still_behind_mm = plan.setup.isocenter_patient_mm.y() - 25.0,
@@ -176,10 +185,14 @@ void collimate(CasePlan& plan, Draw& draw) {
 
 }  // namespace
 
-std::string stratum_of(std::uint64_t seed) { return kStrata[seed % kStrata.size()]; }
+std::string stratum_of(std::uint64_t seed) {
+  if (is_of_breathing(seed)) return "breathing";
+  if (is_of_levels(seed)) return kStrataOfLevels[seed % kStrataOfLevels.size()];
+  return kStrata[seed % kStrata.size()];
+}
 
 std::string anatomy_of(std::uint64_t seed) {
-  return stratum_of(seed) != "breathing" && seed / kStrata.size() % 2 == 1 ? "head" : "chest";
+  return stratum_of(seed) != "breathing" && !is_of_levels(seed) && seed / kStrata.size() % 2 == 1 ? "head" : "chest";
 }
 
 Vector3d chest_spine_mm(double z_mm) {
