@@ -90,6 +90,7 @@ struct StageReport {
 // how it is turned there.
 struct BodyMotion {
   std::string name;
+  std::optional<int> vertebra;  // counted from the one nearest to the target, positive toward the head; nothing: none
   Eigen::Vector3d center_room_mm = Eigen::Vector3d::Zero();  // as planned, mm from the isocenter, IEC 61217 fixed
   Eigen::Vector3d displacement_mm = Eigen::Vector3d::Zero();
   Eigen::Vector3d rotation_rad = Eigen::Vector3d::Zero();  // rotation vector

@@ -62,6 +62,7 @@ std::vector<ShownShift::Moved> moved_bodies(const SetupResult& result) {
   for (const BodyMotion& body : result.bodies) {
     ShownShift::Moved& moved = all.emplace_back();
     moved.name = body.name;
+    moved.vertebra = body.vertebra;
     moved.from_target_mm = (body.center_room_mm - target).norm();
     moved.carries_target = body.carries_target;
     moved.breathes = body.breathes;

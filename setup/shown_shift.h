@@ -39,6 +39,7 @@ struct ShownShift {
   // What a bone did against the target. Motions are those of a patient seen along his axes: left, back, head.
   struct Moved {
     std::string name;
+    std::optional<int> vertebra;  // as BodyMotion has it
     double from_target_mm = 0.0;  // of its center, as planned
     double carries_target = 0.0;
     bool breathes = false;

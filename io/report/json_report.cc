@@ -157,6 +157,7 @@ Json bodies_json(const SetupResult& report) {
   Json list = Json::array();
   for (const BodyMotion& body : report.bodies)
     list.push_back({{"name", body.name},
+                    {"vertebra", body.vertebra ? Json(*body.vertebra) : Json(nullptr)},
                     {"center_room_mm", array_of(body.center_room_mm)},
                     {"displacement_mm", array_of(body.displacement_mm)},
                     {"rotation_deg", array_of(Eigen::Vector3d(body.rotation_rad.unaryExpr(&deg_from_rad)))},

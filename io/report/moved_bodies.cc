@@ -81,6 +81,24 @@ std::string value_of(const Moved& body, LengthUnit unit) {
 
 }  // namespace
 
+namespace {
+
+// How the spine bends on one side of the target: the way its last vertebra that is determined is turned. Empty: not
+// told.
+std::string spine_words(const std::vector<Moved>& moved, int side) {
+  const Moved* last = nullptr;
+  for (const Moved& body : moved)
+    if (body.is_determined && body.vertebra && *body.vertebra * side > 0 &&
+        (last == nullptr || *body.vertebra * side > *last->vertebra * side))
+      last = &body;
+  if (last == nullptr || !(*last->deg > kLeastDeg)) return "";
+  const int count = std::abs(*last->vertebra);
+  return fmt::format("toward the {} the spine {} over {} {}", side > 0 ? "head" : "feet", is_turned(*last), count,
+                     count == 1 ? "vertebra" : "vertebrae");
+}
+
+}  // namespace
+
 std::string bent_words(const ShownShift& shown, LengthUnit unit) {
   if (shown.moved.empty()) return "";
   // What breathes lies elsewhere in every view: it says little about how the patient lies.
@@ -93,6 +111,9 @@ std::string bent_words(const ShownShift& shown, LengthUnit unit) {
   }
   if (std::ranges::none_of(shown.moved, counts)) return "What the bones did against the target is not determined";
   const std::string once = "Once the target is right, ";
+  const std::string headward = spine_words(shown.moved, 1), footward = spine_words(shown.moved, -1);
+  if (!headward.empty() || !footward.empty())
+    return once + headward + (headward.empty() || footward.empty() ? "" : ", ") + footward;
   if (farthest == nullptr && most_turned == nullptr)
     return fmt::format("{}no bone that is determined lies more than {} {} off or is turned by more than {:.0f} deg",
                        once, unsigned_length(kLeastMm, unit), name_of(unit), kLeastDeg);

@@ -9,7 +9,8 @@ namespace isoshift {
 
 inline constexpr const char* kMovedTitle = "What moved against the target";
 
-// One or two sentences: the bone that lies farthest off, and the one that is turned most. Empty: the patient as a whole
+// One sentence: how the spine bends on both sides of the target; where it does not, the bone that lies farthest off and
+// the one that is turned most. Empty: the patient as a whole
 // was registered, or the shift is withheld.
 std::string bent_words(const ShownShift& shown, LengthUnit unit);
 

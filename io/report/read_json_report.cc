@@ -133,7 +133,9 @@ std::vector<BodyMotion> bodies_from(const Json& json) {
   std::vector<BodyMotion> bodies;
   for (const Json& body : json) {
     const Json& sigma = body.at("sigma_mm");
+    const Json vertebra = body.value("vertebra", Json(nullptr));
     bodies.push_back({.name = body.at("name"),
+                      .vertebra = vertebra.is_null() ? std::nullopt : std::optional(vertebra.get<int>()),
                       .center_room_mm = vector_from<3>(body.at("center_room_mm")),
                       .displacement_mm = vector_from<3>(body.at("displacement_mm")),
                       .rotation_rad = vector_from<3>(body.at("rotation_deg")).unaryExpr(&rad_from_deg),

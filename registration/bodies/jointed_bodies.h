@@ -13,6 +13,7 @@ struct JointedBodies {
   struct Body {
     std::string name;
     bool is_vertebra = false;  // those of a spine follow each other, from the feet to the head
+    int vertebra = 0;          // counted from the one nearest to the target, positive toward the head
     bool breathes = false;     // may lie elsewhere in every view: it has a pose per view
     bool is_soft = false;      // far from bone: a search holds it to its neighbors until the bones are about right
   };

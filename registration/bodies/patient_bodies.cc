@@ -72,6 +72,7 @@ std::vector<Group> vertebrae_of(const BodyMap& map, const Vector3d& target) {
   const Group* at_target = nearest(groups, target, is_vertebra);
   for (Group& group : groups) {
     const auto steps = &group - at_target;
+    group.body.vertebra = static_cast<int>(steps);
     group.body.name = steps == 0
                           ? "vertebra nearest to the target"
                           : fmt::format("vertebra {} toward the {}", std::abs(steps), steps > 0 ? "head" : "feet");

@@ -92,7 +92,9 @@ std::vector<BodyMotion> motions_of(const JointedBodies& bodies, const BodyRender
     const Vector3d variance = (per_motions * certainty.covariance * per_motions.transpose()).diagonal();
     Eigen::MatrixXd own = Eigen::MatrixXd::Zero(3, difference.cols());
     own.middleCols<6>(static_cast<Eigen::Index>(6 * n)) = at_center;
-    motions.push_back({.name = bodies.bodies[n].name,
+    const JointedBodies::Body& body = bodies.bodies[n];
+    motions.push_back({.name = body.name,
+                       .vertebra = body.is_vertebra ? std::optional(body.vertebra) : std::nullopt,
                        .center_room_mm = center,
                        .displacement_mm = against * center - center,
                        .rotation_rad = rotation_vector(against.linear()),

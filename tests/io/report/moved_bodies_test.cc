@@ -26,6 +26,19 @@ TEST(MovedBodies, TheFarthestAndTheMostTurnedBoneAreNamed) {
             "toward the head is tilted backward by 4.0 deg against it");
 }
 
+TEST(MovedBodies, TheSpineIsToldOnBothSidesOfTheTarget) {
+  SetupResult report = bent_report(Verdict::kAccepted);
+  report.bodies[0].vertebra = -3;
+  report.bodies[1].vertebra = 0;
+  report.bodies[2].vertebra = 2;
+  EXPECT_EQ(words_of(report),
+            "Once the target is right, toward the head the spine is tilted backward by 4.0 deg over 2 vertebrae");
+  report.bodies[0].rotation_rad = {0.0, 0.06, 0.0};  // about the room's y: toward the head
+  EXPECT_EQ(words_of(report),
+            "Once the target is right, toward the head the spine is tilted backward by 4.0 deg over 2 vertebrae, "
+            "toward the feet the spine is turned to the left by 3.4 deg over 3 vertebrae");
+}
+
 TEST(MovedBodies, ABoneThatIsBothIsNamedOnce) {
   SetupResult report = bent_report(Verdict::kAccepted);
   report.bodies[0].name = "right bones 60 mm toward the feet";
