@@ -116,6 +116,7 @@ struct Registration {
   // a whole was registered.
   std::vector<BodyMotion> bodies;
   double target_image_share = 0.0;  // of what is known about where the target lies; springs between bodies are the rest
+  double target_match = 0.0;        // mean over the views of the gradient correlation near the target, coarse
   double target_deformation_mm = 0.0;  // how far the target's surface lies from where a rigid motion puts it, at most
   double seconds = 0.0, seconds_rendering = 0.0, seconds_similarity = 0.0;  // in all, and of that in the search
 

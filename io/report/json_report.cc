@@ -150,6 +150,7 @@ Json target_json(const SetupResult& report, const ShownShift& shown) {
           {"displacement_mm", displacement},
           {"sigma_mm", sigma_json(report.uncertainty.has_value(), shown.target_sigma_mm)},
           {"image_share", report.bodies.empty() ? Json(nullptr) : Json(report.target_image_share)},
+          {"match", report.bodies.empty() ? Json(nullptr) : Json(report.target_match)},
           {"deformation_mm", report.bodies.empty() ? Json(nullptr) : Json(report.target_deformation_mm)}};
 }
 

@@ -232,6 +232,7 @@ SetupResult report_from(const Json& json) {
   if (json.contains("bodies")) report.bodies = bodies_from(json.at("bodies"));
   if (!report.bodies.empty() && report.target) {
     report.target_image_share = json.at("target").at("image_share");
+    report.target_match = json.at("target").value("match", 0.0);
     report.target_deformation_mm = json.at("target").at("deformation_mm");
   }
   const Json& error = json.at("setup_error");

@@ -44,12 +44,42 @@ Eigen::MatrixXd seen_motions(const XrayView& view, const CarriedTarget& target, 
   return motions;
 }
 
+double match_of(const BodyScene& scene, const std::vector<FixedImage>& level, const BodyPoses& poses,
+                std::size_t view) {
+  const Objective pixels(*scene.fine.as_one, level, scene.whole_room_from_patient,
+                         {.similarity = SimilarityKind::kGradientCorrelation});
+  return pixels.comparison(view).of(scene.fine.line_integrals(pixels, poses, view));
+}
+
+// The same near the target, mean over the views. On coarse pixels noise hardly counts: what does not match there is
+// other anatomy. In small fields that show too little of it, all that they show.
+double match_near_target(const BodyScene& scene, const Vector3d& target_room_mm, const BodyPoses& poses) {
+  constexpr double kPixelMm = 4.0, kReachMm = 40.0;
+  constexpr std::ptrdiff_t kLeastPixels = 200;
+  std::vector<FixedImage> level = scene.views.reduced_to(kPixelMm, scene.whole_room_from_patient, 0.0);
+  for (FixedImage& image : level) {
+    const auto center = image.view.project(target_room_mm);
+    Image<std::uint8_t> near = image.field;
+    for (int row = 0; row < near.rows; ++row)
+      for (int column = 0; column < near.columns; ++column)
+        if (!center || (Eigen::Vector2d(column, row) - *center).norm() > kReachMm * pixels_per_mm(image.view))
+          near.at(column, row) = 0;
+    if (std::ranges::count(near.pixels, 1) >= kLeastPixels) image.field = std::move(near);
+  }
+  double sum = 0.0;
+  for (std::size_t view = 0; view < level.size(); ++view) sum += match_of(scene, level, poses, view);
+  return sum / static_cast<double>(level.size());
+}
+
 // What the search found, as images and as certainty: of every view how well it matches, and what it alone would want.
 void report_match(const BodyScene& scene, const Carriers& carriers, const CarriedTarget& target,
-                  const Vector3d& center_room_mm, const BodyPoses& poses, RegistrationResult& result) {
+                  const Vector3d& center_room_mm, const BodyPoses& planned, const BodyPoses& poses,
+                  double similarity_pixel_mm, RegistrationResult& result) {
   constexpr double kPixelMm = 2.0;
   const Eigen::Isometry3d& about = poses.front().front();
   const std::vector<FixedImage> level = scene.views.reduced_to(kPixelMm, about, 0.0);
+  const std::vector<FixedImage> as_whole = scene.views.reduced_to(similarity_pixel_mm, about, 0.0);
+  result.target_match = match_near_target(scene, target.setup_error * center_room_mm, poses);
   const Objective pixels(*scene.fine.as_one, level, about, {.similarity = SimilarityKind::kGradientCorrelation});
   const BodyObjective objective(scene.bodies, scene.fine.apart, pixels, BodyStage().tile_mm);
   const PoseSlots slots(scene.bodies, scene.fine.apart, poses);
@@ -59,7 +89,8 @@ void report_match(const BodyScene& scene, const Carriers& carriers, const Carrie
   for (std::size_t view = 0; view < level.size(); ++view) {
     ViewMatch& match = result.views[view];
     match.left_out.reset();
-    match.similarity_final = pixels.comparison(view).of(scene.fine.line_integrals(pixels, poses, view));
+    match.similarity_start = match_of(scene, as_whole, planned, view);
+    match.similarity_final = match_of(scene, as_whole, poses, view);
     // The step from the common optimum to where this view and the springs are best.
     const QuadraticModel& alone = parts.views[view];
     const Eigen::MatrixXd held = alone.curvature + parts.springs.curvature +
@@ -119,6 +150,25 @@ RenderedBodies rendered(const Volume<float>& ct_hu, const AttenuationModel& atte
           .as_one = make_renderer(RendererKind::kCpu, ct.hu, ct.model, beams)};
 }
 
+// Whether parts of every view near the target have a signal and match where the whole puts them.
+bool do_parts_match_near(std::span<const FixedImage> images, const Vector3d& target_room_mm,
+                         const RegistrationResult& whole) {
+  constexpr double kNearMm = 50.0;
+  constexpr int kLeastParts = 2, kOfAll = 5;  // of the parts with a signal, one in five may disagree
+  for (std::size_t view = 0; view < images.size(); ++view) {
+    const XrayView& camera = images[view].view;
+    const auto target_px = camera.project(target_room_mm);
+    int with_signal = 0, disagreeing = 0;
+    for (const ViewPart& part : whole.views[view].consistency.parts)
+      if (target_px && part.has_signal && (part.center_px - *target_px).norm() <= kNearMm * pixels_per_mm(camera)) {
+        ++with_signal;
+        disagreeing += part.disagrees ? 1 : 0;
+      }
+    if (with_signal < kLeastParts || kOfAll * disagreeing > with_signal) return false;
+  }
+  return true;
+}
+
 }  // namespace
 
 BentPatient::BentPatient(const Volume<float>& ct_hu, const AttenuationModel& attenuation, std::span<const Beam> beams,
@@ -128,10 +178,13 @@ BentPatient::BentPatient(const Volume<float>& ct_hu, const AttenuationModel& att
       fine(rendered(ct_hu, attenuation, beams, parts.bodies, kVoxelMm)),
       coarse(rendered(ct_hu, attenuation, beams, parts.bodies, kCoarseVoxelMm)) {}
 
-bool may_have_bent(const RegistrationOptions& options, const RegistrationResult& whole) {
+bool may_have_bent(const RegistrationOptions& options, std::span<const FixedImage> images,
+                   const Vector3d& target_room_mm, const RegistrationResult& whole) {
   const bool is_whole = options.region == nullptr || !options.region->has_volume();
-  return is_whole && options.dof == Dof::kRigid && options.check_alternatives && whole.unobservable_room.empty() &&
-         whole.verdict == Verdict::kReview;
+  if (!is_whole || options.dof != Dof::kRigid || !options.check_alternatives || !whole.unobservable_room.empty())
+    return false;
+  if (whole.verdict == Verdict::kReview) return true;
+  return whole.verdict == Verdict::kAccepted && !do_parts_match_near(images, target_room_mm, whole);
 }
 
 void register_bodies(const BentPatient& patient, std::span<const FixedImage> images,
@@ -162,7 +215,8 @@ void register_bodies(const BentPatient& patient, std::span<const FixedImage> ima
   std::ranges::copy(found.stages, std::back_inserter(result.stages));
   // Soft tissue may still creep. What counts is the target.
   result.stages.back().reached_limit = result.stages.back().reached_limit && target.left_mm > kConvergedMm;
-  report_match(scene, carriers, target, patient.target.center_room_mm, found.poses, result);
+  report_match(scene, carriers, target, patient.target.center_room_mm, at_one_pose(scene, planned_room_from_patient),
+               found.poses, 2.0 * options.stages.back().pixel_mm, result);
   result.bodies = motions_of(patient.parts.bodies, patient.fine.apart, carriers, target, planned_room_from_patient,
                              found.poses, certainty);
   std::ranges::copy(found.alternatives, std::back_inserter(result.alternatives));

@@ -21,16 +21,24 @@ struct Hypothesis {
   BodySearchResult found;
 };
 
-std::vector<Hypothesis> hypotheses_of(const BodyScene& scene, const Carriers& carriers) {
+// The vertebra nearest to the target; the number of bodies where the CT shows none.
+std::size_t vertebra_at_target(const JointedBodies& bodies) {
+  const auto nearest = std::ranges::find_if(
+      bodies.bodies, [](const JointedBodies::Body& body) { return body.is_vertebra && body.vertebra == 0; });
+  return static_cast<std::size_t>(nearest - bodies.bodies.begin());
+}
+
+std::vector<Hypothesis> hypotheses_of(const BodyScene& scene) {
   const Eigen::Isometry3d& whole = scene.whole_room_from_patient;
   std::vector<Hypothesis> hypotheses = {{.description = "the spine where the patient as a whole matches best",
                                          .found = {.poses = at_one_pose(scene, whole)}}};
-  const std::size_t carrier = carriers.largest();
-  if (!scene.bodies.bodies[carrier].is_vertebra) return hypotheses;
+  const std::size_t at_target = vertebra_at_target(scene.bodies);
+  if (at_target == scene.bodies.bodies.size()) return hypotheses;
   for (const int step : {-1, 1}) {
-    const std::size_t other = carrier + static_cast<std::size_t>(step);
+    const std::size_t other = at_target + static_cast<std::size_t>(step);
     if (other >= scene.bodies.bodies.size() || !scene.bodies.bodies[other].is_vertebra) continue;
-    const Eigen::Vector3d way = scene.fine.apart.center_patient_mm(other) - scene.fine.apart.center_patient_mm(carrier);
+    const Eigen::Vector3d way =
+        scene.fine.apart.center_patient_mm(other) - scene.fine.apart.center_patient_mm(at_target);
     for (const double part : {0.5, 1.0})
       hypotheses.push_back({.description = fmt::format("the spine {} vertebra farther toward the {}",
                                                        part < 1.0 ? "half a" : "one", step > 0 ? "head" : "feet"),
@@ -84,7 +92,7 @@ Alternative alternative_of(const BodyScene& scene, const Carriers& carriers, con
 TargetSearchResult search_target(const BodyScene& scene, const Carriers& carriers, const BodySearchOptions& options,
                                  const SearchProgress& progress) {
   TargetSearchResult result;
-  std::vector<Hypothesis> open = hypotheses_of(scene, carriers);
+  std::vector<Hypothesis> open = hypotheses_of(scene);
   double done = 0.0;
   for (const BodyStage& stage : options.stages) {
     for (Hypothesis& one : open) {

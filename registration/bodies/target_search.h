@@ -15,7 +15,7 @@ struct TargetSearchResult {
   std::vector<Alternative> alternatives;  // the others, where they were given up or at the end
 };
 
-// Searches from the pose of the whole, and, where a vertebra carries most of the target, as freely from poses half a
+// Searches from the pose of the whole, and, where the CT shows vertebrae, as freely from poses half a
 // vertebra and a whole one farther toward head and feet. After every stage, searches are given up that are clearly less
 // probable than the best, or that have come to where a better one is.
 TargetSearchResult search_target(const BodyScene& scene, const Carriers& carriers, const BodySearchOptions& options,

@@ -27,6 +27,9 @@ constexpr double kMaxSpreadMm = 1.0, kMaxSpreadRad = rad_from_deg(1.0);
 // distance 2 % off in one of them 0.68 mm and more (docs/evaluation.md).
 constexpr double kMaxContradictionMm = 0.5, kMaxContradictionSigmas = 3.0;
 constexpr double kMaxTwoSigmaMm = 1.0, kMaxTwoSigmaRad = rad_from_deg(1.0);
+// Phantom patients who were right had 0.79 and more, and real ones 0.86; others of the same kind, whose bones were free
+// to follow, 0.67 and less.
+constexpr double kMinTargetMatch = 0.73;
 constexpr double kMinImageShare = 0.3, kMaxDeformationMm = 2.0;
 // What carries a target is small, and turns less surely than a whole patient; what counts is where its surface lies.
 constexpr double kMaxTwoSigmaRadOfBodies = rad_from_deg(2.0);
@@ -116,6 +119,11 @@ void judge_contradiction(RegistrationResult& result) {
 
 // The answer is that of the bodies that carry the target: they must be seen, and the target must not be bent itself.
 void judge_bodies(RegistrationResult& result) {
+  if (!(result.target_match >= kMinTargetMatch))
+    review(result,
+           fmt::format("the target's surroundings match poorly (gradient correlation {:.2f}, {:.2f} is expected): "
+                       "they may be another patient's, or the target may lie elsewhere",
+                       result.target_match, kMinTargetMatch));
   if (!(result.target_image_share >= kMinImageShare))
     review(result, fmt::format("the images hardly show the bodies that carry the target: {:.0f} % of what is known of "
                                "their place comes from them, the rest from their neighbors",

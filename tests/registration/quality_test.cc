@@ -78,6 +78,23 @@ TEST(Quality, TooLittleToCheckForMovedAnatomyNeedsReview) {
   expect_accepted([](RegistrationResult& r) { r.views[0].consistency = parts(2, 0); });
 }
 
+// Of bodies: whether the target is seen, straight, and surrounded by what the CT shows.
+TEST(Quality, SurroundingsOfTheTargetThatMatchPoorlyNeedAReview) {
+  const auto bent = [](double match, double image_share, double deformation_mm) {
+    return [=](RegistrationResult& result) {
+      result.bodies.resize(3);
+      result.target_match = match;
+      result.target_image_share = image_share;
+      result.target_deformation_mm = deformation_mm;
+    };
+  };
+  expect_accepted(bent(0.8, 0.6, 1.0));
+  expect_review(bent(0.7, 0.6, 1.0),
+                "the target's surroundings match poorly (gradient correlation 0.70, 0.73 is expected)");
+  expect_review(bent(0.8, 0.2, 1.0), "the images hardly show the bodies that carry the target");
+  expect_review(bent(0.8, 0.6, 2.5), "the target itself is bent");
+}
+
 TEST(Quality, ViewsThatContradictEachOtherNeedReview) {
   expect_review(
       [](RegistrationResult& r) { r.views[0].contradiction = {0.9, 0.1}, r.views[1].contradiction = {0.4, 0.1}; },

@@ -207,7 +207,7 @@ EvaluationFolder evaluate_study(const EvaluateOptions& options, Notes& notes, Ob
   RendererStore renderers;
   BodyStore bodies;
   const RegistrationSetup setup(options.registration, study, beams_of(study), renderers);
-  const TargetRegistration registration(study, options.registration, setup, choice.target, surrogate, bodies);
+  const TargetRegistration registration(study, options.registration, setup, choice, surrogate, bodies);
   EvaluationFolder folder(
       options.output, configuration_of(options.registration, options.study.intensity, study, setup.renderers().finest(),
                                        choice.target, options.truth, options.protocol));

@@ -58,14 +58,11 @@ SetupResult register_study(const RegisterOptions& options, SharedWork& shared, O
   TargetChoice choice = target_of(study, {options.target, site ? site->target : ""});
   const Surrogate surrogate = surrogate_of(study, choice.target, site ? site->surrogate : "");
   choice.target.surrogate = surrogate.words;
-  if (surrogate.doubt) choice.doubts.push_back(*surrogate.doubt);
   const RegistrationSetup setup(options.registration, study, beams_of(study), shared.renderers);
   const std::vector<FixedImage> images = prepared(study.xrays);
   const double seconds_load = total.seconds();
-  const TargetRegistration registration(study, options.registration, setup, choice.target, surrogate, shared.bodies);
+  const TargetRegistration registration(study, options.registration, setup, choice, surrogate, shared.bodies);
   RegistrationResult found = registration.from(study.planned_room_from_patient, images, observer);
-  for (const std::string& doubt : study.doubts) found.demote(Verdict::kReview, doubt);
-  for (const std::string& doubt : choice.doubts) found.demote(Verdict::kReview, doubt);
 
   SetupResult result = setup_result_of(study, images, options.registration, setup, choice.target, std::move(found));
   result.site = std::move(site);

@@ -12,10 +12,11 @@
 namespace isoshift {
 namespace {
 
+constexpr double kLeastMm3 = 100.0;
+
 // Whether a CT shows bone near a place: as much as a small piece of rib, or a ball. Quicker than finding its bodies,
 // which only bent patients need.
 bool is_bone_near(const Volume<float>& ct_hu, const Eigen::Vector3d& patient_mm) {
-  constexpr double kLeastMm3 = 100.0;
   const double bone_hu = BodyOptions().bone_hu;
   const Eigen::Vector3d center = ct_hu.patient_from_voxel.inverse() * patient_mm;
   const Eigen::Vector3d spacing = ct_hu.spacing_mm(), reach = kCarriersNearMm * spacing.cwiseInverse();
@@ -32,6 +33,13 @@ bool is_bone_near(const Volume<float>& ct_hu, const Eigen::Vector3d& patient_mm)
   return found_mm3 >= kLeastMm3;
 }
 
+bool holds_bone(const Volume<float>& ct_hu, const Volume<std::uint8_t>& structure) {
+  double found_mm3 = 0.0;
+  for (std::size_t n = 0; n < ct_hu.voxels.size(); ++n)
+    if (structure.voxels[n] != 0 && ct_hu.voxels[n] >= BodyOptions().bone_hu) found_mm3 += ct_hu.spacing_mm().prod();
+  return found_mm3 >= kLeastMm3;
+}
+
 }  // namespace
 
 Surrogate surrogate_of(const Study& study, const Target& target, const std::string& by_site) {
@@ -41,10 +49,11 @@ Surrogate surrogate_of(const Study& study, const Target& target, const std::stri
           fmt::format("surrogate {} (the site file): the study holds no RT Structure Set (--structures FILE "
                       "names one)",
                       by_site));
-    return {.words = fmt::format("bones in {} (the site file)", by_site),
-            .drawn = mask_of(structure_named(*study.structures, by_site), study.ct->hu.size,
-                             study.ct->hu.patient_from_voxel),
-            .doubt = {}};
+    Volume<std::uint8_t> drawn =
+        mask_of(structure_named(*study.structures, by_site), study.ct->hu.size, study.ct->hu.patient_from_voxel);
+    if (!holds_bone(study.ct->hu, drawn))
+      throw Error(fmt::format("surrogate {} (the site file): the CT shows no bone in this structure", by_site));
+    return {.words = fmt::format("bones in {} (the site file)", by_site), .drawn = std::move(drawn), .doubt = {}};
   }
   const auto is_near = [&](const Eigen::Vector3d& room_mm) {
     return is_bone_near(study.ct->hu, study.planned_room_from_patient.inverse() * room_mm);

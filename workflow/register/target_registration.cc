@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include "base/error.h"
+#include "setup/couch_shift.h"
 
 namespace isoshift {
 
@@ -20,14 +21,15 @@ std::shared_ptr<const CtBodies> BodyStore::get(const std::shared_ptr<const CtSer
 const BentPatient& TargetRegistration::bent_patient() const {
   std::call_once(bent_once_, [&] {
     const std::shared_ptr<const CtBodies> of_ct = bodies_.get(study_.ct);
-    const Eigen::Vector3d center_patient_mm = study_.planned_room_from_patient.inverse() * target_.center_room_mm;
+    const Eigen::Vector3d center_patient_mm =
+        study_.planned_room_from_patient.inverse() * choice_.target.center_room_mm;
     PatientBodies parts = patient_bodies(of_ct->map, of_ct->masks, center_patient_mm);
     if (surrogate_.drawn) {
       parts.named_carriers = shares_of_bone_in(parts, *surrogate_.drawn);
       if (parts.named_carriers.empty())
         throw Error(fmt::format("surrogate: the CT shows no bone in it ({})", surrogate_.words));
     }
-    bent_.emplace(study_.ct->hu, request_.rendering.model(), beams_of(study_), std::move(parts), target_);
+    bent_.emplace(study_.ct->hu, request_.rendering.model(), beams_of(study_), std::move(parts), choice_.target);
   });
   return *bent_;
 }
@@ -37,9 +39,15 @@ RegistrationResult TargetRegistration::from(const Eigen::Isometry3d& start_room_
   RegistrationResult found = register_views(setup_.renderers(), images, start_room_from_patient, setup_.options(),
                                             [&](double share) { observer.progress("Registering", share); });
   observer.progress("Registering", 1.0);
-  if (may_have_bent(setup_.options(), found))
+  const Eigen::Vector3d target_room_mm =
+      setup_error_from_poses(study_.planned_room_from_patient, found.actual_room_from_patient) *
+      choice_.target.center_room_mm;
+  if (may_have_bent(setup_.options(), images, target_room_mm, found))
     register_bodies(bent_patient(), images, study_.planned_room_from_patient, setup_.options(), found,
                     [&](double share) { observer.progress("Registering the target", share); });
+  for (const std::string& doubt : study_.doubts) found.demote(Verdict::kReview, doubt);
+  for (const std::string& doubt : choice_.doubts) found.demote(Verdict::kReview, doubt);
+  if (surrogate_.doubt) found.demote(Verdict::kReview, *surrogate_.doubt);
   return found;
 }
 

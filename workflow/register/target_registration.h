@@ -12,6 +12,7 @@
 #include "workflow/observer.h"
 #include "workflow/register/registration_setup.h"
 #include "workflow/register/surrogate.h"
+#include "workflow/register/target_of.h"
 
 namespace isoshift {
 
@@ -35,10 +36,11 @@ class BodyStore {
 class TargetRegistration {
  public:
   TargetRegistration(const Study& study, const RegistrationRequest& request, const RegistrationSetup& setup,
-                     const Target& target, const Surrogate& surrogate, BodyStore& bodies)
-      : study_(study), request_(request), setup_(setup), target_(target), surrogate_(surrogate), bodies_(bodies) {}
+                     const TargetChoice& choice, const Surrogate& surrogate, BodyStore& bodies)
+      : study_(study), request_(request), setup_(setup), choice_(choice), surrogate_(surrogate), bodies_(bodies) {}
 
-  // Searches from this pose of the whole patient. Several threads may call it at a time.
+  // Searches from this pose of the whole patient; doubts about study, target and surrogate make the result a review.
+  // Several threads may call it at a time.
   RegistrationResult from(const Eigen::Isometry3d& start_room_from_patient, std::span<const FixedImage> images,
                           Observer& observer) const;
 
@@ -48,7 +50,7 @@ class TargetRegistration {
   const Study& study_;
   const RegistrationRequest& request_;
   const RegistrationSetup& setup_;
-  const Target& target_;
+  const TargetChoice& choice_;
   const Surrogate& surrogate_;
   BodyStore& bodies_;
   mutable std::once_flag bent_once_;

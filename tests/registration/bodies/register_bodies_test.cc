@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "registration/presets.h"
+#include "tests/drr/test_views.h"
 #include "tests/support/bent_scene.h"
 
 namespace isoshift {
@@ -58,6 +59,7 @@ TEST(RegisterBodies, TheTargetIsRightAndTheRestIsSaid) {
     EXPECT_TRUE(result.bodies[other].is_determined());
   }
   EXPECT_GT(result.target_image_share, 0.5);
+  EXPECT_GT(result.target_match, 0.8);
   for (const ViewMatch& view : result.views) EXPECT_GT(view.similarity_final, 0.8);
 }
 
@@ -84,22 +86,49 @@ TEST(RegisterBodies, WithoutBoneNearTheTargetTheWholeAnswersForReview) {
   EXPECT_NE(result.reasons.back().find("no bone"), std::string::npos) << result.reasons.back();
 }
 
-TEST(RegisterBodies, OnlyPatientsWhoNeedAReviewMayHaveBent) {
-  RegistrationResult whole;
-  whole.verdict = Verdict::kReview;
-  RegistrationOptions options = preset("setup");
-  EXPECT_TRUE(may_have_bent(options, whole));
-  EXPECT_FALSE(may_have_bent(preset("fast"), whole)) << "it leaves out the checks";
-  options.dof = Dof::kTranslation;
-  EXPECT_FALSE(may_have_bent(options, whole));
-  options.dof = Dof::kRigid;
-  whole.unobservable_room = {Vector3d::UnitX()};
-  EXPECT_FALSE(may_have_bent(options, whole));
-  whole.unobservable_room.clear();
-  for (const Verdict verdict : {Verdict::kAccepted, Verdict::kRejected}) {
-    whole.verdict = verdict;
-    EXPECT_FALSE(may_have_bent(options, whole));
+// A whole with a view whose parts near the isocenter have a signal.
+struct SeenWhole {
+  std::vector<FixedImage> images = std::vector<FixedImage>(1, {.view = centered_view(0.0, 200, 1.5)});
+  RegistrationResult result;
+
+  SeenWhole() {
+    result.verdict = Verdict::kAccepted;
+    result.views.resize(1);
+    for (const double x : {80.0, 100.0, 120.0})
+      result.views[0].consistency.parts.push_back({.center_px = {x, 100.0}, .has_signal = true});
   }
+  bool may_have_bent(const RegistrationOptions& options, const Vector3d& target_mm = Vector3d::Zero()) const {
+    return isoshift::may_have_bent(options, images, target_mm, result);
+  }
+};
+
+TEST(RegisterBodies, OnlyPatientsWhoNeedAReviewMayHaveBent) {
+  SeenWhole whole;
+  RegistrationOptions options = preset("setup");
+  EXPECT_FALSE(whole.may_have_bent(options)) << "accepted";
+  whole.result.verdict = Verdict::kRejected;
+  EXPECT_FALSE(whole.may_have_bent(options));
+  whole.result.verdict = Verdict::kReview;
+  EXPECT_TRUE(whole.may_have_bent(options));
+  EXPECT_FALSE(whole.may_have_bent(preset("fast"))) << "it leaves out the checks";
+  options.dof = Dof::kTranslation;
+  EXPECT_FALSE(whole.may_have_bent(options));
+  options.dof = Dof::kRigid;
+  whole.result.unobservable_room = {Vector3d::UnitX()};
+  EXPECT_FALSE(whole.may_have_bent(options));
+}
+
+// A whole that is accepted for what it shows elsewhere says nothing of a target far off.
+TEST(RegisterBodies, AWholeThatDoesNotShowTheTargetMayHaveBent) {
+  const RegistrationOptions options = preset("setup");
+  SeenWhole whole;
+  EXPECT_FALSE(whole.may_have_bent(options, {20, 0, 0}));
+  EXPECT_TRUE(whole.may_have_bent(options, {0, 90, 0})) << "far from all parts";
+  whole.result.views[0].consistency.parts[1].disagrees = true;
+  EXPECT_TRUE(whole.may_have_bent(options)) << "one of three parts near the target matches elsewhere";
+  whole = SeenWhole();
+  for (ViewPart& part : whole.result.views[0].consistency.parts) part.has_signal = false;
+  EXPECT_TRUE(whole.may_have_bent(options)) << "noise";
 }
 
 }  // namespace

@@ -21,7 +21,10 @@ struct Column {
   Target target{.name = "PTV"};
 
   explicit Column(bool has_vertebrae) {
-    for (JointedBodies::Body& body : scene.bodies.bodies) body.is_vertebra = has_vertebrae;
+    for (std::size_t n = 0; n < scene.bodies.bodies.size(); ++n) {
+      scene.bodies.bodies[n].is_vertebra = has_vertebrae;
+      scene.bodies.bodies[n].vertebra = static_cast<int>(n) - 1;
+    }
     patient.bodies = scene.bodies;
     patient.carried = scene.bodies.shares;
     patient.to_bone_mm = Volume<float>(scene.ct.size, scene.ct.patient_from_voxel);

@@ -74,6 +74,9 @@ TEST(Surrogate, IsTheStructureThatTheSiteNames) {
   ASSERT_TRUE(surrogate.drawn);
   EXPECT_GT(std::ranges::count(surrogate.drawn->voxels, 1), 1000);
   EXPECT_THROW(surrogate_of(study, far, "Femur"), Error);
+  for (Contour& contour : study.structures->structures[0].contours)
+    for (Vector3d& point : contour.points_patient_mm) point.z() += 80.0;
+  EXPECT_THROW(surrogate_of(study, far, "Pelvis"), Error) << "it holds no bone";
   study.structures.reset();
   EXPECT_THROW(surrogate_of(study, far, "Pelvis"), Error);
 }
