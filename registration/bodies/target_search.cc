@@ -100,7 +100,7 @@ TargetSearchResult search_target(const BodyScene& scene, const Carriers& carrier
       done += 1.0 / static_cast<double>(options.stages.size() * open.size());
       if (progress) progress(std::min(done, 1.0));
     }
-    std::ranges::stable_sort(open, std::greater(), [](const Hypothesis& one) { return one.found.log_probability; });
+    std::ranges::sort(open, std::greater(), [](const Hypothesis& one) { return one.found.log_probability; });
     const bool is_last = &stage == &options.stages.back();
     std::vector<Hypothesis> kept = {open.front()};
     for (const Hypothesis& one : std::span(open).subspan(1)) {
