@@ -79,10 +79,6 @@ std::string value_of(const Moved& body, LengthUnit unit) {
   return words;
 }
 
-}  // namespace
-
-namespace {
-
 // How the spine bends on one side of the target: the way its last vertebra that is determined is turned. Empty: not
 // told.
 std::string spine_words(const std::vector<Moved>& moved, int side) {

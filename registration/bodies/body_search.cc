@@ -87,6 +87,15 @@ std::vector<float> RenderedBodies::line_integrals(const Objective& pixels, const
   return drr;
 }
 
+std::vector<double> RenderedBodies::matches(std::span<const FixedImage> images, const BodyPoses& poses) const {
+  const Objective pixels(*as_one, images, poses.front().front(), {.similarity = SimilarityKind::kGradientCorrelation});
+  std::vector<double> matches;
+  matches.reserve(images.size());
+  for (std::size_t view = 0; view < images.size(); ++view)
+    matches.push_back(pixels.comparison(view).of(line_integrals(pixels, poses, view)));
+  return matches;
+}
+
 BodyPoses at_one_pose(const BodyScene& scene, const Eigen::Isometry3d& room_from_patient) {
   return BodyPoses(scene.bodies.bodies.size(),
                    std::vector<Eigen::Isometry3d>(scene.views.images.size(), room_from_patient));

@@ -65,6 +65,9 @@ struct RenderedBodies {
 
   // Line integrals of the pixels that `pixels` renders in a view, with bodies at some poses.
   std::vector<float> line_integrals(const Objective& pixels, const BodyPoses& poses, std::size_t view) const;
+
+  // Gradient correlation per view, of all pixels in the fields, with bodies at some poses.
+  std::vector<double> matches(std::span<const FixedImage> images, const BodyPoses& poses) const;
 };
 
 // A patient whose bodies can be rendered: what searches share.

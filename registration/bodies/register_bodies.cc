@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <numeric>
 
 #include "geometry/rotation.h"
 #include "geometry/voxel_box.h"
@@ -44,15 +45,8 @@ Eigen::MatrixXd seen_motions(const XrayView& view, const CarriedTarget& target, 
   return motions;
 }
 
-double match_of(const BodyScene& scene, const std::vector<FixedImage>& level, const BodyPoses& poses,
-                std::size_t view) {
-  const Objective pixels(*scene.fine.as_one, level, scene.whole_room_from_patient,
-                         {.similarity = SimilarityKind::kGradientCorrelation});
-  return pixels.comparison(view).of(scene.fine.line_integrals(pixels, poses, view));
-}
-
-// The same near the target, mean over the views. On coarse pixels noise hardly counts: what does not match there is
-// other anatomy. In small fields that show too little of it, all that they show.
+// Gradient correlation near the target, mean over the views. On coarse pixels noise hardly counts: what does not match
+// there is other anatomy. In small fields that show too little of it, all that they show.
 double match_near_target(const BodyScene& scene, const Vector3d& target_room_mm, const BodyPoses& poses) {
   constexpr double kPixelMm = 4.0, kReachMm = 40.0;
   constexpr std::ptrdiff_t kLeastPixels = 200;
@@ -66,9 +60,8 @@ double match_near_target(const BodyScene& scene, const Vector3d& target_room_mm,
           near.at(column, row) = 0;
     if (std::ranges::count(near.pixels, 1) >= kLeastPixels) image.field = std::move(near);
   }
-  double sum = 0.0;
-  for (std::size_t view = 0; view < level.size(); ++view) sum += match_of(scene, level, poses, view);
-  return sum / static_cast<double>(level.size());
+  const std::vector<double> matches = scene.fine.matches(level, poses);
+  return std::reduce(matches.begin(), matches.end()) / static_cast<double>(matches.size());
 }
 
 // What the search found, as images and as certainty: of every view how well it matches, and what it alone would want.
@@ -79,6 +72,8 @@ void report_match(const BodyScene& scene, const Carriers& carriers, const Carrie
   const Eigen::Isometry3d& about = poses.front().front();
   const std::vector<FixedImage> level = scene.views.reduced_to(kPixelMm, about, 0.0);
   const std::vector<FixedImage> as_whole = scene.views.reduced_to(similarity_pixel_mm, about, 0.0);
+  const std::vector<double> at_start = scene.fine.matches(as_whole, planned),
+                            at_end = scene.fine.matches(as_whole, poses);
   result.target_match = match_near_target(scene, target.setup_error * center_room_mm, poses);
   const Objective pixels(*scene.fine.as_one, level, about, {.similarity = SimilarityKind::kGradientCorrelation});
   const BodyObjective objective(scene.bodies, scene.fine.apart, pixels, BodyStage().tile_mm);
@@ -89,8 +84,8 @@ void report_match(const BodyScene& scene, const Carriers& carriers, const Carrie
   for (std::size_t view = 0; view < level.size(); ++view) {
     ViewMatch& match = result.views[view];
     match.left_out.reset();
-    match.similarity_start = match_of(scene, as_whole, planned, view);
-    match.similarity_final = match_of(scene, as_whole, poses, view);
+    match.similarity_start = at_start[view];
+    match.similarity_final = at_end[view];
     // The step from the common optimum to where this view and the springs are best.
     const QuadraticModel& alone = parts.views[view];
     const Eigen::MatrixXd held = alone.curvature + parts.springs.curvature +
@@ -112,7 +107,8 @@ std::vector<BodyMotion> motions_of(const JointedBodies& bodies, const BodyRender
   const Eigen::MatrixXd target_motion = carriers.motion_per_motions();
   std::vector<BodyMotion> motions;
   for (std::size_t n = 0; n < bodies.bodies.size(); ++n) {
-    if (bodies.bodies[n].is_soft) continue;
+    const JointedBodies::Body& body = bodies.bodies[n];
+    if (body.is_soft) continue;
     const Vector3d center = planned * renderers.center_patient_mm(n);
     const Eigen::Isometry3d against = target.setup_error.inverse() * poses[n].front() * planned.inverse();
     Eigen::MatrixXd difference = -target_motion;
@@ -123,7 +119,6 @@ std::vector<BodyMotion> motions_of(const JointedBodies& bodies, const BodyRender
     const Vector3d variance = (per_motions * certainty.covariance * per_motions.transpose()).diagonal();
     Eigen::MatrixXd own = Eigen::MatrixXd::Zero(3, difference.cols());
     own.middleCols<6>(static_cast<Eigen::Index>(6 * n)) = at_center;
-    const JointedBodies::Body& body = bodies.bodies[n];
     motions.push_back({.name = body.name,
                        .vertebra = body.is_vertebra ? std::optional(body.vertebra) : std::nullopt,
                        .center_room_mm = center,
@@ -133,7 +128,7 @@ std::vector<BodyMotion> motions_of(const JointedBodies& bodies, const BodyRender
                        .carries_target = carriers.shares()[n],
                        .image_share = image_share(own * certainty.covariance * own.transpose(),
                                                   own * certainty.covariance_on_loose_springs * own.transpose()),
-                       .breathes = bodies.bodies[n].breathes});
+                       .breathes = body.breathes});
   }
   return motions;
 }

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <functional>
+#include <numeric>
 
 #include "registration/pose_parameters.h"
 
@@ -49,14 +50,9 @@ std::vector<Hypothesis> hypotheses_of(const BodyScene& scene) {
 
 // Gradient correlation, mean over the views.
 double match_of(const BodyScene& scene, const BodyPoses& poses, const BodyStage& stage) {
-  const RenderedBodies& rendered = scene.of(stage);
-  const Eigen::Isometry3d& about = scene.whole_room_from_patient;
-  const std::vector<FixedImage> level = scene.views.reduced_to(stage.pixel_mm, about, 5.0);
-  const Objective pixels(*rendered.as_one, level, about, {.similarity = SimilarityKind::kGradientCorrelation});
-  double sum = 0.0;
-  for (std::size_t view = 0; view < level.size(); ++view)
-    sum += pixels.comparison(view).of(rendered.line_integrals(pixels, poses, view)) / static_cast<double>(level.size());
-  return sum;
+  const std::vector<double> matches =
+      scene.of(stage).matches(scene.views.reduced_to(stage.pixel_mm, scene.whole_room_from_patient, 5.0), poses);
+  return std::reduce(matches.begin(), matches.end()) / static_cast<double>(matches.size());
 }
 
 PoseDistance distance_of(const Carriers& carriers, const Hypothesis& a, const Hypothesis& b) {
