@@ -1,6 +1,7 @@
 // Who is on the table, and are the images what they say? Registers phantom patients with their own X-rays, with X-rays
-// that were mirrored, turned, exchanged or taken from the other side, and with those of all other patients. Prints a
-// line of CSV per registration and a summary; exits with 1 if anything wrong was accepted.
+// that were mirrored, turned, exchanged or taken from the other side, and with those of all other patients; where the
+// patient as a whole is not accepted, also the bodies about the isocenter, as `isoshift register` does. Prints a line of
+// CSV per registration and a summary; exits with 1 if anything wrong was accepted.
 //
 //   identity_check [patients=20 [only the CT of patient]] > identity.csv
 
@@ -8,13 +9,16 @@
 
 #include <algorithm>
 #include <iostream>
+#include <limits>
 #include <map>
 #include <optional>
 #include <random>
 
 #include "base/error.h"
 #include "bench/scene.h"
+#include "bodies/soft_masks.h"
 #include "geometry/target_error.h"
+#include "registration/bodies/register_bodies.h"
 #include "registration/presets.h"
 
 namespace isoshift {
@@ -60,6 +64,19 @@ Volume<float> ct_of(const Patient& patient) {
   patient_from_voxel.linear() = spacing_mm.asDiagonal();
   patient_from_voxel.translation() = -0.5 * (size.cast<double>().cwiseProduct(spacing_mm) - spacing_mm);
   return ct_of_shapes(patient.shapes, size, patient_from_voxel);
+}
+
+// The bone nearest to the isocenter. Planned, the room's axes are (x, z, -y) of the patient.
+Target target_of(const BodyMap& map) {
+  Target target{.name = "bone", .chosen_by = "identity_check"};
+  double nearest_mm = std::numeric_limits<double>::infinity();
+  for (const Body& body : map.bodies) {
+    const Eigen::Vector3d& center = body.center_patient_mm;
+    if (body.kind == Body::Kind::kCouch || center.norm() >= nearest_mm) continue;
+    nearest_mm = center.norm();
+    target.center_room_mm = {center.x(), center.z(), -center.y()};
+  }
+  return target;
 }
 
 XrayImage mirrored(XrayImage xray) {
@@ -115,18 +132,22 @@ int check(int patient_count, std::optional<int> only) {
   std::map<std::string, Count> counts;
   bool wrong_accepted = false;
   fmt::print(
-      "ct,xrays,case,verdict,mtre_mm,least_gradient_correlation,as_is,best_alternative,disagreeing,seconds,"
+      "ct,xrays,case,verdict,answer_of,mtre_mm,least_gradient_correlation,as_is,best_alternative,disagreeing,seconds,"
       "err_sigma,reasons\n");
   RegistrationOptions options = preset("setup");
-  const auto one = [&](const RendererPyramid& renderers, int ct, int of, const std::string& what,
-                       const std::vector<XrayImage>& xrays) {
+  const auto one = [&](const RendererPyramid& renderers, const BentPatient& bent, int ct, int of,
+                       const std::string& what, const std::vector<XrayImage>& xrays) {
     Count& count = counts[what];
     ++count.all;
     RegistrationResult result;
     try {
-      result = register_views(renderers, prepared(xrays), planned, options);
+      const std::vector<FixedImage> images = prepared(xrays);
+      result = register_views(renderers, images, planned, options);
+      const Eigen::Vector3d target_mm =
+          result.actual_room_from_patient * (planned.inverse() * options.target_room_mm);
+      if (may_have_bent(options, images, target_mm, result)) register_bodies(bent, images, planned, options, result);
     } catch (const Error& error) {
-      fmt::print("{},{},{},error,,,,,,,,,\"{}\"\n", ct, of, what, error.what());
+      fmt::print("{},{},{},error,,,,,,,,,,\"{}\"\n", ct, of, what, error.what());
       return;
     }
     const Eigen::Isometry3d found = result.actual_room_from_patient * planned.inverse();
@@ -148,13 +169,13 @@ int check(int patient_count, std::optional<int> only) {
     const Eigen::Isometry3d error = found * patients[static_cast<std::size_t>(of)].setup_error.inverse();
     const Eigen::AngleAxisd turn(error.linear());
     for (int axis = 0; axis < 3 && result.uncertainty; ++axis)
-      errors += fmt::format("{:.3f}/{:.3f} ", error.translation()[axis], result.uncertainty->translation_mm[axis]);
+      errors += fmt::format("{:.3f}/{:.3f} ", error.translation()[axis], result.uncertainty->translation_mm()[axis]);
     for (int axis = 0; axis < 3 && result.uncertainty; ++axis)
       errors += fmt::format("{:.3f}/{:.3f} ", deg_from_rad(turn.angle() * turn.axis()[axis]),
-                            deg_from_rad(result.uncertainty->rotation_rad[axis]));
+                            deg_from_rad(result.uncertainty->rotation_rad()[axis]));
     for (const std::string& reason : result.reasons) reasons += reason + "; ";
-    fmt::print("{},{},{},{},{:.2f},{:.3f},{:.3f},{:.3f},{:.3f},{:.2f},{},\"{}\"\n", ct, of, what,
-               to_string(result.verdict), mtre_mm, least, as_is, best, disagreeing, result.seconds, errors, reasons);
+    fmt::print("{},{},{},{},{},{:.2f},{:.3f},{:.3f},{:.3f},{:.3f},{:.2f},{},\"{}\"\n", ct, of, what,
+               to_string(result.verdict), result.bodies.empty() ? "whole" : "bodies", mtre_mm, least, as_is, best, disagreeing, result.seconds, errors, reasons);
     std::fflush(stdout);
     count.accepted += result.verdict == Verdict::kAccepted ? 1 : 0;
     wrong_accepted = wrong_accepted || (result.verdict == Verdict::kAccepted && (what != "right" || mtre_mm > 2.0));
@@ -167,13 +188,19 @@ int check(int patient_count, std::optional<int> only) {
     all_of_the_ct.cut_ends = beyond_the_ct(hu, AttenuationModel{}.threshold_hu);
     const ProjectedRegion region(all_of_the_ct);
     options.region = &region;
+    const BodyMap bodies = find_bodies(hu);
+    const Target target = target_of(bodies);
+    options.target_room_mm = target.center_room_mm;
+    const BentPatient bent(
+        hu, AttenuationModel{}, std::array{Beam::kKilovoltage},
+        patient_bodies(bodies, soft_masks(bodies), planned.inverse() * target.center_room_mm), target);
     for (const auto& [what, xrays] : variants(patients[static_cast<std::size_t>(ct)].xrays))
-      one(renderers, ct, ct, what, xrays);
+      one(renderers, bent, ct, ct, what, xrays);
     const std::vector<XrayImage>& own = patients[static_cast<std::size_t>(ct)].xrays;
     const std::size_t next = static_cast<std::size_t>((ct + 1) % patient_count);
-    if (patient_count > 1) one(renderers, ct, ct, "lateral of another patient", {own[0], patients[next].xrays[1]});
+    if (patient_count > 1) one(renderers, bent, ct, ct, "lateral of another patient", {own[0], patients[next].xrays[1]});
     for (int of = 0; of < patient_count; ++of)
-      if (of != ct) one(renderers, ct, of, "another patient", patients[static_cast<std::size_t>(of)].xrays);
+      if (of != ct) one(renderers, bent, ct, of, "another patient", patients[static_cast<std::size_t>(of)].xrays);
   }
   for (const auto& [what, count] : counts)
     std::cerr << fmt::format("{:<24} {:>4} of {:>4} accepted\n", what, count.accepted, count.all);

@@ -269,16 +269,18 @@ void write_structures(const PhantomOptions& options, const StudyUids& study, Uid
   for (const std::string& instance : study.ct_instances)
     series.append_reference(DCM_ContourImageSequence, UID_CTImageStorage, instance);
   const CtLattice lattice = lattice_of(options);
+  const Eigen::Vector3d normal = Eigen::Vector3d::UnitX().cross(lattice.along_columns);
   std::vector<double> slices_mm;
   slices_mm.reserve(static_cast<std::size_t>(lattice.size.z()));
   for (int k = 0; k < lattice.size.z(); ++k)
-    slices_mm.push_back((lattice.patient_from_voxel * Eigen::Vector3d(0, 0, k)).z());
+    slices_mm.push_back(normal.dot(lattice.patient_from_voxel * Eigen::Vector3d(0, 0, k)));
   put_ball_target(dataset,
                   {.name = target.name,
                    .interpreted_type = target.interpreted_type,
                    .center_patient_mm = options.placement.isocenter_patient_mm,
                    .radius_mm = target.radius_mm,
-                   .contour_points = 36},
+                   .contour_points = 36,
+                   .slice_normal = normal},
                   study.frame_of_reference, slices_mm, target.radius_mm);
   dataset.put(DCM_ApprovalStatus, "UNAPPROVED");
   file.write(path);

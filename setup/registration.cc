@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <numeric>
 
+#include "geometry/rotation.h"
+
 namespace isoshift {
 
 int ViewConsistency::with_signal() const {
@@ -21,6 +23,22 @@ const char* to_string(IrradiatedField::Origin origin) {
     case IrradiatedField::Origin::kDrawn: return "drawn";
   }
   return "";
+}
+
+Eigen::Vector3d Uncertainty::translation_mm() const { return covariance.diagonal().head<3>().cwiseSqrt(); }
+
+Eigen::Vector3d Uncertainty::displacement_mm(const Eigen::Vector3d& point_room_mm) const {
+  Eigen::Matrix<double, 3, 6> per_motion;
+  per_motion << Eigen::Matrix3d::Identity(), -cross_matrix(point_room_mm);
+  return (per_motion * covariance * per_motion.transpose()).diagonal().cwiseSqrt();
+}
+
+Eigen::Vector3d Uncertainty::rotation_rad() const { return covariance.diagonal().tail<3>().cwiseSqrt(); }
+
+Uncertainty uncertainty_of_independent_axes(const Eigen::Vector3d& translation_mm, const Eigen::Vector3d& rotation_rad) {
+  Uncertainty uncertainty;
+  uncertainty.covariance.diagonal() << translation_mm.cwiseAbs2(), rotation_rad.cwiseAbs2();
+  return uncertainty;
 }
 
 bool BodyMotion::is_determined() const {

@@ -64,11 +64,20 @@ struct Alternative {
   bool is_ruled_out = false;  // by the probability of all that the images show of the bodies, not by similarity
 };
 
-// One standard deviation per axis, in the room: of where the isocenter's anatomy lies, and of the rotation vector.
+// How far the setup error found may lie from the true one: the covariance of the motion between the two, in the room
+// and about the isocenter, of the translation (mm) and then the rotation vector (rad).
 struct Uncertainty {
-  Eigen::Vector3d translation_mm = Eigen::Vector3d::Zero();
-  Eigen::Vector3d rotation_rad = Eigen::Vector3d::Zero();
+  Eigen::Matrix<double, 6, 6> covariance = Eigen::Matrix<double, 6, 6>::Zero();
+
+  // One standard deviation per axis: of where the isocenter's anatomy lies, of where anatomy lies that is found at a
+  // point, and of the rotation vector.
+  Eigen::Vector3d translation_mm() const;
+  Eigen::Vector3d displacement_mm(const Eigen::Vector3d& point_room_mm) const;
+  Eigen::Vector3d rotation_rad() const;
 };
+
+// From one standard deviation per axis.
+Uncertainty uncertainty_of_independent_axes(const Eigen::Vector3d& translation_mm, const Eigen::Vector3d& rotation_rad);
 
 struct StageReport {
   std::string name;

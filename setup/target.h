@@ -22,7 +22,4 @@ struct Target {
 // How far anatomy planned at a point lies from its plan.
 Eigen::Vector3d displacement_mm(const Eigen::Isometry3d& setup_error, const Eigen::Vector3d& point_room_mm);
 
-// One standard deviation of that per axis, from the uncertainty of the setup error; its axes count as independent.
-Eigen::Vector3d displacement_sigma_mm(const Uncertainty& uncertainty, const Eigen::Vector3d& point_room_mm);
-
 }  // namespace isoshift

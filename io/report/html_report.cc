@@ -172,6 +172,7 @@ std::string html_report(const SetupResult& report, const ReportPage& page) {
   fill(html, "<!--COUCH_DRAWING-->",
        svg_image(260, 180, "The couch, its axes and the way it has to move",
                  [&](Canvas& canvas) { draw_couch(canvas, 0, 0, 260, 180, report, page); }));
+  fill(html, "<!--PICTURES-->", html_escaped(page.picture_words));
   fill(html, "<!--CONVENTIONS-->", conventions);
   fill(html, "<!--COUCH-->", couch(page));
   fill(html, "<!--NUMBERS-->", numbers(page));

@@ -79,6 +79,14 @@ Json sigma_json(bool is_known, const std::array<std::optional<double>, 3>& compo
   return array;
 }
 
+Json covariance_json(const SetupResult& report) {
+  if (!report.uncertainty) return nullptr;
+  Json rows = Json::array();
+  for (const auto& row : report.uncertainty->covariance.rowwise())
+    rows.push_back(std::vector<double>(row.begin(), row.end()));
+  return rows;
+}
+
 Json stage_json(const StageReport& stage) {
   Json json = {{"name", stage.name},
                {"similarity", stage.similarity},
@@ -284,6 +292,7 @@ std::string json_report(const SetupResult& report) {
                {"uncertainty",
                 {{"translation_mm", sigma_json(report.uncertainty.has_value(), shown.sigma_mm)},
                  {"rotation_deg", sigma_json(report.uncertainty.has_value(), shown.sigma_deg)},
+                 {"covariance", covariance_json(report)},
                  {"unobservable", unobservable_json(report)}}},
                {"views", Json::array()},
                {"stages", Json::array()},

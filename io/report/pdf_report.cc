@@ -231,7 +231,7 @@ class PdfReport {
   // Returns how many are drawn by now.
   std::size_t pictures(std::size_t first, double page_limit, bool may_break_page) {
     constexpr double kNarrowest = 0.6;
-    const double limit = page_limit - canvas_.text_height(kLegend, legend_style()) - 2.0;
+    const double limit = page_limit - canvas_.text_height(page_.picture_words, legend_style()) - 2.0;
     const auto all_height = [&](double width) {
       double height = 0.0;
       for (std::size_t n = first; n < report_.views.size(); ++n) height += view_height(report_.views[n], width);
@@ -251,16 +251,11 @@ class PdfReport {
       y_ += height;
     }
     if (n == first) return n;
-    const std::string legend = fmt::format("{}{}", kLegend, n < report_.views.size() ? " More on the next page." : "");
+    const std::string legend = fmt::format("{}{}", page_.picture_words, n < report_.views.size() ? " More on the next page." : "");
     y_ += canvas_.text(kMargin, y_, legend, legend_style()) + 2.0;
     return n;
   }
 
-  static constexpr const char* kLegend =
-      "Both: X-ray magenta, DRR green, gray where they match. Cross: isocenter. Dashed: compared field. Orange: "
-      "structures. "
-      "Yellow squares: parts that match elsewhere. Yellow arrows: bones that lie off once the target is right, five "
-      "times as long.";
   static TextStyle legend_style() { return {.size = 6.2, .color = color::kGray, .width = kWidth}; }
 
   static double sign_off_height() { return 82.0; }

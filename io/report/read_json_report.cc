@@ -192,6 +192,20 @@ Eigen::Vector3d known_from(const Json& json) {
   return vector;
 }
 
+std::optional<Uncertainty> uncertainty_from(const Json& json) {
+  if (json.at("translation_mm").is_null()) return std::nullopt;
+  // Results of before 2026-11-24 hold the sigmas alone.
+  if (!json.contains("covariance"))
+    return uncertainty_of_independent_axes(known_from(json.at("translation_mm")),
+                                           known_from(json.at("rotation_deg")).unaryExpr(&rad_from_deg));
+  Uncertainty uncertainty;
+  for (std::size_t row = 0; row < 6; ++row)
+    for (std::size_t column = 0; column < 6; ++column)
+      uncertainty.covariance(static_cast<Eigen::Index>(row), static_cast<Eigen::Index>(column)) =
+          or_nan(json.at("covariance").at(row).at(column));
+  return uncertainty;
+}
+
 Verdict verdict_from(const std::string& word) {
   for (const Verdict verdict : {Verdict::kAccepted, Verdict::kReview})
     if (word == to_string(verdict)) return verdict;
@@ -243,9 +257,7 @@ SetupResult report_from(const Json& json) {
   const Json& uncertainty = json.at("uncertainty");
   for (const Json& direction : uncertainty.at("unobservable"))
     report.unobservable_room.push_back(vector_from<3>(direction));
-  if (!uncertainty.at("translation_mm").is_null())
-    report.uncertainty = {.translation_mm = known_from(uncertainty.at("translation_mm")),
-                          .rotation_rad = known_from(uncertainty.at("rotation_deg")).unaryExpr(&rad_from_deg)};
+  report.uncertainty = uncertainty_from(uncertainty);
   report.translation_only = json.at("dof") == "translation";
   for (const Json& view : json.at("views")) report.views.push_back(view_from(view));
   for (const Json& stage : json.at("stages")) report.stages.push_back(stage_from(stage));

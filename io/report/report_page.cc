@@ -8,6 +8,7 @@
 
 #include "geometry/rotation.h"
 #include "io/report/canvas.h"
+#include "io/report/drawings.h"
 #include "io/report/moved_bodies.h"
 #include "io/report/report_sections.h"
 #include "io/report/rounding.h"
@@ -246,7 +247,7 @@ void put_shift(const SetupResult& report, const ShownShift& shown, LengthUnit un
     for (std::size_t n = 3; n < 6; ++n) page.setup_error[n] = taken_as_zero(page.setup_error[n].name);
   if (report.unobservable_room.empty()) {
     std::optional<double> two_sigma_mm;
-    if (report.uncertainty) two_sigma_mm = 2.0 * report.uncertainty->translation_mm.maxCoeff();
+    if (report.uncertainty) two_sigma_mm = 2.0 * report.uncertainty->translation_mm().maxCoeff();
     const std::string text = rounded_length(report.setup_error.translation().norm(), unit, two_sigma_mm);
     page.setup_error_length =
         fmt::format("Length of the translation {} {}", text.substr(text.starts_with('+') ? 1 : 0), name_of(unit));
@@ -270,6 +271,19 @@ const char* meaning(Verdict verdict) {
     case Verdict::kRejected: return "do not use it, for these reasons";
   }
   return "";
+}
+
+std::string picture_words(const SetupResult& report) {
+  std::string words =
+      "Both: X-ray magenta, DRR green, gray where they match. Cross: isocenter. Dashed: compared field. Orange: "
+      "structures.";
+  const auto has_squares = [](const SetupResult::View& view) { return !mismatch_marks(view).squares.empty(); };
+  if (std::ranges::any_of(report.views, has_squares)) words += " Yellow squares: parts that match elsewhere.";
+  const auto has_arrows = [](const SetupResult::View& view) { return !view.picture.moved.empty(); };
+  if (std::ranges::any_of(report.views, has_arrows))
+    words += fmt::format(" Yellow arrows: bones that lie off once the target is right, {:.0f} times as long.",
+                         kMotionMagnified);
+  return words;
 }
 
 }  // namespace
@@ -316,6 +330,7 @@ ReportPage report_page(const SetupResult& report) {
   page.action_reasons = shown.decision.reasons;
   page.withheld = shown.withheld;
   if (!shown.withheld) put_shift(report, shown, unit, page);
+  page.picture_words = picture_words(report);
   page.conventions = {
       "IEC 61217: facing the gantry, x to the right, y toward the gantry, z up; the origin is the isocenter.",
       "Setup error: where the patient lies. Anatomy planned at p is found at R p + t, with R = Rz Rx Ry; couch: what "

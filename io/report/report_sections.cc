@@ -102,8 +102,9 @@ ReportPage::Section checks_section(const SetupResult& report) {
   ReportPage::Section section{.title = "Checks"};
   for (const SetupResult::View& view : report.views) {
     std::string words =
-        fmt::format("similarity {:.4f} as planned, {:.4f} as found; {} of {} parts with signal match elsewhere",
-                    view.match.similarity_start, view.match.similarity_final, view.match.consistency.disagreeing(),
+        fmt::format("similarity {:.4f} as planned, {:.4f} as found; {}{} of {} parts with signal match elsewhere",
+                    view.match.similarity_start, view.match.similarity_final,
+                    report.bodies.empty() ? "" : "of the patient as a whole ", view.match.consistency.disagreeing(),
                     view.match.consistency.with_signal());
     if (const auto& left_out = view.match.left_out)
       words += fmt::format("; without it the pose moves {:.2f} mm, {:.2f} deg", left_out->distance_mm,

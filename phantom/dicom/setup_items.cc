@@ -65,16 +65,17 @@ void put_ball_target(DicomItem structures, const BallTarget& target, const std::
   roi.put(DCM_ROIGenerationAlgorithm, "AUTOMATIC");
   DicomItem drawn = structures.append_item(DCM_ROIContourSequence);
   drawn.put(DCM_ReferencedROINumber, 1);
-  const Eigen::Vector3d& center = target.center_patient_mm;
+  const Eigen::Vector3d along_rows = Eigen::Vector3d::UnitX(), along_columns = target.slice_normal.cross(along_rows);
   for (const double slice_mm : slices_mm) {
-    const double z = slice_mm - center.z();
-    if (std::abs(z) >= most_mm) continue;
-    const double radius_mm = std::sqrt(target.radius_mm * target.radius_mm - z * z);
+    const double height_mm = slice_mm - target.slice_normal.dot(target.center_patient_mm);
+    if (std::abs(height_mm) >= most_mm) continue;
+    const double radius_mm = std::sqrt(target.radius_mm * target.radius_mm - height_mm * height_mm);
     std::vector<double> points;
     for (int n = 0; n < target.contour_points; ++n) {
       const double angle = 2.0 * std::numbers::pi * n / target.contour_points;
       const Eigen::Vector3d point =
-          center + Eigen::Vector3d(radius_mm * std::cos(angle), radius_mm * std::sin(angle), z);
+          target.center_patient_mm + height_mm * target.slice_normal +
+          radius_mm * (std::cos(angle) * along_rows + std::sin(angle) * along_columns);
       points.insert(points.end(), {point.x(), point.y(), point.z()});
     }
     DicomItem contour = drawn.append_item(DCM_ContourSequence);

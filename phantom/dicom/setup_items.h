@@ -38,8 +38,10 @@ struct BallTarget {
   Eigen::Vector3d center_patient_mm;
   double radius_mm;
   int contour_points;
+  Eigen::Vector3d slice_normal = Eigen::Vector3d::UnitZ();  // in the patient, at a right angle to its x axis
 };
-// A circle in each plane `slices_mm` (patient z) that cuts the ball, if it does so nearer to the center than `most_mm`.
+// A circle in each plane at `slices_mm` along the normal that cuts the ball, if it does so nearer to the center than
+// `most_mm`.
 void put_ball_target(DicomItem structures, const BallTarget& target, const std::string& frame_of_reference_uid,
                      std::span<const double> slices_mm, double most_mm);
 

@@ -133,11 +133,6 @@ std::vector<BodyMotion> motions_of(const JointedBodies& bodies, const BodyRender
   return motions;
 }
 
-Uncertainty uncertainty_of(const Eigen::Matrix<double, 6, 6>& covariance) {
-  const Eigen::Matrix<double, 6, 1> sigma = covariance.diagonal().cwiseSqrt();
-  return {.translation_mm = sigma.head<3>(), .rotation_rad = sigma.tail<3>()};
-}
-
 RenderedBodies rendered(const Volume<float>& ct_hu, const AttenuationModel& attenuation, std::span<const Beam> beams,
                         const JointedBodies& bodies, double voxel_mm) {
   const CoarserCt ct = coarser_ct(ct_hu, attenuation, block_of(ct_hu.spacing_mm(), ct_hu.size, voxel_mm));
@@ -204,7 +199,7 @@ void register_bodies(const BentPatient& patient, std::span<const FixedImage> ima
   const BodyCertainty certainty = certainty_of(scene, found.poses, search.stages.back());
   const CarriedTarget target = carriers.target_at(found.poses, certainty);
   result.actual_room_from_patient = target.setup_error * planned_room_from_patient;
-  result.uncertainty = uncertainty_of(target.covariance);
+  result.uncertainty = Uncertainty{.covariance = target.covariance};
   result.target_deformation_mm = target.deformation_mm;
   result.target_image_share = target.image_share;
   std::ranges::copy(found.stages, std::back_inserter(result.stages));

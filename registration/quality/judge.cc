@@ -135,19 +135,21 @@ void judge_bodies(RegistrationResult& result) {
                        result.target_deformation_mm));
 }
 
-void judge_uncertainty(RegistrationResult& result) {
+void judge_uncertainty(const Eigen::Vector3d& target_room_mm, RegistrationResult& result) {
   const double most_rad = result.bodies.empty() ? kMaxTwoSigmaRad : kMaxTwoSigmaRadOfBodies;
   if (!result.uncertainty) {
     review(result, "the images do not determine the pose");
   } else {
+    const Eigen::Vector3d two_sigma_mm = 2.0 * result.uncertainty->displacement_mm(target_room_mm);
+    const Eigen::Vector3d two_sigma_rad = 2.0 * result.uncertainty->rotation_rad();
     for (int axis = 0; axis < 3; ++axis) {
-      if (!(2.0 * result.uncertainty->translation_mm[axis] <= kMaxTwoSigmaMm))
-        review(result, fmt::format("the {} is uncertain: {:.1f} mm at two sigma", kAxes[static_cast<std::size_t>(axis)],
-                                   2.0 * result.uncertainty->translation_mm[axis]));
-      if (!(2.0 * result.uncertainty->rotation_rad[axis] <= most_rad))
-        review(result, fmt::format("the {} is uncertain: {:.1f} degrees at two sigma",
-                                   kAxes[static_cast<std::size_t>(axis) + 3],
-                                   deg_from_rad(2.0 * result.uncertainty->rotation_rad[axis])));
+      if (!(two_sigma_mm[axis] <= kMaxTwoSigmaMm))
+        review(result, fmt::format("the target's {} is uncertain: {:.1f} mm at two sigma",
+                                   kAxes[static_cast<std::size_t>(axis)], two_sigma_mm[axis]));
+      if (!(two_sigma_rad[axis] <= most_rad))
+        review(result,
+               fmt::format("the {} is uncertain: {:.1f} degrees at two sigma",
+                           kAxes[static_cast<std::size_t>(axis) + 3], deg_from_rad(two_sigma_rad[axis])));
     }
   }
 }
@@ -193,7 +195,7 @@ void judge(std::span<const double> parameters, const RegistrationOptions& option
   judge_search(parameters, options, result);
   judge_views(options.region != nullptr && options.region->has_volume(), result);
   judge_contradiction(result);
-  judge_uncertainty(result);
+  judge_uncertainty(setup_error_from_parameters(parameters) * options.target_room_mm, result);
   if (!result.bodies.empty()) judge_bodies(result);
   judge_alternatives(result);
   if (!options.check_alternatives)

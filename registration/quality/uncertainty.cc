@@ -118,26 +118,28 @@ std::optional<Uncertainty> estimated_uncertainty(Objective& objective, const Eig
   if (!(eigen.eigenvalues().minCoeff() > kSingular * eigen.eigenvalues().maxCoeff())) return std::nullopt;
   const Eigen::MatrixXd bread = sandwich.curvature.inverse();
   const Eigen::MatrixXd covariance = small_sample(sandwich, axes) * bread * sandwich.scatter * bread;
+  // From parameters to motions: rotation vectors in rad.
+  Eigen::Matrix<double, 6, 1> units = Eigen::Matrix<double, 6, 1>::Ones();
+  units.tail<3>() /= kLeverMm;
   const double overlap = options.has_volume_of_interest ? kOverlap : 1.0;
-  const auto sigma_mm = [&](int axis) {
-    return overlap * std::hypot(kCalibration * std::sqrt(covariance(axis, axis)),
-                                std::max(kFloorMm, kFloorVoxels * options.voxel_mm));
-  };
+  const double floor_mm = std::max(kFloorMm, kFloorVoxels * options.voxel_mm);
   Uncertainty uncertainty;
-  for (int axis = 0; axis < 3; ++axis) {
-    uncertainty.translation_mm[axis] = sigma_mm(axis);
-    if (!options.translation_only) uncertainty.rotation_rad[axis] = sigma_mm(axis + 3) / kLeverMm;
-  }
+  auto searched = uncertainty.covariance.topLeftCorner(axes, axes);
+  searched = kCalibration * kCalibration * covariance;
+  searched.diagonal().array() += floor_mm * floor_mm;
+  uncertainty.covariance = overlap * overlap * units.asDiagonal() * uncertainty.covariance * units.asDiagonal();
   return uncertainty;
 }
 
 Uncertainty widened_to_spread(const Uncertainty& uncertainty, double spread_mm, double spread_rad) {
   constexpr double kSigmas = 4.0;
-  const auto widened = [](const Eigen::Vector3d& sigma, double spread) -> Eigen::Vector3d {
-    return sigma.isZero() ? sigma : std::max(1.0, spread / (kSigmas * sigma.norm())) * sigma;
+  const auto factor = [](const Eigen::Vector3d& sigma, double spread) {
+    return sigma.isZero() ? 1.0 : std::max(1.0, spread / (kSigmas * sigma.norm()));
   };
-  return {.translation_mm = widened(uncertainty.translation_mm, spread_mm),
-          .rotation_rad = widened(uncertainty.rotation_rad, spread_rad)};
+  Eigen::Matrix<double, 6, 1> factors;
+  factors << Eigen::Vector3d::Constant(factor(uncertainty.translation_mm(), spread_mm)),
+      Eigen::Vector3d::Constant(factor(uncertainty.rotation_rad(), spread_rad));
+  return {.covariance = factors.asDiagonal() * uncertainty.covariance * factors.asDiagonal()};
 }
 
 }  // namespace isoshift

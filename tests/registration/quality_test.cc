@@ -8,12 +8,14 @@
 #include <limits>
 
 #include "geometry/rotation.h"
+#include "registration/pose_parameters.h"
 #include "tests/drr/test_views.h"
 #include "tests/support/pose_near.h"
 
 namespace isoshift {
 namespace {
 
+using testing::Contains;
 using testing::ElementsAre;
 using testing::HasSubstr;
 
@@ -36,8 +38,8 @@ RegistrationResult good_result() {
                     .spread_mm = 0.1,
                     .spread_rad = rad_from_deg(0.1)},
                    {.name = "fine", .similarity = "gradient-correlation", .evaluations = 40}};
-  result.uncertainty = Uncertainty{.translation_mm = Eigen::Vector3d::Constant(0.2),
-                                   .rotation_rad = Eigen::Vector3d::Constant(rad_from_deg(0.2))};
+  result.uncertainty = uncertainty_of_independent_axes(Eigen::Vector3d::Constant(0.2),
+                                                       Eigen::Vector3d::Constant(rad_from_deg(0.2)));
   result.alternatives = {
       {.description = "view 1 mirrored", .similarity = 0.6, .as_is = 0.96, .distance_mm = 9.0},
       {.description = "views 1 and 2 exchanged", .similarity = 0.3, .as_is = 0.96, .angle_rad = 0.5}};
@@ -132,25 +134,54 @@ TEST(Quality, AParameterAtItsBoundNeedsReview) {
     }
 }
 
+void set_sigma(RegistrationResult& result, int axis, double sigma) {
+  result.uncertainty->covariance(axis, axis) = sigma * sigma;
+}
+
 TEST(Quality, EveryAxisMustBeKnownToAMillimeterAndADegreeAtTwoSigma) {
   for (int axis = 0; axis < 3; ++axis) {
     expect_accepted([&](RegistrationResult& result) {
-      result.uncertainty->translation_mm[axis] = 0.49;
-      result.uncertainty->rotation_rad[axis] = rad_from_deg(0.49);
+      set_sigma(result, axis, 0.49);
+      set_sigma(result, axis + 3, rad_from_deg(0.49));
     });
     const std::string name(1, "xyz"[axis]);
-    expect_review([&](RegistrationResult& result) { result.uncertainty->translation_mm[axis] = 0.6; },
-                  "the " + name + " translation is uncertain: 1.2 mm at two sigma");
-    expect_review([&](RegistrationResult& result) { result.uncertainty->rotation_rad[axis] = rad_from_deg(0.6); },
+    expect_review([&](RegistrationResult& result) { set_sigma(result, axis, 0.6); },
+                  "the target's " + name + " translation is uncertain: 1.2 mm at two sigma");
+    expect_review([&](RegistrationResult& result) { set_sigma(result, axis + 3, rad_from_deg(0.6)); },
                   "the rotation about " + name + " is uncertain: 1.2 degrees at two sigma");
   }
+}
+
+// Rotations of 0.4 degrees at one sigma are 0.7 mm at 100 mm. Where translation and rotation err together, as those of
+// bones about a target do, the isocenter may be uncertain and the target certain.
+TEST(Quality, TheUncertaintyThatCountsIsThatOfTheTarget) {
+  RegistrationOptions options;
+  options.target_room_mm = {0.0, 0.0, 100.0};
+  RegistrationResult result = good_result();
+  for (int axis = 3; axis < 6; ++axis) set_sigma(result, axis, rad_from_deg(0.4));
+  const RegistrationResult independent = result;
+  judge(kInside, options, result);
+  EXPECT_EQ(result.verdict, Verdict::kReview);
+  EXPECT_THAT(result.reasons, Contains(HasSubstr("the target's y translation is uncertain: 1.4 mm at two sigma")));
+
+  const Eigen::Vector3d found_mm = setup_error_from_parameters(kInside) * options.target_room_mm;
+  Eigen::Matrix<double, 6, 6> about_target = Eigen::Matrix<double, 6, 6>::Identity();
+  about_target.topRightCorner<3, 3>() = cross_matrix(found_mm);
+  result = independent;
+  result.uncertainty->covariance = about_target * independent.uncertainty->covariance * about_target.transpose();
+  EXPECT_GT(result.uncertainty->translation_mm().y(), 0.5);
+  EXPECT_LT((result.uncertainty->displacement_mm(found_mm) - independent.uncertainty->translation_mm()).norm(), 1e-9);
+  judge(kInside, options, result);
+  EXPECT_EQ(result.verdict, Verdict::kAccepted);
+  judge(kInside, {}, result);
+  EXPECT_EQ(result.verdict, Verdict::kReview);
 }
 
 TEST(Quality, AnUncertaintyThatIsMissingOrNoNumberNeedsReview) {
   expect_review([](RegistrationResult& result) { result.uncertainty.reset(); }, "the images do not determine the pose");
   constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-  expect_review([&](RegistrationResult& result) { result.uncertainty->translation_mm[1] = kNan; }, "is uncertain");
-  expect_review([&](RegistrationResult& result) { result.uncertainty->rotation_rad[2] = kNan; }, "is uncertain");
+  expect_review([&](RegistrationResult& result) { set_sigma(result, 1, kNan); }, "is uncertain");
+  expect_review([&](RegistrationResult& result) { set_sigma(result, 5, kNan); }, "is uncertain");
 }
 
 TEST(Quality, StartsThatEndApartNeedReview) {

@@ -92,7 +92,7 @@ double target_error_mm(const Eigen::Isometry3d& found, const Eigen::Isometry3d& 
   constexpr double kHalfEdgeMm = 7.5;
   double farthest_mm = 0.0;
   for (int n = 0; n < 8; ++n) {
-    const Eigen::Vector3d side(2 * (n & 1) - 1, (n & 2) - 1, (n & 4) / 2 - 1);
+    const Eigen::Vector3d side((n & 1) != 0 ? 1.0 : -1.0, (n & 2) != 0 ? 1.0 : -1.0, (n & 4) != 0 ? 1.0 : -1.0);
     const Eigen::Vector3d corner = target.center_room_mm + kHalfEdgeMm * side;
     farthest_mm = std::max(farthest_mm, (found * corner - truth * corner).norm());
   }
@@ -122,10 +122,12 @@ void add_errors(const RegistrationResult& result, const Eigen::Isometry3d& truth
   }
   if (!result.uncertainty) return;
   run.sigma.emplace();
+  const Eigen::Vector3d sigma_mm = result.uncertainty->translation_mm();
+  const Eigen::Vector3d sigma_rad = result.uncertainty->rotation_rad();
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const auto n = static_cast<Eigen::Index>(axis);
-    (*run.sigma)[axis] = result.uncertainty->translation_mm[n];
-    (*run.sigma)[axis + 3] = deg_from_rad(result.uncertainty->rotation_rad[n]);
+    (*run.sigma)[axis] = sigma_mm[n];
+    (*run.sigma)[axis + 3] = deg_from_rad(sigma_rad[n]);
   }
 }
 

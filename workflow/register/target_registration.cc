@@ -18,6 +18,19 @@ std::shared_ptr<const CtBodies> BodyStore::get(const std::shared_ptr<const CtSer
   return last_;
 }
 
+TargetRegistration::TargetRegistration(const Study& study, const RegistrationRequest& request,
+                                       const RegistrationSetup& setup, const TargetChoice& choice,
+                                       const Surrogate& surrogate, BodyStore& bodies)
+    : study_(study),
+      request_(request),
+      setup_(setup),
+      choice_(choice),
+      surrogate_(surrogate),
+      bodies_(bodies),
+      options_(setup.options()) {
+  options_.target_room_mm = choice.target.center_room_mm;
+}
+
 const BentPatient& TargetRegistration::bent_patient() const {
   std::call_once(bent_once_, [&] {
     const std::shared_ptr<const CtBodies> of_ct = bodies_.get(study_.ct);
@@ -36,14 +49,14 @@ const BentPatient& TargetRegistration::bent_patient() const {
 
 RegistrationResult TargetRegistration::from(const Eigen::Isometry3d& start_room_from_patient,
                                             std::span<const FixedImage> images, Observer& observer) const {
-  RegistrationResult found = register_views(setup_.renderers(), images, start_room_from_patient, setup_.options(),
+  RegistrationResult found = register_views(setup_.renderers(), images, start_room_from_patient, options_,
                                             [&](double share) { observer.progress("Registering", share); });
   observer.progress("Registering", 1.0);
   const Eigen::Vector3d target_room_mm =
       setup_error_from_poses(study_.planned_room_from_patient, found.actual_room_from_patient) *
       choice_.target.center_room_mm;
-  if (may_have_bent(setup_.options(), images, target_room_mm, found))
-    register_bodies(bent_patient(), images, study_.planned_room_from_patient, setup_.options(), found,
+  if (may_have_bent(options_, images, target_room_mm, found))
+    register_bodies(bent_patient(), images, study_.planned_room_from_patient, options_, found,
                     [&](double share) { observer.progress("Registering the target", share); });
   for (const std::string& doubt : study_.doubts) found.demote(Verdict::kReview, doubt);
   for (const std::string& doubt : choice_.doubts) found.demote(Verdict::kReview, doubt);

@@ -36,8 +36,7 @@ class BodyStore {
 class TargetRegistration {
  public:
   TargetRegistration(const Study& study, const RegistrationRequest& request, const RegistrationSetup& setup,
-                     const TargetChoice& choice, const Surrogate& surrogate, BodyStore& bodies)
-      : study_(study), request_(request), setup_(setup), choice_(choice), surrogate_(surrogate), bodies_(bodies) {}
+                     const TargetChoice& choice, const Surrogate& surrogate, BodyStore& bodies);
 
   // Searches from this pose of the whole patient; doubts about study, target and surrogate make the result a review.
   // Several threads may call it at a time.
@@ -53,6 +52,7 @@ class TargetRegistration {
   const TargetChoice& choice_;
   const Surrogate& surrogate_;
   BodyStore& bodies_;
+  RegistrationOptions options_;
   mutable std::once_flag bent_once_;
   mutable std::optional<BentPatient> bent_;
 };

@@ -106,8 +106,8 @@ TEST(Report, AllFormatsShowTheSameNumbers) {
     report.setup_error.translation() = Eigen::Vector3d(uniform(-30, 30), uniform(-3, 3), uniform(-0.2, 0.2));
     report.setup_error.linear() = rotation_from_zxy({uniform(-0.1, 0.1), uniform(-0.02, 0.02), uniform(-0.002, 0.002)});
     const double wide = n % 2 == 0 ? 1.5 : 0.2;  // sigma: rounded to 1 or to 0.1
-    report.uncertainty = {.translation_mm = {wide, 0.04, 0.1},
-                          .rotation_rad = {rad_from_deg(0.05), rad_from_deg(wide), rad_from_deg(0.01)}};
+    report.uncertainty = uncertainty_of_independent_axes(
+        {wide, 0.04, 0.1}, {rad_from_deg(0.05), rad_from_deg(wide), rad_from_deg(0.01)});
     const auto json = nlohmann::json::parse(json_report(report));
     const std::string pdf = text_of_pdf(report, 1), html = html_of(report), text = text_of(report);
     const auto csv = csv_of(report);
@@ -253,7 +253,7 @@ TEST(Report, TheTargetStandsBehindThePatientAndIsBroughtRight) {
   SetupResult report = oblique_report(Verdict::kAccepted);
   EXPECT_THAT(text_of(report), testing::Not(HasSubstr("Target ")));
   report.target = Target{.name = "PTV 60", .chosen_by = "dose reference of the plan", .center_room_mm = {10, 80, -20}};
-  report.uncertainty = {.translation_mm = {0.1, 0.1, 0.1}, .rotation_rad = Eigen::Vector3d::Constant(0.001)};
+  report.uncertainty = uncertainty_of_independent_axes({0.1, 0.1, 0.1}, Eigen::Vector3d::Constant(0.001));
   const ReportPage page = report_page(report);
   EXPECT_EQ(page.who[0].name, "Patient");
   EXPECT_EQ(page.who[1].name, "Target");

@@ -27,7 +27,7 @@ class ResultFolderTest : public testing::Test {
  protected:
   ResultFolderTest() {
     report_.site = small_couch();
-    report_.uncertainty = {.translation_mm = {0.1, 0.2, 0.3}, .rotation_rad = {0.001, 0.002, 0.003}};
+    report_.uncertainty = uncertainty_of_independent_axes({0.1, 0.2, 0.3}, {0.001, 0.002, 0.003});
     report_.stages = {{.name = "fine",
                        .similarity = "ncc",
                        .optimizer = "bobyqa",
