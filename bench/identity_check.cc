@@ -1,7 +1,7 @@
 // Who is on the table, and are the images what they say? Registers phantom patients with their own X-rays, with X-rays
 // that were mirrored, turned, exchanged or taken from the other side, and with those of all other patients; where the
-// patient as a whole is not accepted, also the bodies about the isocenter, as `isoshift register` does. Prints a line of
-// CSV per registration and a summary; exits with 1 if anything wrong was accepted.
+// patient as a whole is not accepted, also the bodies about the isocenter, as `isoshift register` does. Prints a line
+// of CSV per registration and a summary; exits with 1 if anything wrong was accepted.
 //
 //   identity_check [patients=20 [only the CT of patient]] > identity.csv
 
@@ -143,8 +143,7 @@ int check(int patient_count, std::optional<int> only) {
     try {
       const std::vector<FixedImage> images = prepared(xrays);
       result = register_views(renderers, images, planned, options);
-      const Eigen::Vector3d target_mm =
-          result.actual_room_from_patient * (planned.inverse() * options.target_room_mm);
+      const Eigen::Vector3d target_mm = result.actual_room_from_patient * (planned.inverse() * options.target_room_mm);
       if (may_have_bent(options, images, target_mm, result)) register_bodies(bent, images, planned, options, result);
     } catch (const Error& error) {
       fmt::print("{},{},{},error,,,,,,,,,,\"{}\"\n", ct, of, what, error.what());
@@ -175,7 +174,8 @@ int check(int patient_count, std::optional<int> only) {
                             deg_from_rad(result.uncertainty->rotation_rad()[axis]));
     for (const std::string& reason : result.reasons) reasons += reason + "; ";
     fmt::print("{},{},{},{},{},{:.2f},{:.3f},{:.3f},{:.3f},{:.3f},{:.2f},{},\"{}\"\n", ct, of, what,
-               to_string(result.verdict), result.bodies.empty() ? "whole" : "bodies", mtre_mm, least, as_is, best, disagreeing, result.seconds, errors, reasons);
+               to_string(result.verdict), result.bodies.empty() ? "whole" : "bodies", mtre_mm, least, as_is, best,
+               disagreeing, result.seconds, errors, reasons);
     std::fflush(stdout);
     count.accepted += result.verdict == Verdict::kAccepted ? 1 : 0;
     wrong_accepted = wrong_accepted || (result.verdict == Verdict::kAccepted && (what != "right" || mtre_mm > 2.0));
@@ -191,14 +191,15 @@ int check(int patient_count, std::optional<int> only) {
     const BodyMap bodies = find_bodies(hu);
     const Target target = target_of(bodies);
     options.target_room_mm = target.center_room_mm;
-    const BentPatient bent(
-        hu, AttenuationModel{}, std::array{Beam::kKilovoltage},
-        patient_bodies(bodies, soft_masks(bodies), planned.inverse() * target.center_room_mm), target);
+    const BentPatient bent(hu, AttenuationModel{}, std::array{Beam::kKilovoltage},
+                           patient_bodies(bodies, soft_masks(bodies), planned.inverse() * target.center_room_mm),
+                           target, {});
     for (const auto& [what, xrays] : variants(patients[static_cast<std::size_t>(ct)].xrays))
       one(renderers, bent, ct, ct, what, xrays);
     const std::vector<XrayImage>& own = patients[static_cast<std::size_t>(ct)].xrays;
     const std::size_t next = static_cast<std::size_t>((ct + 1) % patient_count);
-    if (patient_count > 1) one(renderers, bent, ct, ct, "lateral of another patient", {own[0], patients[next].xrays[1]});
+    if (patient_count > 1)
+      one(renderers, bent, ct, ct, "lateral of another patient", {own[0], patients[next].xrays[1]});
     for (int of = 0; of < patient_count; ++of)
       if (of != ct) one(renderers, bent, ct, of, "another patient", patients[static_cast<std::size_t>(of)].xrays);
   }

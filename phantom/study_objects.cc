@@ -211,6 +211,7 @@ void write_xray(const PhantomOptions& options, const StudyUids& study, const std
   const double corner_mm = 0.5 * (imager.pixels - 1) * imager.pixel_mm;
   dataset.put(DCM_ImageType, imager.is_megavoltage ? "ORIGINAL\\PRIMARY\\PORTAL" : "ORIGINAL\\PRIMARY\\RADIOGRAPH");
   dataset.put(DCM_ConversionType, "DI");
+  dataset.put(DCM_PatientOrientation, "");
   const std::string date = fmt::format("202603{:02}", moment.day);
   dataset.put(DCM_ContentDate, date);
   dataset.put(DCM_ContentTime, time_of_day(moment.time_s));
@@ -237,6 +238,7 @@ void write_xray(const PhantomOptions& options, const StudyUids& study, const std
   dataset.put(DCM_TableTopRollAngle, 0.0);
   DicomItem exposure = dataset.append_item(DCM_ExposureSequence);
   exposure.put(DCM_KVP, imager.is_megavoltage ? 6000.0 : 120.0);
+  exposure.put(DCM_NumberOfBlocks, 0);
   dataset.append_reference(DCM_ReferencedRTPlanSequence, UID_RTPlanStorage, study.plan);
   dataset.put(DCM_ReferencedBeamNumber, fmt::format("{}", number + 1));
   put_pixel_format(dataset, {.columns = imager.pixels, .rows = imager.pixels});

@@ -111,6 +111,41 @@ std::optional<std::array<double, 6>> share_within(std::span<const EvaluatedRun> 
   return share;
 }
 
+BodySummary summary_of(const std::string& name, std::span<const EvaluatedRun> runs) {
+  BodySummary summary{.name = name};
+  std::vector<double> errors_mm, lengths_mm, sigmas_off;
+  for (const EvaluatedRun& run : runs)
+    for (const EvaluatedBody& body : run.bodies) {
+      if (body.name != name) continue;
+      ++summary.runs;
+      if (!body.is_determined) continue;
+      ++summary.determined;
+      const Vector3d error_mm = body.found_mm - body.true_mm;
+      errors_mm.push_back(error_mm.norm());
+      lengths_mm.push_back(body.true_mm.norm());
+      for (int axis = 0; axis < 3; ++axis)
+        if (body.sigma_mm[axis] > 0.0) sigmas_off.push_back(std::abs(error_mm[axis]) / body.sigma_mm[axis]);
+    }
+  const auto share_within = [&](double sigmas) {
+    const auto within = std::ranges::count_if(sigmas_off, [&](double off) { return off <= sigmas; });
+    return sigmas_off.empty() ? 0.0 : static_cast<double>(within) / static_cast<double>(sigmas_off.size());
+  };
+  summary.median_true_mm = median_of(lengths_mm);
+  summary.median_error_mm = median_of(errors_mm);
+  summary.within_one_sigma = share_within(1.0);
+  summary.within_two_sigma = share_within(2.0);
+  return summary;
+}
+
+std::vector<BodySummary> body_summaries(std::span<const EvaluatedRun> runs) {
+  std::vector<BodySummary> summaries;
+  for (const EvaluatedRun& run : runs)
+    for (const EvaluatedBody& body : run.bodies)
+      if (std::ranges::find(summaries, body.name, &BodySummary::name) == summaries.end())
+        summaries.push_back(summary_of(body.name, runs));
+  return summaries;
+}
+
 }  // namespace
 
 StartProtocol StartProtocol::paper() {
@@ -198,6 +233,7 @@ EvaluationSummary summarized(std::span<const EvaluatedRun> runs, bool by_mrpd) {
   }
   summary.within_one_sigma = share_within(runs, 1.0);
   summary.within_two_sigma = share_within(runs, 2.0);
+  summary.bodies = body_summaries(runs);
   return summary;
 }
 

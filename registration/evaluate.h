@@ -46,6 +46,14 @@ struct StartPose {
 // starts are the same as 50 starts.
 std::vector<StartPose> start_poses(const Eigen::Isometry3d& truth, const StartProtocol& protocol);
 
+// What a bone did against the target once that is right, in mm in the room: found, and true at the bone's center.
+struct EvaluatedBody {
+  std::string name;
+  bool is_determined = false;
+  Eigen::Vector3d found_mm = Eigen::Vector3d::Zero(), true_mm = Eigen::Vector3d::Zero();
+  Eigen::Vector3d sigma_mm = Eigen::Vector3d::Zero();  // as the registration gave it
+};
+
 // One registration of an evaluation. Errors are found * truth^-1: translation at the isocenter and rotation vector.
 struct EvaluatedRun {
   int number = 0;
@@ -60,10 +68,19 @@ struct EvaluatedRun {
   std::string reasons;  // why it is not accepted
   int evaluations = 0;
   double seconds = 0.0, seconds_rendering = 0.0, seconds_similarity = 0.0;
+  std::vector<EvaluatedBody> bodies;  // where bodies answered, those whose truth is known
 };
 
 // A registration counts as successful below this mTRE (mRPD where one view cannot tell depth).
 inline constexpr double kSuccessMm = 2.0;
+
+// All that was found of the bone of one name, where it was determined.
+struct BodySummary {
+  std::string name;
+  int runs = 0, determined = 0;
+  double median_true_mm = 0.0, median_error_mm = 0.0;     // lengths
+  double within_one_sigma = 0.0, within_two_sigma = 0.0;  // shares of axes that have a sigma
+};
 
 struct EvaluationSummary {
   int runs = 0, successes = 0;
@@ -82,6 +99,7 @@ struct EvaluationSummary {
   int target_beyond_2_mm_accepted = 0;
   // Share of runs whose true error lies within one and two sigma, per axis; nothing without sigmas.
   std::optional<std::array<double, 6>> within_one_sigma, within_two_sigma;
+  std::vector<BodySummary> bodies;  // in the order of their first mention
 
   double success_share() const { return runs > 0 ? static_cast<double>(successes) / runs : 0.0; }
 };

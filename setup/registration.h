@@ -112,6 +112,13 @@ struct BodyMotion {
   bool is_determined() const;
 };
 
+// How far a drawn structure lies off once the target is right, if it goes with the bones near it.
+struct StructureMotion {
+  std::string name;
+  Eigen::Vector3d displacement_mm = Eigen::Vector3d::Zero();  // of its center
+  double most_mm = 0.0;                                       // of points of its surface
+};
+
 struct Registration {
   Verdict verdict = Verdict::kRejected;
   std::vector<std::string> reasons = {"not run"};  // why the verdict is not `accepted`
@@ -124,6 +131,7 @@ struct Registration {
   // Where the patient has bent: what bones did against the target. The pose is then the target's. Empty: the patient as
   // a whole was registered.
   std::vector<BodyMotion> bodies;
+  std::vector<StructureMotion> structures;  // other than the target, near bones; where bodies answered
   double target_image_share = 0.0;  // of what is known about where the target lies; springs between bodies are the rest
   double target_match = 0.0;        // mean over the views of the gradient correlation near the target, coarse
   double target_deformation_mm = 0.0;  // how far the target's surface lies from where a rigid motion puts it, at most

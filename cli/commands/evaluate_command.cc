@@ -51,6 +51,7 @@ void run_evaluate(EvaluateFlags& flags, Console& console) {
   options.protocol = protocol_of(flags);
   options.registration.settle();
   options.truth = read_setup_error(flags.truth);
+  options.body_truths = read_body_truths(flags.truth);
   Notes notes;
   ConsoleObserver observer(console);
   const EvaluationFolder folder = evaluate_study(options, notes, observer);
@@ -68,7 +69,7 @@ void add_evaluate_command(CLI::App& app, Console& console, int&) {
   command->footer(
       "\nExample:\n  isoshift evaluate exported/ --truth exported/truth.json -o evaluation\n"
       "  isoshift evaluate --table evaluation other_evaluation\n\n"
-      "Writes runs.csv, summary.json, success.svg and errors.svg. The same command continues an\n"
+      "Writes runs.csv, bodies.csv, summary.json, success.svg and errors.svg. The same command continues an\n"
       "evaluation that was stopped. The protocol is that of van de Kraats et al. (2005): docs/evaluation.md.");
   add_study_options(*command, options.study);
   command->add_option("--truth", flags->truth, "truth.json of the study: the true setup error")->type_name("FILE");

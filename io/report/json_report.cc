@@ -162,6 +162,15 @@ Json target_json(const SetupResult& report, const ShownShift& shown) {
           {"deformation_mm", report.bodies.empty() ? Json(nullptr) : Json(report.target_deformation_mm)}};
 }
 
+Json structures_json(const SetupResult& report) {
+  Json list = Json::array();
+  for (const StructureMotion& structure : report.structures)
+    list.push_back({{"name", structure.name},
+                    {"displacement_mm", array_of(structure.displacement_mm)},
+                    {"most_mm", structure.most_mm}});
+  return list;
+}
+
 Json bodies_json(const SetupResult& report) {
   Json list = Json::array();
   for (const BodyMotion& body : report.bodies)
@@ -289,6 +298,7 @@ std::string json_report(const SetupResult& report) {
                {"couch_applied", couch_applied_json(report, shown)},
                {"target", target_json(report, shown)},
                {"bodies", bodies_json(report)},
+               {"structures", structures_json(report)},
                {"uncertainty",
                 {{"translation_mm", sigma_json(report.uncertainty.has_value(), shown.sigma_mm)},
                  {"rotation_deg", sigma_json(report.uncertainty.has_value(), shown.sigma_deg)},

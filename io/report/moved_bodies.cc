@@ -123,11 +123,18 @@ std::string bent_words(const ShownShift& shown, LengthUnit unit) {
   return words;
 }
 
-ReportPage::Section moved_section(const ShownShift& shown, LengthUnit unit) {
+ReportPage::Section moved_section(const ShownShift& shown, const std::vector<StructureMotion>& structures,
+                                  LengthUnit unit) {
   ReportPage::Section section{.title = kMovedTitle};
   section.rows.push_back(
       {"Bone", "how far its center lies off once the target is right, +/- two sigma; how it is turned"});
   for (const Moved& body : shown.moved) section.rows.push_back({printable(body.name), value_of(body, unit)});
+  for (const StructureMotion& structure : structures)
+    section.rows.push_back(
+        {"Structure " + printable(structure.name),
+         fmt::format("its center lies {} {} off, its surface {} {} at most, if it goes with the bones near it",
+                     unsigned_length(structure.displacement_mm.norm(), unit), name_of(unit),
+                     unsigned_length(structure.most_mm, unit), name_of(unit))});
   section.rows.push_back({"Arrows in the pictures",
                           fmt::format("what lies off by 1 mm and more, {:.0f} times as long", kMotionMagnified)});
   return section;

@@ -15,6 +15,7 @@ inline constexpr const char* kMovedTitle = "What moved against the target";
 std::string bent_words(const ShownShift& shown, LengthUnit unit);
 
 // A row per bone, the nearest to the target first.
-ReportPage::Section moved_section(const ShownShift& shown, LengthUnit unit);
+ReportPage::Section moved_section(const ShownShift& shown, const std::vector<StructureMotion>& structures,
+                                  LengthUnit unit);
 
 }  // namespace isoshift

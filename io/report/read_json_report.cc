@@ -244,6 +244,10 @@ SetupResult report_from(const Json& json) {
   // Results of before 2026-11-23 do not say.
   if (json.contains("target")) report.target = target_from(json.at("target"));
   if (json.contains("bodies")) report.bodies = bodies_from(json.at("bodies"));
+  for (const Json& structure : json.value("structures", Json::array()))
+    report.structures.push_back({.name = structure.at("name"),
+                                 .displacement_mm = vector_from<3>(structure.at("displacement_mm")),
+                                 .most_mm = structure.at("most_mm")});
   if (!report.bodies.empty() && report.target) {
     report.target_image_share = json.at("target").at("image_share");
     report.target_match = json.at("target").value("match", 0.0);

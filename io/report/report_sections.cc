@@ -163,7 +163,7 @@ std::vector<ReportPage::Section> report_sections(const SetupResult& report, cons
                                                  const ReportPage& page) {
   std::vector<ReportPage::Section> sections;
   if (report.target) sections.push_back(target_section(report, shown, unit));
-  if (!shown.moved.empty()) sections.push_back(moved_section(shown, unit));
+  if (!shown.moved.empty()) sections.push_back(moved_section(shown, report.structures, unit));
   sections.push_back(geometry_section(report));
   if (!page.left_over.empty()) sections.push_back(left_over_section(page));
   for (const auto& section : {search_section(report), checks_section(report), provenance_section(report)})

@@ -30,12 +30,12 @@ std::vector<double> carried_shares(const PatientBodies& patient, const Eigen::Ve
 }  // namespace
 
 Carriers::Carriers(const PatientBodies& patient, const Target& target,
-                   const Eigen::Isometry3d& planned_room_from_patient)
+                   const Eigen::Isometry3d& planned_room_from_patient, const std::vector<double>& named)
     : planned_(planned_room_from_patient),
       center_room_mm_(target.center_room_mm),
       extent_room_mm_(target.extent_room_mm) {
-  if (!patient.named_carriers.empty()) {
-    at_center_ = patient.named_carriers;
+  if (!named.empty()) {
+    at_center_ = named;
     at_extent_.assign(extent_room_mm_.size(), at_center_);
     return;
   }
@@ -85,12 +85,19 @@ std::size_t Carriers::largest() const {
   return static_cast<std::size_t>(std::ranges::max_element(at_center_) - at_center_.begin());
 }
 
+Carriers::Off Carriers::off_from(const Eigen::Isometry3d& setup_error, const BodyPoses& poses) const {
+  const auto off_mm = [&](const Eigen::Vector3d& point, std::span<const double> shares) -> Eigen::Vector3d {
+    return setup_error.inverse() * moved(point, shares, poses) - point;
+  };
+  Off off{.center_mm = off_mm(center_room_mm_, at_center_)};
+  for (std::size_t n = 0; n < extent_room_mm_.size(); ++n)
+    off.most_mm = std::max(off.most_mm, off_mm(extent_room_mm_[n], at_extent_[n]).norm());
+  return off;
+}
+
 CarriedTarget Carriers::target_at(const BodyPoses& poses, const BodyCertainty& certainty) const {
   CarriedTarget target{.setup_error = setup_error_at(poses)};
-  for (std::size_t n = 0; n < extent_room_mm_.size(); ++n)
-    target.deformation_mm =
-        std::max(target.deformation_mm,
-                 (moved(extent_room_mm_[n], at_extent_[n], poses) - target.setup_error * extent_room_mm_[n]).norm());
+  target.deformation_mm = off_from(target.setup_error, poses).most_mm;
   const Eigen::MatrixXd per_motions = motion_per_motions();
   target.covariance = per_motions * certainty.covariance * per_motions.transpose();
   Eigen::Matrix<double, 3, 6> at_center;

@@ -25,8 +25,9 @@ inline constexpr double kCarriersNearMm = 20.0;
 class Carriers {
  public:
   // Bones carry a target if they lie within 20 mm of its center or surface; the nearer they are, the larger their
-  // shares. Where a person names the carriers (PatientBodies::named_carriers), these alone do.
-  Carriers(const PatientBodies& patient, const Target& target, const Eigen::Isometry3d& planned_room_from_patient);
+  // shares. Where a person names the carriers by their shares, these alone do.
+  Carriers(const PatientBodies& patient, const Target& target, const Eigen::Isometry3d& planned_room_from_patient,
+           const std::vector<double>& named = {});
 
   // Whether bones lie that near.
   bool exist() const { return !at_center_.empty(); }
@@ -40,6 +41,14 @@ class Carriers {
   // The target's motion with bodies at some poses.
   Eigen::Isometry3d setup_error_at(const BodyPoses& poses) const;
   CarriedTarget target_at(const BodyPoses& poses, const BodyCertainty& certainty) const;
+
+  // How far bodies at some poses put the target from where a rigid motion does, brought back by that motion: its
+  // center, and its surface at most.
+  struct Off {
+    Eigen::Vector3d center_mm = Eigen::Vector3d::Zero();
+    double most_mm = 0.0;
+  };
+  Off off_from(const Eigen::Isometry3d& setup_error, const BodyPoses& poses) const;
 
   // How the target moves with the motions of all bodies (BodyCertainty::covariance): 6 x 6n.
   Eigen::MatrixXd motion_per_motions() const;

@@ -14,7 +14,8 @@ struct PatientBodies {
   // bodies of soft tissue. And how far a place is from bone.
   std::vector<BodyShare> carried;
   Volume<float> to_bone_mm;
-  // The shares of all bodies in carrying the target, which add up to 1, where a person names what carries it.
+  // The shares of all bodies in carrying the target, which add up to 1, where a person names what carries it. Empty:
+  // the bones near it do.
   std::vector<double> named_carriers;
 };
 

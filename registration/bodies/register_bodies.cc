@@ -133,6 +133,19 @@ std::vector<BodyMotion> motions_of(const JointedBodies& bodies, const BodyRender
   return motions;
 }
 
+// What lies near bones goes with these.
+std::vector<StructureMotion> motions_of_structures(const BentPatient& patient, const Eigen::Isometry3d& planned,
+                                                   const Eigen::Isometry3d& setup_error, const BodyPoses& poses) {
+  std::vector<StructureMotion> motions;
+  for (const Target& structure : patient.structures) {
+    const Carriers carriers(patient.parts, structure, planned);
+    if (!carriers.exist()) continue;
+    const Carriers::Off off = carriers.off_from(setup_error, poses);
+    motions.push_back({.name = structure.name, .displacement_mm = off.center_mm, .most_mm = off.most_mm});
+  }
+  return motions;
+}
+
 RenderedBodies rendered(const Volume<float>& ct_hu, const AttenuationModel& attenuation, std::span<const Beam> beams,
                         const JointedBodies& bodies, double voxel_mm) {
   const CoarserCt ct = coarser_ct(ct_hu, attenuation, block_of(ct_hu.spacing_mm(), ct_hu.size, voxel_mm));
@@ -162,9 +175,11 @@ bool do_parts_match_near(std::span<const FixedImage> images, const Vector3d& tar
 }  // namespace
 
 BentPatient::BentPatient(const Volume<float>& ct_hu, const AttenuationModel& attenuation, std::span<const Beam> beams,
-                         PatientBodies parts_of_patient, Target target_of_patient)
+                         PatientBodies parts_of_patient, Target target_of_patient,
+                         std::vector<Target> structures_of_patient)
     : parts(std::move(parts_of_patient)),
       target(std::move(target_of_patient)),
+      structures(std::move(structures_of_patient)),
       fine(rendered(ct_hu, attenuation, beams, parts.bodies, kVoxelMm)),
       coarse(rendered(ct_hu, attenuation, beams, parts.bodies, kCoarseVoxelMm)) {}
 
@@ -181,7 +196,7 @@ void register_bodies(const BentPatient& patient, std::span<const FixedImage> ima
                      const Eigen::Isometry3d& planned_room_from_patient, const RegistrationOptions& options,
                      RegistrationResult& result, const SearchProgress& progress) {
   const auto begin = std::chrono::steady_clock::now();
-  const Carriers carriers(patient.parts, patient.target, planned_room_from_patient);
+  const Carriers carriers(patient.parts, patient.target, planned_room_from_patient, patient.parts.named_carriers);
   if (!carriers.exist()) {
     result.demote(Verdict::kReview, "no bone carries the target: soft tissue is not seen in X-rays");
     return;
@@ -209,6 +224,7 @@ void register_bodies(const BentPatient& patient, std::span<const FixedImage> ima
                found.poses, 2.0 * options.stages.back().pixel_mm, result);
   result.bodies = motions_of(patient.parts.bodies, patient.fine.apart, carriers, target, planned_room_from_patient,
                              found.poses, certainty);
+  result.structures = motions_of_structures(patient, planned_room_from_patient, target.setup_error, found.poses);
   std::ranges::copy(found.alternatives, std::back_inserter(result.alternatives));
   judge(parameters_from_setup_error(target.setup_error), options, result);
   result.seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();

@@ -10,11 +10,13 @@ namespace isoshift {
 
 // A patient who may have bent, ready to be searched: made once, for any number of registrations.
 struct BentPatient {
+  // `structures`: volumes other than the target; how far they lie off is told of those near bones.
   BentPatient(const Volume<float>& ct_hu, const AttenuationModel& attenuation, std::span<const Beam> beams,
-              PatientBodies parts, Target target);
+              PatientBodies parts, Target target, std::vector<Target> structures);
 
   PatientBodies parts;
   Target target;
+  std::vector<Target> structures;
   RenderedBodies fine, coarse;  // with voxels up to 1.4 and 3 mm
 };
 
@@ -27,9 +29,9 @@ bool may_have_bent(const RegistrationOptions& options, std::span<const FixedImag
 
 // Searches all bodies from the pose of the whole, and judges again. In the result, pose, uncertainty, similarities and
 // contradictions are those of the bodies that carry the target; `alternatives` gains what the images say of a spine one
-// vertebra higher or lower; `bodies` holds what the others did. Bones carry the target by their shares of it; if soft
-// tissue has most of it, or the CT shows no body, the result stays as it is but for a reason. The result's pose must be
-// that of the whole.
+// vertebra higher or lower; `bodies` and `structures` hold what the others did. Bones carry the target by their shares
+// of it; if soft tissue has most of it, or the CT shows no body, the result stays as it is but for a reason. The
+// result's pose must be that of the whole.
 void register_bodies(const BentPatient& patient, std::span<const FixedImage> images,
                      const Eigen::Isometry3d& planned_room_from_patient, const RegistrationOptions& options,
                      RegistrationResult& result, const SearchProgress& progress = {});

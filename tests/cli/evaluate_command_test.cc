@@ -103,7 +103,8 @@ TEST_F(EvaluateCommandTest, StoppedAndStartedAgainGivesTheSameRuns) {
   // As it is left when it is stopped: two runs and half of a third, and no summary yet.
   const std::vector<std::string> lines = lines_of(folder_ / "whole" / "runs.csv");
   std::filesystem::create_directory(folder_ / "stopped");
-  std::filesystem::copy(folder_ / "whole" / "evaluation.json", folder_ / "stopped" / "evaluation.json");
+  for (const char* file : {"evaluation.json", "bodies.csv"})
+    std::filesystem::copy(folder_ / "whole" / file, folder_ / "stopped" / file);
   std::ofstream(folder_ / "stopped" / "runs.csv") << lines[0] << "\n"
                                                   << lines[1] << "\n"
                                                   << lines[2] << "\n"

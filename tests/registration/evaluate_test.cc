@@ -235,6 +235,30 @@ TEST(EvaluationSummary, CoverageIsTheShareOfErrorsWithinSigma) {
   EXPECT_THAT(*summary.within_two_sigma, testing::ElementsAre(0.75, 1.0, 0.0, 1.0, 1.0, 1.0));
 }
 
+TEST(EvaluationSummary, OfBodiesIsByName) {
+  const auto body = [](const char* name, bool is_determined, double found_mm, double true_mm) {
+    return EvaluatedBody{.name = name,
+                         .is_determined = is_determined,
+                         .found_mm = {found_mm, 0, 0},
+                         .true_mm = {true_mm, 0, 0},
+                         .sigma_mm = {0.5, 0, 0}};
+  };
+  const std::vector<EvaluatedRun> runs = {{.bodies = {body("skull", true, 2.0, 2.4), body("jaw", false, 0.0, 9.0)}},
+                                          {.bodies = {body("skull", true, 3.0, 2.1)}},
+                                          {.bodies = {body("skull", true, 4.0, 2.0)}}};
+  const std::vector<BodySummary> bodies = summarized(runs, false).bodies;
+  ASSERT_EQ(bodies.size(), 2U);
+  EXPECT_EQ(bodies[0].name, "skull");
+  EXPECT_EQ(bodies[0].runs, 3);
+  EXPECT_EQ(bodies[0].determined, 3);
+  EXPECT_NEAR(bodies[0].median_true_mm, 2.1, 1e-12);
+  EXPECT_NEAR(bodies[0].median_error_mm, 0.9, 1e-12);
+  EXPECT_NEAR(bodies[0].within_one_sigma, 1.0 / 3.0, 1e-12) << "of x, the axis that has a sigma";
+  EXPECT_NEAR(bodies[0].within_two_sigma, 2.0 / 3.0, 1e-12);
+  EXPECT_EQ(bodies[1].runs, 1);
+  EXPECT_EQ(bodies[1].determined, 0);
+}
+
 TEST(EvaluationSummary, OfNoRunsIsEmpty) {
   const EvaluationSummary summary = summarized({}, false);
   EXPECT_EQ(summary.runs, 0);

@@ -72,6 +72,7 @@ SetupResult bent_report(Verdict verdict) {
                    body("front bones 60 mm toward the head", 75, {0.0, 0.0, 12.0}, {0.0, 6.0, 0.0}),
                    body("left bones 120 mm toward the head", 125, {0.0, 30.0, 0.0}, {0.0, 0.0, 9.0})};
   report.bodies[1].carries_target = 0.62;
+  report.structures = {{.name = "Spinal^Cord", .displacement_mm = {0.3, -0.4, 1.2}, .most_mm = 4.26}};
   report.bodies[3].breathes = true;
   report.bodies[4].image_share = 0.05;
   return report;

@@ -132,7 +132,7 @@ void add_errors(const RegistrationResult& result, const Eigen::Isometry3d& truth
 }
 
 // A registration that ends with an error counts as one that found nothing.
-EvaluatedRun evaluated(int number, const StartPose& start, const Eigen::Isometry3d& truth, const Study& study,
+EvaluatedRun evaluated(int number, const StartPose& start, const EvaluateOptions& options, const Study& study,
                        std::span<const FixedImage> images, const Target& target,
                        const TargetRegistration& registration) {
   constexpr double kNothing = std::numeric_limits<double>::infinity();
@@ -146,7 +146,8 @@ EvaluatedRun evaluated(int number, const StartPose& start, const Eigen::Isometry
   try {
     const RegistrationResult result =
         registration.from(start.setup_error * study.planned_room_from_patient, images, nobody);
-    add_errors(result, truth, study, target, run);
+    add_errors(result, options.truth, study, target, run);
+    run.bodies = compared_bodies(result.bodies, options.body_truths, options.truth, study.planned_room_from_patient);
     run.verdict = result.verdict;
     run.reasons = joined(result.reasons);
     run.evaluations = result.evaluations();
@@ -162,8 +163,8 @@ EvaluatedRun evaluated(int number, const StartPose& start, const Eigen::Isometry
 // Runs what is missing, several at a time, each on one thread; alone, one uses all. What it finds does not depend on
 // that.
 void run_missing(EvaluationFolder& folder, const Study& study, const Target& target,
-                 const TargetRegistration& registration, const Eigen::Isometry3d& truth,
-                 const std::vector<StartPose>& starts, int jobs, Observer& observer) {
+                 const TargetRegistration& registration, const EvaluateOptions& options, int jobs, Observer& observer) {
+  const std::vector<StartPose> starts = start_poses(options.truth, options.protocol);
   const std::vector<FixedImage> images = prepared(study.xrays);
   std::vector<int> missing;
   for (int number = 0; number < static_cast<int>(starts.size()); ++number)
@@ -174,7 +175,7 @@ void run_missing(EvaluationFolder& folder, const Study& study, const Target& tar
   const auto work = [&] {
     for (std::size_t n = next++; n < missing.size(); n = next++) try {
         const int number = missing[n];
-        const EvaluatedRun run = evaluated(number, starts[number], truth, study, images, target, registration);
+        const EvaluatedRun run = evaluated(number, starts[number], options, study, images, target, registration);
         const std::lock_guard lock(mutex);
         folder.append(run);
         observer.progress("Evaluating", folder.runs().size(), starts.size());
@@ -213,8 +214,7 @@ EvaluationFolder evaluate_study(const EvaluateOptions& options, Notes& notes, Ob
   EvaluationFolder folder(
       options.output, configuration_of(options.registration, options.study.intensity, study, setup.renderers().finest(),
                                        choice.target, options.truth, options.protocol));
-  run_missing(folder, study, choice.target, registration, options.truth, start_poses(options.truth, options.protocol),
-              jobs, observer);
+  run_missing(folder, study, choice.target, registration, options, jobs, observer);
   folder.write_summary();
   return folder;
 }

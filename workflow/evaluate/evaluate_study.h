@@ -5,6 +5,7 @@
 #include <filesystem>
 
 #include "registration/evaluate.h"
+#include "workflow/evaluate/body_truth.h"
 #include "workflow/evaluate/evaluation_files.h"
 #include "workflow/observer.h"
 #include "workflow/register/registration_setup.h"
@@ -19,6 +20,7 @@ struct EvaluateOptions {
   std::string target;  // the structure whose error counts, or "isocenter"; empty: as target_of() finds it
   int jobs = 0;  // registrations at a time, each on one thread; 1: one on all cores; 0: as many as the machine's cores
   Eigen::Isometry3d truth = Eigen::Isometry3d::Identity();  // the true setup error
+  std::vector<BodyTruth> body_truths;                       // empty: nobody knows what single bones did
   std::filesystem::path output;
 };
 

@@ -24,6 +24,40 @@ constexpr const char* kHeader =
     "sigma_x_mm,sigma_y_mm,sigma_z_mm,sigma_rx_deg,sigma_ry_deg,sigma_rz_deg,evaluations,seconds,seconds_rendering,"
     "seconds_similarity,verdict,reasons";
 
+constexpr const char* kBodiesFile = "bodies.csv";
+constexpr const char* kBodiesHeader =
+    "run,body,determined,found_x_mm,found_y_mm,found_z_mm,true_x_mm,true_y_mm,true_z_mm,sigma_x_mm,sigma_y_mm,"
+    "sigma_z_mm";
+
+std::string lines_of_bodies(const EvaluatedRun& run) {
+  std::string lines;
+  for (const EvaluatedBody& body : run.bodies) {
+    lines += fmt::format("{},{},{}", run.number, body.name, body.is_determined ? "yes" : "no");
+    for (const Eigen::Vector3d* mm : {&body.found_mm, &body.true_mm, &body.sigma_mm})
+      lines += fmt::format(",{}", fmt::join(mm->begin(), mm->end(), ","));
+    lines += "\n";
+  }
+  return lines;
+}
+
+// Adds the body of a line of bodies.csv to its run, if that has ended.
+void add_body(const std::string& line, std::vector<EvaluatedRun>& runs) {
+  std::istringstream text(line);
+  std::string number, word;
+  EvaluatedBody body;
+  std::getline(text, number, ',');
+  std::getline(text, body.name, ',');
+  std::getline(text, word, ',');
+  body.is_determined = word == "yes";
+  for (Eigen::Vector3d* mm : {&body.found_mm, &body.true_mm, &body.sigma_mm})
+    for (double& component : *mm) {
+      std::getline(text, word, ',');
+      component = std::stod(word);
+    }
+  const auto run = std::ranges::find(runs, std::stoi(number), &EvaluatedRun::number);
+  if (run != runs.end()) run->bodies.push_back(std::move(body));
+}
+
 std::string line_of(const EvaluatedRun& run) {
   std::string line = fmt::format("{},{},{},{},{},{},{},{},", run.number, run.start_mtre_mm, run.mtre_mm, run.mpd_mm,
                                  run.mrpd_mm, run.target_mm, run.rotation_share, fmt::join(run.error, ","));
@@ -88,6 +122,14 @@ Json json_of(const EvaluationSummary& summary) {
                  {"within_1_mm", summary.target_within_1_mm},
                  {"within_1_mm_accepted", summary.target_within_1_mm_accepted},
                  {"beyond_2_mm_accepted", summary.target_beyond_2_mm_accepted}}}};
+  for (const BodySummary& body : summary.bodies)
+    json["bodies"].push_back({{"name", body.name},
+                              {"runs", body.runs},
+                              {"determined", body.determined},
+                              {"median_true_mm", body.median_true_mm},
+                              {"median_error_mm", body.median_error_mm},
+                              {"share_within_one_sigma", body.within_one_sigma},
+                              {"share_within_two_sigma", body.within_two_sigma}});
   if (summary.within_one_sigma) json["share_within_one_sigma"] = *summary.within_one_sigma;
   if (summary.within_two_sigma) json["share_within_two_sigma"] = *summary.within_two_sigma;
   return json;
@@ -155,6 +197,7 @@ EvaluationFolder::EvaluationFolder(std::filesystem::path path, Json configuratio
   std::filesystem::create_directories(path_);
   write_text(path_ / kConfigurationFile, configuration_.dump(2) + "\n");
   write_text(path_ / kRunsFile, std::string(kHeader) + "\n");
+  write_text(path_ / kBodiesFile, std::string(kBodiesHeader) + "\n");
 }
 
 EvaluationFolder::EvaluationFolder(std::filesystem::path path)
@@ -181,6 +224,23 @@ void EvaluationFolder::read_runs() {
     whole += line + "\n";
   }
   if (cut) replace_text(path_ / kRunsFile, whole);
+  read_bodies();
+}
+
+// Bodies are written before the line of their run: those of a run that was stopped are left out, and made again.
+void EvaluationFolder::read_bodies() {
+  std::ifstream stream(path_ / kBodiesFile);
+  std::string line;
+  std::getline(stream, line);
+  if (line != kBodiesHeader) throw Error(fmt::format("{}: is of another version", (path_ / kBodiesFile).string()));
+  for (int number = 2; std::getline(stream, line) && !stream.eof(); ++number) try {
+      add_body(line, runs_);
+    } catch (const std::exception&) {
+      throw Error(fmt::format("{}: line {} cannot be read: {}", (path_ / kBodiesFile).string(), number, line));
+    }
+  std::string whole = std::string(kBodiesHeader) + "\n";
+  for (const EvaluatedRun& run : runs_) whole += lines_of_bodies(run);
+  replace_text(path_ / kBodiesFile, whole);
 }
 
 bool EvaluationFolder::has(int number) const {
@@ -188,9 +248,13 @@ bool EvaluationFolder::has(int number) const {
 }
 
 void EvaluationFolder::append(const EvaluatedRun& run) {
-  std::ofstream stream(path_ / kRunsFile, std::ios::app);
-  stream << line_of(run) << std::flush;
-  if (!stream) throw Error(fmt::format("{}: cannot be written", (path_ / kRunsFile).string()));
+  const auto add = [&](const char* file, const std::string& lines) {
+    std::ofstream stream(path_ / file, std::ios::app);
+    stream << lines << std::flush;
+    if (!stream) throw Error(fmt::format("{}: cannot be written", (path_ / file).string()));
+  };
+  add(kBodiesFile, lines_of_bodies(run));
+  add(kRunsFile, line_of(run));
   runs_.push_back(run);
 }
 

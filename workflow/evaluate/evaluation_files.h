@@ -33,6 +33,7 @@ class EvaluationFolder {
 
  private:
   void read_runs();
+  void read_bodies();
 
   std::filesystem::path path_;
   nlohmann::ordered_json configuration_;

@@ -4,6 +4,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <array>
 #include <optional>
 
 #include "base/error.h"
@@ -128,7 +129,26 @@ std::vector<Candidate> around_isocenter(const Study& study, std::string_view typ
   return candidates;
 }
 
+constexpr std::array kToldOf = {"PTV", "CTV", "GTV", "ORGAN", "AVOIDANCE", "CAVITY"};  // RT ROI Interpreted Types
+
 }  // namespace
+
+std::vector<Target> structures_beside(const std::string& target, const Study& study) {
+  std::vector<Target> beside;
+  if (!study.structures) return beside;
+  for (const Structure& structure : study.structures->structures) {
+    if (structure.name == target || !is_drawn_here(structure, study) ||
+        std::ranges::find(kToldOf, structure.interpreted_type) == kToldOf.end())
+      continue;
+    try {
+      if (const Candidate candidate = candidate_of(structure, study); candidate.voxels > 0)
+        beside.push_back(target_from(candidate, study, ""));
+    } catch (const Error&) {
+      continue;  // drawn across the slices, say: a registration must not fail for what it only tells of
+    }
+  }
+  return beside;
+}
 
 TargetChoice target_of(const Study& study, const TargetWish& wish) {
   if (!wish.by_person.empty()) return named(study, wish.by_person, "--target");

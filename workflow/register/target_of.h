@@ -26,4 +26,7 @@ struct TargetChoice {
 // is not there or has no closed contour in the CT.
 TargetChoice target_of(const Study& study, const TargetWish& wish);
 
+// Targets and organs that are drawn in the CT, but for the one of this name; not those that cannot be filled.
+std::vector<Target> structures_beside(const std::string& target, const Study& study);
+
 }  // namespace isoshift

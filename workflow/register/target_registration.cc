@@ -42,7 +42,8 @@ const BentPatient& TargetRegistration::bent_patient() const {
       if (parts.named_carriers.empty())
         throw Error(fmt::format("surrogate: the CT shows no bone in it ({})", surrogate_.words));
     }
-    bent_.emplace(study_.ct->hu, request_.rendering.model(), beams_of(study_), std::move(parts), choice_.target);
+    bent_.emplace(study_.ct->hu, request_.rendering.model(), beams_of(study_), std::move(parts), choice_.target,
+                  structures_beside(choice_.target.name, study_));
   });
   return *bent_;
 }

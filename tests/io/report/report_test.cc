@@ -249,6 +249,20 @@ TEST(Report, SmallCouchesSayWhatTheyApplyAndWhatRemains) {
   EXPECT_TRUE(report_page(report).left_over.empty());
 }
 
+TEST(Report, TheLegendNamesOnlyWhatThePicturesShow) {
+  SetupResult report = oblique_report(Verdict::kAccepted);
+  ASSERT_FALSE(report.views.empty());
+  for (SetupResult::View& view : report.views) view.match.consistency.parts.clear();
+  EXPECT_THAT(report_page(report).picture_words, testing::Not(HasSubstr("Yellow")));
+  report.views[0].match.consistency.parts = {{.center_px = {3, 3}, .has_signal = true, .disagrees = true}};
+  EXPECT_THAT(report_page(report).picture_words, HasSubstr("Yellow squares"));
+  report.views[0].picture.moved = {{{1, 1}, {2, 2}}};
+  const std::string words = report_page(report).picture_words;
+  EXPECT_THAT(words, HasSubstr("Yellow arrows: bones that lie off once the target is right, 5 times as long"));
+  EXPECT_THAT(words, testing::Not(HasSubstr("squares")));
+  EXPECT_THAT(html_of(report), HasSubstr(words));
+}
+
 TEST(Report, TheTargetStandsBehindThePatientAndIsBroughtRight) {
   SetupResult report = oblique_report(Verdict::kAccepted);
   EXPECT_THAT(text_of(report), testing::Not(HasSubstr("Target ")));
@@ -263,9 +277,10 @@ TEST(Report, TheTargetStandsBehindThePatientAndIsBroughtRight) {
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const auto n = static_cast<Eigen::Index>(axis);
     EXPECT_NEAR(*shown.target_mm[axis], (report.setup_error * center - center)[n], 1e-9);
-    // By hand: 0.1 mm and 0.001 rad about the two other axes, at their distances.
+    // By hand: 0.1 mm and 0.001 rad about the two other axes, at their distances from where it was found.
+    const Eigen::Vector3d found = report.setup_error * center;
     EXPECT_NEAR(*shown.target_sigma_mm[axis],
-                std::hypot(0.1, 0.001 * std::hypot(center[(n + 1) % 3], center[(n + 2) % 3])), 1e-9);
+                std::hypot(0.1, 0.001 * std::hypot(found[(n + 1) % 3], found[(n + 2) % 3])), 1e-9);
     EXPECT_EQ(shown.applied_mm[axis], shown.couch_mm[axis]);  // a couch that can do all
   }
   report.site = small_couch();

@@ -60,12 +60,30 @@ TEST_F(ResultFolderTest, WhatBodiesDidIsReadBack) {
   ASSERT_EQ(read.bodies.size(), bent.bodies.size());
   EXPECT_EQ(read.target_deformation_mm, bent.target_deformation_mm);
   EXPECT_EQ(read.target_image_share, bent.target_image_share);
+  ASSERT_EQ(read.structures.size(), 1U);
+  EXPECT_EQ(read.structures[0].displacement_mm, bent.structures[0].displacement_mm);
   for (std::size_t n = 0; n < bent.bodies.size(); ++n) {
     EXPECT_EQ(read.bodies[n].name, bent.bodies[n].name);
     EXPECT_EQ(read.bodies[n].displacement_mm, bent.bodies[n].displacement_mm);
     EXPECT_LT((read.bodies[n].rotation_rad - bent.bodies[n].rotation_rad).norm(), 1e-12);
     EXPECT_EQ(read.bodies[n].is_determined(), bent.bodies[n].is_determined());
   }
+}
+
+// The sigma of a point far from the isocenter depends on how errors of translation and rotation go together.
+TEST_F(ResultFolderTest, TheCovarianceIsReadBackAndOlderResultsHaveSigmas) {
+  SetupResult report = bent_report(Verdict::kAccepted);
+  Eigen::Matrix<double, 6, 6> root = Eigen::Matrix<double, 6, 6>::Identity() * 0.1;
+  root.bottomRows<3>() *= 0.01;
+  root(0, 4) = -0.05;
+  report.uncertainty = Uncertainty{.covariance = root * root.transpose()};
+  auto json = nlohmann::json::parse(json_report(report));
+  const SetupResult read = report_from_json(json.dump(), "result.json");
+  EXPECT_EQ(read.uncertainty->covariance, report.uncertainty->covariance);
+  json["uncertainty"].erase("covariance");
+  const SetupResult older = report_from_json(json.dump(), "result.json");
+  EXPECT_LT((older.uncertainty->translation_mm() - report.uncertainty->translation_mm()).norm(), 1e-12);
+  EXPECT_LT((older.uncertainty->rotation_rad() - report.uncertainty->rotation_rad()).norm(), 1e-12);
 }
 
 TEST_F(ResultFolderTest, ResultsWithoutBodiesAreThoseOfTheWholePatient) {

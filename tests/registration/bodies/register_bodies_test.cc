@@ -29,7 +29,12 @@ BentPatient patient_of(const BentScene& scene, float to_bone_mm = 0.0F) {
   Target target{.name = "PTV"};
   for (int axis = 0; axis < 3; ++axis)
     for (const double side : {-8.0, 8.0}) target.extent_room_mm.push_back(side * Vector3d::Unit(axis));
-  return {scene.ct, {}, std::array{Beam::kKilovoltage}, std::move(parts), std::move(target)};
+  // A structure in the body above.
+  Target structure = target;
+  structure.name = "cord";
+  structure.center_room_mm = {0, 36, 0};
+  for (Vector3d& point : structure.extent_room_mm) point += structure.center_room_mm;
+  return {scene.ct, {}, std::array{Beam::kKilovoltage}, std::move(parts), std::move(target), {std::move(structure)}};
 }
 
 RegistrationResult registered(const BentScene& scene, const std::vector<FixedImage>& images,
@@ -58,6 +63,11 @@ TEST(RegisterBodies, TheTargetIsRightAndTheRestIsSaid) {
     EXPECT_LT((result.bodies[other].displacement_mm - truth).norm(), 1.5) << "body " << other;
     EXPECT_TRUE(result.bodies[other].is_determined());
   }
+  ASSERT_EQ(result.structures.size(), 1U);
+  EXPECT_EQ(result.structures[0].name, "cord");
+  const Vector3d of_structure = scene.truth[1].inverse() * scene.truth[2] * Vector3d(0, 36, 0) - Vector3d(0, 36, 0);
+  EXPECT_LT((result.structures[0].displacement_mm - of_structure).norm(), 1.5);
+  EXPECT_GT(result.structures[0].most_mm, of_structure.norm() - 1.5);
   EXPECT_GT(result.target_image_share, 0.5);
   EXPECT_GT(result.target_match, 0.8);
   for (const ViewMatch& view : result.views) EXPECT_GT(view.similarity_final, 0.8);
