@@ -133,7 +133,9 @@ struct Registration {
   std::vector<BodyMotion> bodies;
   std::vector<StructureMotion> structures;  // other than the target, near bones; where bodies answered
   double target_image_share = 0.0;  // of what is known about where the target lies; springs between bodies are the rest
-  double target_match = 0.0;        // mean over the views of the gradient correlation near the target, coarse
+  // Mean over the views of the gradient correlation near the target, on coarse pixels; and of small parts by
+  // themselves.
+  double target_match = 0.0, target_match_of_parts = 0.0;
   double target_deformation_mm = 0.0;  // how far the target's surface lies from where a rigid motion puts it, at most
   double seconds = 0.0, seconds_rendering = 0.0, seconds_similarity = 0.0;  // in all, and of that in the search
 

@@ -159,6 +159,7 @@ Json target_json(const SetupResult& report, const ShownShift& shown) {
           {"sigma_mm", sigma_json(report.uncertainty.has_value(), shown.target_sigma_mm)},
           {"image_share", report.bodies.empty() ? Json(nullptr) : Json(report.target_image_share)},
           {"match", report.bodies.empty() ? Json(nullptr) : Json(report.target_match)},
+          {"match_of_parts", report.bodies.empty() ? Json(nullptr) : Json(report.target_match_of_parts)},
           {"deformation_mm", report.bodies.empty() ? Json(nullptr) : Json(report.target_deformation_mm)}};
 }
 

@@ -251,6 +251,7 @@ SetupResult report_from(const Json& json) {
   if (!report.bodies.empty() && report.target) {
     report.target_image_share = json.at("target").at("image_share");
     report.target_match = json.at("target").value("match", 0.0);
+    report.target_match_of_parts = json.at("target").value("match_of_parts", 0.0);
     report.target_deformation_mm = json.at("target").at("deformation_mm");
   }
   const Json& error = json.at("setup_error");

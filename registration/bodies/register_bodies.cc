@@ -4,12 +4,12 @@
 
 #include <algorithm>
 #include <chrono>
-#include <numeric>
 
 #include "geometry/rotation.h"
 #include "geometry/voxel_box.h"
 #include "registration/bodies/body_objective.h"
 #include "registration/bodies/carriers.h"
+#include "registration/bodies/target_match.h"
 #include "registration/bodies/target_search.h"
 #include "registration/pose_parameters.h"
 #include "registration/quality/judge.h"
@@ -45,25 +45,6 @@ Eigen::MatrixXd seen_motions(const XrayView& view, const CarriedTarget& target, 
   return motions;
 }
 
-// Gradient correlation near the target, mean over the views. On coarse pixels noise hardly counts: what does not match
-// there is other anatomy. In small fields that show too little of it, all that they show.
-double match_near_target(const BodyScene& scene, const Vector3d& target_room_mm, const BodyPoses& poses) {
-  constexpr double kPixelMm = 4.0, kReachMm = 40.0;
-  constexpr std::ptrdiff_t kLeastPixels = 200;
-  std::vector<FixedImage> level = scene.views.reduced_to(kPixelMm, scene.whole_room_from_patient, 0.0);
-  for (FixedImage& image : level) {
-    const auto center = image.view.project(target_room_mm);
-    Image<std::uint8_t> near = image.field;
-    for (int row = 0; row < near.rows; ++row)
-      for (int column = 0; column < near.columns; ++column)
-        if (!center || (Eigen::Vector2d(column, row) - *center).norm() > kReachMm * pixels_per_mm(image.view))
-          near.at(column, row) = 0;
-    if (std::ranges::count(near.pixels, 1) >= kLeastPixels) image.field = std::move(near);
-  }
-  const std::vector<double> matches = scene.fine.matches(level, poses);
-  return std::reduce(matches.begin(), matches.end()) / static_cast<double>(matches.size());
-}
-
 // What the search found, as images and as certainty: of every view how well it matches, and what it alone would want.
 void report_match(const BodyScene& scene, const Carriers& carriers, const CarriedTarget& target,
                   const Vector3d& center_room_mm, const BodyPoses& planned, const BodyPoses& poses,
@@ -74,7 +55,9 @@ void report_match(const BodyScene& scene, const Carriers& carriers, const Carrie
   const std::vector<FixedImage> as_whole = scene.views.reduced_to(similarity_pixel_mm, about, 0.0);
   const std::vector<double> at_start = scene.fine.matches(as_whole, planned),
                             at_end = scene.fine.matches(as_whole, poses);
-  result.target_match = match_near_target(scene, target.setup_error * center_room_mm, poses);
+  const TargetMatch near = match_near_target(scene, target.setup_error * center_room_mm, poses);
+  result.target_match = near.of_all;
+  result.target_match_of_parts = near.of_parts;
   const Objective pixels(*scene.fine.as_one, level, about, {.similarity = SimilarityKind::kGradientCorrelation});
   const BodyObjective objective(scene.bodies, scene.fine.apart, pixels, BodyStage().tile_mm);
   const PoseSlots slots(scene.bodies, scene.fine.apart, poses);
