@@ -132,7 +132,8 @@ int check(int patient_count, std::optional<int> only) {
   std::map<std::string, Count> counts;
   bool wrong_accepted = false;
   fmt::print(
-      "ct,xrays,case,verdict,answer_of,mtre_mm,least_gradient_correlation,as_is,best_alternative,disagreeing,seconds,"
+      "ct,xrays,case,verdict,answer_of,target_match,match_of_parts,mtre_mm,least_gradient_correlation,as_is,best_"
+      "alternative,disagreeing,seconds,"
       "err_sigma,reasons\n");
   RegistrationOptions options = preset("setup");
   const auto one = [&](const RendererPyramid& renderers, const BentPatient& bent, int ct, int of,
@@ -143,10 +144,10 @@ int check(int patient_count, std::optional<int> only) {
     try {
       const std::vector<FixedImage> images = prepared(xrays);
       result = register_views(renderers, images, planned, options);
-      const Eigen::Vector3d target_mm = result.actual_room_from_patient * (planned.inverse() * options.target_room_mm);
+      const Eigen::Vector3d target_mm = result.actual_room_from_patient * *options.target_patient_mm;
       if (may_have_bent(options, images, target_mm, result)) register_bodies(bent, images, planned, options, result);
     } catch (const Error& error) {
-      fmt::print("{},{},{},error,,,,,,,,,,\"{}\"\n", ct, of, what, error.what());
+      fmt::print("{},{},{},error,,,,,,,,,,,,\"{}\"\n", ct, of, what, error.what());
       return;
     }
     const Eigen::Isometry3d found = result.actual_room_from_patient * planned.inverse();
@@ -168,14 +169,15 @@ int check(int patient_count, std::optional<int> only) {
     const Eigen::Isometry3d error = found * patients[static_cast<std::size_t>(of)].setup_error.inverse();
     const Eigen::AngleAxisd turn(error.linear());
     for (int axis = 0; axis < 3 && result.uncertainty; ++axis)
-      errors += fmt::format("{:.3f}/{:.3f} ", error.translation()[axis], result.uncertainty->translation_mm()[axis]);
+      errors +=
+          fmt::format("{:.3f}/{:.3f} ", error.translation()[axis], result.uncertainty->sigma_translation_mm()[axis]);
     for (int axis = 0; axis < 3 && result.uncertainty; ++axis)
       errors += fmt::format("{:.3f}/{:.3f} ", deg_from_rad(turn.angle() * turn.axis()[axis]),
-                            deg_from_rad(result.uncertainty->rotation_rad()[axis]));
+                            deg_from_rad(result.uncertainty->sigma_rotation_rad()[axis]));
     for (const std::string& reason : result.reasons) reasons += reason + "; ";
-    fmt::print("{},{},{},{},{},{:.2f},{:.3f},{:.3f},{:.3f},{:.3f},{:.2f},{},\"{}\"\n", ct, of, what,
-               to_string(result.verdict), result.bodies.empty() ? "whole" : "bodies", mtre_mm, least, as_is, best,
-               disagreeing, result.seconds, errors, reasons);
+    fmt::print("{},{},{},{},{},{:.3f},{:.3f},{:.2f},{:.3f},{:.3f},{:.3f},{:.3f},{:.2f},{},\"{}\"\n", ct, of, what,
+               to_string(result.verdict), result.bodies.empty() ? "whole" : "bodies", result.target_match,
+               result.target_match_of_parts, mtre_mm, least, as_is, best, disagreeing, result.seconds, errors, reasons);
     std::fflush(stdout);
     count.accepted += result.verdict == Verdict::kAccepted ? 1 : 0;
     wrong_accepted = wrong_accepted || (result.verdict == Verdict::kAccepted && (what != "right" || mtre_mm > 2.0));
@@ -190,10 +192,9 @@ int check(int patient_count, std::optional<int> only) {
     options.region = &region;
     const BodyMap bodies = find_bodies(hu);
     const Target target = target_of(bodies);
-    options.target_room_mm = target.center_room_mm;
+    options.target_patient_mm = planned.inverse() * target.center_room_mm;
     const BentPatient bent(hu, AttenuationModel{}, std::array{Beam::kKilovoltage},
-                           patient_bodies(bodies, soft_masks(bodies), planned.inverse() * target.center_room_mm),
-                           target, {});
+                           patient_bodies(bodies, soft_masks(bodies), *options.target_patient_mm), target, {});
     for (const auto& [what, xrays] : variants(patients[static_cast<std::size_t>(ct)].xrays))
       one(renderers, bent, ct, ct, what, xrays);
     const std::vector<XrayImage>& own = patients[static_cast<std::size_t>(ct)].xrays;

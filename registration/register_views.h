@@ -36,7 +36,7 @@ struct RegistrationOptions {
   bool check_vertebrae = false;             // along the spine; on request, for it takes as long as the registration
   RectanglesByLabel rectangles;             // of the views with these labels: nothing else of them is compared
   const ProjectedRegion* region = nullptr;  // borrowed; what of the views is compared. nullptr: all
-  Eigen::Vector3d target_room_mm = Eigen::Vector3d::Zero();  // as planned; where it lies must be certain
+  std::optional<Eigen::Vector3d> target_patient_mm;  // where its place must be certain; nothing: at the isocenter
 
   // Throws UsageError naming the field and its value.
   void check() const;

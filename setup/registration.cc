@@ -25,17 +25,22 @@ const char* to_string(IrradiatedField::Origin origin) {
   return "";
 }
 
-Eigen::Vector3d Uncertainty::translation_mm() const { return covariance.diagonal().head<3>().cwiseSqrt(); }
+Eigen::Vector3d Uncertainty::sigma_translation_mm() const { return covariance.diagonal().head<3>().cwiseSqrt(); }
 
-Eigen::Vector3d Uncertainty::displacement_mm(const Eigen::Vector3d& point_room_mm) const {
+Eigen::Matrix3d Uncertainty::covariance_at_mm2(const Eigen::Vector3d& found_room_mm) const {
   Eigen::Matrix<double, 3, 6> per_motion;
-  per_motion << Eigen::Matrix3d::Identity(), -cross_matrix(point_room_mm);
-  return (per_motion * covariance * per_motion.transpose()).diagonal().cwiseSqrt();
+  per_motion << Eigen::Matrix3d::Identity(), -cross_matrix(found_room_mm);
+  return per_motion * covariance * per_motion.transpose();
 }
 
-Eigen::Vector3d Uncertainty::rotation_rad() const { return covariance.diagonal().tail<3>().cwiseSqrt(); }
+Eigen::Vector3d Uncertainty::sigma_at_mm(const Eigen::Vector3d& found_room_mm) const {
+  return covariance_at_mm2(found_room_mm).diagonal().cwiseSqrt();
+}
 
-Uncertainty uncertainty_of_independent_axes(const Eigen::Vector3d& translation_mm, const Eigen::Vector3d& rotation_rad) {
+Eigen::Vector3d Uncertainty::sigma_rotation_rad() const { return covariance.diagonal().tail<3>().cwiseSqrt(); }
+
+Uncertainty uncertainty_of_independent_axes(const Eigen::Vector3d& translation_mm,
+                                            const Eigen::Vector3d& rotation_rad) {
   Uncertainty uncertainty;
   uncertainty.covariance.diagonal() << translation_mm.cwiseAbs2(), rotation_rad.cwiseAbs2();
   return uncertainty;

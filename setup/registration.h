@@ -71,9 +71,12 @@ struct Uncertainty {
 
   // One standard deviation per axis: of where the isocenter's anatomy lies, of where anatomy lies that is found at a
   // point, and of the rotation vector.
-  Eigen::Vector3d translation_mm() const;
-  Eigen::Vector3d displacement_mm(const Eigen::Vector3d& point_room_mm) const;
-  Eigen::Vector3d rotation_rad() const;
+  Eigen::Vector3d sigma_translation_mm() const;
+  Eigen::Vector3d sigma_at_mm(const Eigen::Vector3d& found_room_mm) const;
+  Eigen::Vector3d sigma_rotation_rad() const;
+
+  // Of where anatomy lies that is found at a point.
+  Eigen::Matrix3d covariance_at_mm2(const Eigen::Vector3d& found_room_mm) const;
 };
 
 // From one standard deviation per axis.
@@ -117,6 +120,7 @@ struct StructureMotion {
   std::string name;
   Eigen::Vector3d displacement_mm = Eigen::Vector3d::Zero();  // of its center
   double most_mm = 0.0;                                       // of points of its surface
+  bool is_determined = true;                                  // the bones near it are, and do not breathe
 };
 
 struct Registration {

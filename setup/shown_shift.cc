@@ -98,8 +98,8 @@ ShownShift shown_shift(const SetupResult& result) {
   shown.setup_error_mm = determined(setup_error.translation(), result.unobservable_room);
   shown.setup_error_deg = {deg_from_rad(error.x_rad), deg_from_rad(error.y_rad), deg_from_rad(error.z_rad)};
   if (result.uncertainty) {
-    shown.sigma_mm = determined(result.uncertainty->translation_mm(), result.unobservable_room);
-    const Eigen::Vector3d sigma_rad = result.uncertainty->rotation_rad();
+    shown.sigma_mm = determined(result.uncertainty->sigma_translation_mm(), result.unobservable_room);
+    const Eigen::Vector3d sigma_rad = result.uncertainty->sigma_rotation_rad();
     for (int axis = 0; axis < 3 && !result.translation_only; ++axis)
       shown.sigma_deg[axis] = deg_from_rad(sigma_rad[axis]);
   }
@@ -107,7 +107,7 @@ ShownShift shown_shift(const SetupResult& result) {
     shown.target_mm = determined(displacement_mm(setup_error, target_mm), result.unobservable_room);
     if (result.uncertainty)
       shown.target_sigma_mm =
-          determined(result.uncertainty->displacement_mm(setup_error * target_mm), result.unobservable_room);
+          determined(result.uncertainty->sigma_at_mm(setup_error * target_mm), result.unobservable_room);
   }
   shown.withheld = result.verdict == Verdict::kRejected;
   std::vector<Eigen::Vector3d> unobservable_table;
@@ -119,10 +119,10 @@ ShownShift shown_shift(const SetupResult& result) {
   shown.couch_deg = yaw_pitch_roll_deg(shift.change);
   shown.couch_target_deg = yaw_pitch_roll_deg(shift.target);
   if (result.uncertainty) {
-    // The table's axes are the room's turned about z.
+    // Of the target, which the shift brings right. The table's axes are the room's turned about z.
     const Eigen::Matrix3d table_from_room = rotation_z(-result.table.yaw_rad());
     const Eigen::Vector3d variance =
-        (table_from_room * result.uncertainty->covariance.topLeftCorner<3, 3>() * table_from_room.transpose())
+        (table_from_room * result.uncertainty->covariance_at_mm2(setup_error * target_mm) * table_from_room.transpose())
             .diagonal();
     for (std::size_t axis = 0; axis < 3; ++axis)
       if (shown.couch_mm[axis]) shown.couch_sigma_mm[axis] = std::sqrt(variance[static_cast<Eigen::Index>(axis)]);

@@ -168,7 +168,8 @@ Json structures_json(const SetupResult& report) {
   for (const StructureMotion& structure : report.structures)
     list.push_back({{"name", structure.name},
                     {"displacement_mm", array_of(structure.displacement_mm)},
-                    {"most_mm", structure.most_mm}});
+                    {"most_mm", structure.most_mm},
+                    {"is_determined", structure.is_determined}});
   return list;
 }
 

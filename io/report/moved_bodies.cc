@@ -79,6 +79,13 @@ std::string value_of(const Moved& body, LengthUnit unit) {
   return words;
 }
 
+std::string structure_words(const StructureMotion& structure, LengthUnit unit) {
+  if (!structure.is_determined) return kNotDetermined;
+  return fmt::format("its center lies {} {} off, its surface {} {} at most, if it goes with the bones near it",
+                     unsigned_length(structure.displacement_mm.norm(), unit), name_of(unit),
+                     unsigned_length(structure.most_mm, unit), name_of(unit));
+}
+
 // How the spine bends on one side of the target: the way its last vertebra that is determined is turned. Empty: not
 // told.
 std::string spine_words(const std::vector<Moved>& moved, int side) {
@@ -130,11 +137,7 @@ ReportPage::Section moved_section(const ShownShift& shown, const std::vector<Str
       {"Bone", "how far its center lies off once the target is right, +/- two sigma; how it is turned"});
   for (const Moved& body : shown.moved) section.rows.push_back({printable(body.name), value_of(body, unit)});
   for (const StructureMotion& structure : structures)
-    section.rows.push_back(
-        {"Structure " + printable(structure.name),
-         fmt::format("its center lies {} {} off, its surface {} {} at most, if it goes with the bones near it",
-                     unsigned_length(structure.displacement_mm.norm(), unit), name_of(unit),
-                     unsigned_length(structure.most_mm, unit), name_of(unit))});
+    section.rows.push_back({"Structure " + printable(structure.name), structure_words(structure, unit)});
   section.rows.push_back({"Arrows in the pictures",
                           fmt::format("what lies off by 1 mm and more, {:.0f} times as long", kMotionMagnified)});
   return section;

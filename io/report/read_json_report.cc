@@ -247,11 +247,15 @@ SetupResult report_from(const Json& json) {
   for (const Json& structure : json.value("structures", Json::array()))
     report.structures.push_back({.name = structure.at("name"),
                                  .displacement_mm = vector_from<3>(structure.at("displacement_mm")),
-                                 .most_mm = structure.at("most_mm")});
+                                 .most_mm = structure.at("most_mm"),
+                                 .is_determined = structure.at("is_determined")});
   if (!report.bodies.empty() && report.target) {
     report.target_image_share = json.at("target").at("image_share");
-    report.target_match = json.at("target").value("match", 0.0);
-    report.target_match_of_parts = json.at("target").value("match_of_parts", 0.0);
+    const auto match = [&](const char* name) {
+      return json.at("target").contains(name) ? or_nan(json.at("target").at(name)) : 0.0;
+    };
+    report.target_match = match("match");
+    report.target_match_of_parts = match("match_of_parts");
     report.target_deformation_mm = json.at("target").at("deformation_mm");
   }
   const Json& error = json.at("setup_error");

@@ -247,7 +247,7 @@ void put_shift(const SetupResult& report, const ShownShift& shown, LengthUnit un
     for (std::size_t n = 3; n < 6; ++n) page.setup_error[n] = taken_as_zero(page.setup_error[n].name);
   if (report.unobservable_room.empty()) {
     std::optional<double> two_sigma_mm;
-    if (report.uncertainty) two_sigma_mm = 2.0 * report.uncertainty->translation_mm().maxCoeff();
+    if (report.uncertainty) two_sigma_mm = 2.0 * report.uncertainty->sigma_translation_mm().maxCoeff();
     const std::string text = rounded_length(report.setup_error.translation().norm(), unit, two_sigma_mm);
     page.setup_error_length =
         fmt::format("Length of the translation {} {}", text.substr(text.starts_with('+') ? 1 : 0), name_of(unit));
@@ -275,8 +275,9 @@ const char* meaning(Verdict verdict) {
 
 std::string picture_words(const SetupResult& report) {
   std::string words =
-      "Both: X-ray magenta, DRR green, gray where they match. Cross: isocenter. Dashed: compared field. Orange: "
-      "structures.";
+      "Both: X-ray magenta, DRR green, gray where they match. Cross: isocenter. Dashed: compared field.";
+  const auto has_structures = [](const SetupResult::View& view) { return !view.picture.structures.empty(); };
+  if (std::ranges::any_of(report.views, has_structures)) words += " Orange: structures.";
   const auto has_squares = [](const SetupResult::View& view) { return !mismatch_marks(view).squares.empty(); };
   if (std::ranges::any_of(report.views, has_squares)) words += " Yellow squares: parts that match elsewhere.";
   const auto has_arrows = [](const SetupResult::View& view) { return !view.picture.moved.empty(); };

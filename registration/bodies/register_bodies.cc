@@ -98,7 +98,7 @@ std::vector<BodyMotion> motions_of(const JointedBodies& bodies, const BodyRender
     difference.middleCols<6>(static_cast<Eigen::Index>(6 * n)) += Eigen::Matrix<double, 6, 6>::Identity();
     Eigen::Matrix<double, 3, 6> at_center;
     at_center << Eigen::Matrix3d::Identity(), -cross_matrix(poses[n].front() * renderers.center_patient_mm(n));
-    const Eigen::MatrixXd per_motions = at_center * difference;
+    const Eigen::MatrixXd per_motions = target.setup_error.linear().transpose() * at_center * difference;
     const Vector3d variance = (per_motions * certainty.covariance * per_motions.transpose()).diagonal();
     Eigen::MatrixXd own = Eigen::MatrixXd::Zero(3, difference.cols());
     own.middleCols<6>(static_cast<Eigen::Index>(6 * n)) = at_center;
@@ -116,15 +116,34 @@ std::vector<BodyMotion> motions_of(const JointedBodies& bodies, const BodyRender
   return motions;
 }
 
-// What lies near bones goes with these.
+// What part of a structure goes with bones that the images determine, and that lie at one place in all views. `motions`
+// are of all bodies but those of soft tissue.
+double determined_share(std::span<const double> shares, const JointedBodies& bodies,
+                        std::span<const BodyMotion> motions) {
+  double share = 0.0;
+  auto motion = motions.begin();
+  for (std::size_t n = 0; n < bodies.bodies.size(); ++n) {
+    if (bodies.bodies[n].is_soft) continue;
+    if (motion->is_determined() && !motion->breathes) share += shares[n];
+    ++motion;
+  }
+  return share;
+}
+
+// Structures near bones are taken to go with the bones near them.
 std::vector<StructureMotion> motions_of_structures(const BentPatient& patient, const Eigen::Isometry3d& planned,
-                                                   const Eigen::Isometry3d& setup_error, const BodyPoses& poses) {
+                                                   const Eigen::Isometry3d& setup_error, const BodyPoses& poses,
+                                                   std::span<const BodyMotion> bones) {
+  constexpr double kMost = 0.8;
   std::vector<StructureMotion> motions;
   for (const Target& structure : patient.structures) {
     const Carriers carriers(patient.parts, structure, planned);
     if (!carriers.exist()) continue;
     const Carriers::Off off = carriers.off_from(setup_error, poses);
-    motions.push_back({.name = structure.name, .displacement_mm = off.center_mm, .most_mm = off.most_mm});
+    motions.push_back({.name = structure.name,
+                       .displacement_mm = off.center_mm,
+                       .most_mm = off.most_mm,
+                       .is_determined = determined_share(carriers.shares(), patient.parts.bodies, bones) >= kMost});
   }
   return motions;
 }
@@ -207,7 +226,8 @@ void register_bodies(const BentPatient& patient, std::span<const FixedImage> ima
                found.poses, 2.0 * options.stages.back().pixel_mm, result);
   result.bodies = motions_of(patient.parts.bodies, patient.fine.apart, carriers, target, planned_room_from_patient,
                              found.poses, certainty);
-  result.structures = motions_of_structures(patient, planned_room_from_patient, target.setup_error, found.poses);
+  result.structures =
+      motions_of_structures(patient, planned_room_from_patient, target.setup_error, found.poses, result.bodies);
   std::ranges::copy(found.alternatives, std::back_inserter(result.alternatives));
   judge(parameters_from_setup_error(target.setup_error), options, result);
   result.seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();

@@ -1,7 +1,9 @@
 #include "registration/bodies/target_match.h"
 
 #include <algorithm>
+#include <cmath>
 #include <map>
+#include <utility>
 #include <vector>
 
 namespace isoshift {
@@ -47,29 +49,45 @@ Eigen::VectorXd values_of(const std::vector<float>& all, const std::vector<std::
   return values.array() - values.mean();
 }
 
+// Of pairs of value and weight.
+double weighted_median(std::vector<std::pair<double, double>> values) {
+  std::ranges::sort(values);
+  double all = 0.0, below = 0.0;
+  for (const auto& [value, weight] : values) all += weight;
+  for (const auto& [value, weight] : values) {
+    below += weight;
+    if (below > 0.5 * all) return value;
+  }
+  return 0.0;
+}
+
+double match_of_parts(const XrayView& view, std::span<const std::uint32_t> compared, const Gradients& xray,
+                      const Gradients& drr) {
+  std::vector<std::pair<double, double>> correlations;
+  for (const std::vector<std::size_t>& part : parts_of(view, compared))
+    for (const auto direction : {&Gradients::along_row, &Gradients::along_column}) {
+      const Eigen::VectorXd there = values_of(xray.*direction, part), here = values_of(drr.*direction, part);
+      const double norms = there.norm() * here.norm();
+      correlations.emplace_back(norms > 0.0 ? there.dot(here) / norms : 0.0, here.norm());
+    }
+  return weighted_median(std::move(correlations));
+}
+
 }  // namespace
 
 TargetMatch match_near_target(const BodyScene& scene, const Vector3d& target_room_mm, const BodyPoses& poses) {
   const std::vector<FixedImage> level = surroundings(scene, target_room_mm);
   const Objective pixels(*scene.fine.as_one, level, poses.front().front(),
                          {.similarity = SimilarityKind::kGradientCorrelation});
+  const double share = 1.0 / static_cast<double>(level.size());
   TargetMatch match;
-  double sum = 0.0, weights = 0.0;
   for (std::size_t view = 0; view < level.size(); ++view) {
     const Comparison& comparison = pixels.comparison(view);
     const std::vector<float> drr = scene.fine.line_integrals(pixels, poses, view);
-    match.of_all += comparison.of(drr) / static_cast<double>(level.size());
-    const Gradients found = gradients(drr, comparison.neighbors());
-    for (const std::vector<std::size_t>& part : parts_of(pixels.views()[view], pixels.compared_pixels(view)))
-      for (const auto direction : {&Gradients::along_row, &Gradients::along_column}) {
-        const Eigen::VectorXd xray = values_of(comparison.xray_gradients().*direction, part);
-        const Eigen::VectorXd here = values_of(found.*direction, part);
-        const double weight = here.norm();
-        if (xray.norm() > 0.0) sum += xray.dot(here) / xray.norm();  // correlation times weight
-        weights += weight;
-      }
+    match.of_all += share * comparison.of(drr);
+    match.of_parts += share * match_of_parts(pixels.views()[view], pixels.compared_pixels(view),
+                                             comparison.xray_gradients(), gradients(drr, comparison.neighbors()));
   }
-  match.of_parts = weights > 0.0 ? sum / weights : 0.0;
   return match;
 }
 

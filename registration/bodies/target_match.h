@@ -9,8 +9,8 @@ struct TargetMatch {
   // Gradient correlation near the target, mean over the views. On coarse pixels noise hardly counts: what does not
   // match there is other anatomy, or the same anatomy with other contrast.
   double of_all = 0.0;
-  // The same of small parts, each for itself, weighted by the gradients that the DRR has there: contrast that has
-  // changed spoils the parts that show its edges, another patient's anatomy spoils most.
+  // The same of small parts, each for itself: their median in a view, weighted by the gradients that the DRR has
+  // there. Contrast that has changed spoils the parts that show its edges, another patient's anatomy spoils most.
   double of_parts = 0.0;
 };
 

@@ -133,13 +133,15 @@ std::optional<Uncertainty> estimated_uncertainty(Objective& objective, const Eig
 
 Uncertainty widened_to_spread(const Uncertainty& uncertainty, double spread_mm, double spread_rad) {
   constexpr double kSigmas = 4.0;
-  const auto factor = [](const Eigen::Vector3d& sigma, double spread) {
-    return sigma.isZero() ? 1.0 : std::max(1.0, spread / (kSigmas * sigma.norm()));
+  // Added to what there is, and not scaled: no point may become more certain by it.
+  const auto added = [](const Eigen::Vector3d& sigma, double spread) -> Eigen::Vector3d {
+    const double factor = sigma.isZero() ? 1.0 : std::max(1.0, spread / (kSigmas * sigma.norm()));
+    return (factor * factor - 1.0) * sigma.cwiseAbs2();
   };
-  Eigen::Matrix<double, 6, 1> factors;
-  factors << Eigen::Vector3d::Constant(factor(uncertainty.translation_mm(), spread_mm)),
-      Eigen::Vector3d::Constant(factor(uncertainty.rotation_rad(), spread_rad));
-  return {.covariance = factors.asDiagonal() * uncertainty.covariance * factors.asDiagonal()};
+  Uncertainty widened = uncertainty;
+  widened.covariance.diagonal().head<3>() += added(uncertainty.sigma_translation_mm(), spread_mm);
+  widened.covariance.diagonal().tail<3>() += added(uncertainty.sigma_rotation_rad(), spread_rad);
+  return widened;
 }
 
 }  // namespace isoshift

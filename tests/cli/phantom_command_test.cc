@@ -20,8 +20,8 @@ CommandOutcome make_phantom(const std::filesystem::path& folder, std::vector<std
   return run_command(arguments);
 }
 
-// KVP, ReportedValuesOrigin and PatientPosition of a RADIOGRAPH are what real exports hold (docs/dicom.md 6.3). The plan
-// is one for setup: its beams have one control point and no jaws.
+// KVP, ReportedValuesOrigin and PatientPosition of a RADIOGRAPH are what real exports hold (docs/dicom.md 6.3). The
+// plan is one for setup: its beams have one control point and no jaws.
 TEST(PhantomCommand, MakesAStudyInWhichDciodvfyFindsOnlyWhatIsMeant) {
   TemporaryFolder folder;
   ASSERT_EQ(make_phantom(folder / "study", {"--bend", "neck:3"}).exit_status, 0);
@@ -34,15 +34,15 @@ TEST(PhantomCommand, MakesAStudyInWhichDciodvfyFindsOnlyWhatIsMeant) {
     std::istringstream lines(checked.out);
     for (std::string line; std::getline(lines, line);) {
       if (!line.starts_with("Error")) continue;
-      EXPECT_THAT(line, testing::AnyOf(HasSubstr("/KVP("), HasSubstr("/ReportedValuesOrigin("),
-                                       HasSubstr("/PatientPosition("), HasSubstr("/BeamLimitingDeviceSequence("),
-                                       HasSubstr("/ControlPointSequence(")))
+      EXPECT_THAT(
+          line, testing::AnyOf(HasSubstr("/KVP("), HasSubstr("/ReportedValuesOrigin("), HasSubstr("/PatientPosition("),
+                               HasSubstr("/BeamLimitingDeviceSequence("), HasSubstr("/ControlPointSequence(")))
           << file;
     }
   }
 }
 
-// Its mask is a ball, too: contours that are not parallel to the slices would be refused.
+// Contours that are not parallel to the slices are refused.
 TEST(PhantomCommand, TheTargetOfATiltedCtIsDrawnOnItsSlices) {
   TemporaryFolder folder;
   ASSERT_EQ(make_phantom(folder / "study", {"--bend", "neck:3", "--ct-tilt", "12"}).exit_status, 0);

@@ -64,6 +64,18 @@ TEST(IrradiatedField, FieldsThatWereOnceWrongAndSureAreFoundOrNotSure) {
   }
 }
 
+// Dense bone along an edge scatters the places at which its blocks see it by more than a millimeter, but nothing else
+// than a collimator makes such edges on all four sides.
+TEST(IrradiatedField, AnEdgeOverDenseBoneIsSureWhereTheOtherEdgesArePlain) {
+  for (const std::uint64_t seed : {2028, 2194, 2262, 2395, 2537}) {
+    const CollimatedXray scene = random_collimated_xray(seed);
+    const XrayImage xray = xray_of(scene);
+    const IrradiatedField field = field_of(xray);
+    EXPECT_TRUE(field.is_sure()) << "seed " << seed << ": " << field.doubt;
+    EXPECT_LE(field_error_mm(scene, xray.view, field.corners_px), 1.0) << "seed " << seed;
+  }
+}
+
 // The outline of a patient, rods and a couch are no collimator.
 TEST(IrradiatedField, AnOpenFieldIsTheWholeReceptor) {
   for (std::uint64_t seed = 1101; seed <= 1140; ++seed) {

@@ -79,8 +79,8 @@ TEST(RegisterViews, AcceptsWhatItFindsAndSaysHowSureItIs) {
   EXPECT_THAT(setup_error_from_poses(scene.planned, result.actual_room_from_patient), PoseNear(scene.truth, 0.3, 0.2));
   EXPECT_EQ(result.verdict, Verdict::kAccepted) << testing::PrintToString(result.reasons);
   ASSERT_TRUE(result.uncertainty);
-  EXPECT_GT(result.uncertainty->translation_mm().minCoeff(), 0.0);
-  EXPECT_GT(result.uncertainty->rotation_rad().minCoeff(), 0.0);
+  EXPECT_GT(result.uncertainty->sigma_translation_mm().minCoeff(), 0.0);
+  EXPECT_GT(result.uncertainty->sigma_rotation_rad().minCoeff(), 0.0);
   EXPECT_EQ(result.alternatives.size(), 5U);  // two views mirrored, turned, and exchanged
   ASSERT_EQ(result.views.size(), 2U);
   for (const ViewMatch& view : result.views) {

@@ -39,10 +39,10 @@ TEST(Uncertainty, MoreNoiseMakesEveryAxisLessCertain) {
   const auto noisy = uncertainty_at_truth(make_scene(small_scene(50.0)));
   ASSERT_TRUE(quiet && noisy);
   for (int axis = 0; axis < 3; ++axis) {
-    EXPECT_GT(quiet->translation_mm()[axis], 0.0);
-    EXPECT_GT(quiet->rotation_rad()[axis], 0.0);
-    EXPECT_GT(noisy->translation_mm()[axis], 1.5 * quiet->translation_mm()[axis]) << axis;
-    EXPECT_GT(noisy->rotation_rad()[axis], 1.5 * quiet->rotation_rad()[axis]) << axis;
+    EXPECT_GT(quiet->sigma_translation_mm()[axis], 0.0);
+    EXPECT_GT(quiet->sigma_rotation_rad()[axis], 0.0);
+    EXPECT_GT(noisy->sigma_translation_mm()[axis], 1.5 * quiet->sigma_translation_mm()[axis]) << axis;
+    EXPECT_GT(noisy->sigma_rotation_rad()[axis], 1.5 * quiet->sigma_rotation_rad()[axis]) << axis;
   }
 }
 
@@ -74,7 +74,7 @@ TEST(Uncertainty, SaysHowFarOffNoisyRegistrationsEnd) {
                                             {.translation_only = false, .voxel_mm = scene.renderers->voxel_mm()});
     ASSERT_TRUE(said);
     Eigen::Matrix<double, 6, 1> of_draw;
-    of_draw << said->translation_mm(), said->rotation_rad();
+    of_draw << said->sigma_translation_mm(), said->sigma_rotation_rad();
     sigma += of_draw / kDraws;
   }
   for (int axis = 0; axis < 6; ++axis) {
@@ -98,18 +98,26 @@ TEST(Uncertainty, OfABallIsNotAccepted) {
         register_views(*scene.renderers, prepared(scene.xrays), scene.planned, preset("setup"));
     EXPECT_NE(result.verdict, Verdict::kAccepted);
     ASSERT_TRUE(result.uncertainty);
-    EXPECT_GT(result.uncertainty->rotation_rad().minCoeff(), rad_from_deg(0.5));
+    EXPECT_GT(result.uncertainty->sigma_rotation_rad().minCoeff(), rad_from_deg(0.5));
   }
 }
 
 TEST(Uncertainty, IsAtLeastAQuarterOfTheSpreadOfRestarts) {
   const Uncertainty curvature = uncertainty_of_independent_axes({0.1, 0.2, 0.2}, {0.003, 0.0, 0.004});
   const Uncertainty widened = widened_to_spread(curvature, /*spread_mm=*/1.0, /*spread_rad=*/0.2);
-  EXPECT_EQ(widened.translation_mm(), curvature.translation_mm());  // 0.3 mm in all: four sigma are 1.2 mm
-  EXPECT_NEAR(widened.rotation_rad().norm(), 0.05, 1e-12);
-  EXPECT_NEAR(widened.rotation_rad().x() / widened.rotation_rad().z(), 0.75, 1e-12);
+  EXPECT_EQ(widened.sigma_translation_mm(), curvature.sigma_translation_mm());  // 0.3 mm in all: four sigma are 1.2 mm
+  EXPECT_NEAR(widened.sigma_rotation_rad().norm(), 0.05, 1e-12);
+  EXPECT_NEAR(widened.sigma_rotation_rad().x() / widened.sigma_rotation_rad().z(), 0.75, 1e-12);
+  // No point becomes more certain, also where translation and rotation go together.
+  Uncertainty about_a_point = uncertainty_of_independent_axes({0.1, 0.1, 0.1}, {0.003, 0.003, 0.003});
+  Eigen::Matrix<double, 6, 6> moved = Eigen::Matrix<double, 6, 6>::Identity();
+  moved.topRightCorner<3, 3>() = cross_matrix({0, 100, 0});
+  about_a_point.covariance = moved * about_a_point.covariance * moved.transpose();
+  const Uncertainty wider = widened_to_spread(about_a_point, /*spread_mm=*/0.0, /*spread_rad=*/0.1);
+  for (const double y : {0.0, 25.0, 50.0, 100.0})
+    EXPECT_TRUE((wider.sigma_at_mm({0, y, 0}).array() >= about_a_point.sigma_at_mm({0, y, 0}).array()).all()) << y;
   const Uncertainty of_translation = uncertainty_of_independent_axes({0.1, 0.1, 0.1}, Vector3d::Zero());
-  EXPECT_EQ(widened_to_spread(of_translation, 0.0, 0.1).rotation_rad(), Vector3d::Zero());
+  EXPECT_EQ(widened_to_spread(of_translation, 0.0, 0.1).sigma_rotation_rad(), Vector3d::Zero());
 }
 
 // A cylinder along the patient (room y) may turn about it and, longer than the views, move along it.
@@ -120,8 +128,8 @@ TEST(Uncertainty, OfALongCylinderIsAbsentOrLargeAlongIt) {
   options.ct_mm = Vector3d(120, 120, 300);
   const auto uncertainty = uncertainty_at_truth(make_scene(options), /*translation_only=*/true);
   if (uncertainty) {
-    EXPECT_GT(uncertainty->translation_mm().y(), 5.0 * uncertainty->translation_mm().x());
-    EXPECT_GT(2.0 * uncertainty->translation_mm().y(), 1.0);
+    EXPECT_GT(uncertainty->sigma_translation_mm().y(), 5.0 * uncertainty->sigma_translation_mm().x());
+    EXPECT_GT(2.0 * uncertainty->sigma_translation_mm().y(), 1.0);
   }
 }
 
@@ -129,11 +137,11 @@ TEST(Uncertainty, OfTranslationsTakesRotationsAsKnown) {
   const RegistrationScene scene = make_scene(small_scene(200.0));
   const auto all = uncertainty_at_truth(scene), translation = uncertainty_at_truth(scene, true);
   ASSERT_TRUE(all && translation);
-  EXPECT_EQ(translation->rotation_rad(), Vector3d::Zero());
+  EXPECT_EQ(translation->sigma_rotation_rad(), Vector3d::Zero());
   for (int axis = 0; axis < 3; ++axis) {
-    EXPECT_GT(translation->translation_mm()[axis], 0.0);
+    EXPECT_GT(translation->sigma_translation_mm()[axis], 0.0);
     // Fewer unknowns: hardly ever more uncertain.
-    EXPECT_LT(translation->translation_mm()[axis], 1.3 * all->translation_mm()[axis]);
+    EXPECT_LT(translation->sigma_translation_mm()[axis], 1.3 * all->sigma_translation_mm()[axis]);
   }
 }
 
@@ -146,9 +154,9 @@ TEST(Uncertainty, IsLargerWithAVolumeOfInterestAndWithCoarserVoxels) {
   const Uncertainty fine = with({.voxel_mm = 1.0}), coarse = with({.voxel_mm = 10.0});
   const Uncertainty overlapped = with({.voxel_mm = 1.0, .has_volume_of_interest = true});
   for (int axis = 0; axis < 3; ++axis) {
-    EXPECT_GT(coarse.translation_mm()[axis], fine.translation_mm()[axis]);
-    EXPECT_GT(overlapped.translation_mm()[axis], 1.2 * fine.translation_mm()[axis]);
-    EXPECT_GT(overlapped.rotation_rad()[axis], 1.2 * fine.rotation_rad()[axis]);
+    EXPECT_GT(coarse.sigma_translation_mm()[axis], fine.sigma_translation_mm()[axis]);
+    EXPECT_GT(overlapped.sigma_translation_mm()[axis], 1.2 * fine.sigma_translation_mm()[axis]);
+    EXPECT_GT(overlapped.sigma_rotation_rad()[axis], 1.2 * fine.sigma_rotation_rad()[axis]);
   }
 }
 
@@ -157,8 +165,8 @@ TEST(Uncertainty, OneViewIsLessCertainAlongItsRays) {
   options.gantry_angles_deg = {0.0};
   const auto one = uncertainty_at_truth(make_scene(options));
   ASSERT_TRUE(one);
-  EXPECT_GT(one->translation_mm().z(), 3.0 * one->translation_mm().x());
-  EXPECT_GT(one->translation_mm().z(), 3.0 * one->translation_mm().y());
+  EXPECT_GT(one->sigma_translation_mm().z(), 3.0 * one->sigma_translation_mm().x());
+  EXPECT_GT(one->sigma_translation_mm().z(), 3.0 * one->sigma_translation_mm().y());
 }
 
 }  // namespace

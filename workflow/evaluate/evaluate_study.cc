@@ -15,6 +15,7 @@
 #include "geometry/target_error.h"
 #include "registration/quality/judge.h"
 #include "setup/couch_shift.h"
+#include "workflow/evaluate/compared_bodies.h"
 #include "workflow/register/target_of.h"
 #include "workflow/register/target_registration.h"
 
@@ -31,10 +32,20 @@ Json rows_of(const Eigen::Isometry3d& transform) {
   return rows;
 }
 
+Json rows_of(const std::vector<BodyTruth>& truths) {
+  Json rows = Json::array();
+  for (const BodyTruth& truth : truths) {
+    Json row = rows_of(truth.setup_error);
+    for (const double component : truth.center_patient_mm) row.push_back(component);
+    rows.push_back(std::move(row));
+  }
+  return rows;
+}
+
 // All that the runs depend on: an evaluation is continued only where it is the same.
 Json configuration_of(const RegistrationRequest& request, const std::string& intensity, const Study& study,
-                      const Renderer& renderer, const Target& target, const Eigen::Isometry3d& truth,
-                      const StartProtocol& protocol) {
+                      const Renderer& renderer, const Target& target, const EvaluateOptions& options) {
+  const StartProtocol& protocol = options.protocol;
   Json images = Json::array(), settings = Json::object();
   for (const RtImage& image : study.rt_images) images.push_back(image.sop_instance_uid);
   for (const auto& [name, value] : request.rendering.settings()) settings[name] = value;
@@ -50,7 +61,8 @@ Json configuration_of(const RegistrationRequest& request, const std::string& int
   return {{"program", fmt::format("isoshift {} ({})", kVersion, kCommit)},
           {"ct_series", study.ct->series_instance_uid},
           {"images", images},
-          {"truth", rows_of(truth)},
+          {"truth", rows_of(options.truth)},
+          {"body_truths", rows_of(options.body_truths)},
           {"planned_room_from_patient", rows_of(study.planned_room_from_patient)},
           {"cameras", cameras},  // columns of each matrix
           {"intensity", intensity},
@@ -122,8 +134,8 @@ void add_errors(const RegistrationResult& result, const Eigen::Isometry3d& truth
   }
   if (!result.uncertainty) return;
   run.sigma.emplace();
-  const Eigen::Vector3d sigma_mm = result.uncertainty->translation_mm();
-  const Eigen::Vector3d sigma_rad = result.uncertainty->rotation_rad();
+  const Eigen::Vector3d sigma_mm = result.uncertainty->sigma_translation_mm();
+  const Eigen::Vector3d sigma_rad = result.uncertainty->sigma_rotation_rad();
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const auto n = static_cast<Eigen::Index>(axis);
     (*run.sigma)[axis] = sigma_mm[n];
@@ -211,9 +223,8 @@ EvaluationFolder evaluate_study(const EvaluateOptions& options, Notes& notes, Ob
   BodyStore bodies;
   const RegistrationSetup setup(options.registration, study, beams_of(study), renderers);
   const TargetRegistration registration(study, options.registration, setup, choice, surrogate, bodies);
-  EvaluationFolder folder(
-      options.output, configuration_of(options.registration, options.study.intensity, study, setup.renderers().finest(),
-                                       choice.target, options.truth, options.protocol));
+  EvaluationFolder folder(options.output, configuration_of(options.registration, options.study.intensity, study,
+                                                           setup.renderers().finest(), choice.target, options));
   run_missing(folder, study, choice.target, registration, options, jobs, observer);
   folder.write_summary();
   return folder;

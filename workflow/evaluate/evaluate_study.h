@@ -5,11 +5,11 @@
 #include <filesystem>
 
 #include "registration/evaluate.h"
-#include "workflow/evaluate/body_truth.h"
 #include "workflow/evaluate/evaluation_files.h"
 #include "workflow/observer.h"
 #include "workflow/register/registration_setup.h"
 #include "workflow/register/study_options.h"
+#include "workflow/register/truth.h"
 
 namespace isoshift {
 

@@ -102,6 +102,8 @@ EvaluatedRun run_of(const std::string& line) {
   return run;
 }
 
+Json if_determined(const BodySummary& body, double value) { return body.determined > 0 ? Json(value) : Json(nullptr); }
+
 Json json_of(const EvaluationSummary& summary) {
   Json json = {{"runs", summary.runs},
                {"successes", summary.successes},
@@ -126,10 +128,10 @@ Json json_of(const EvaluationSummary& summary) {
     json["bodies"].push_back({{"name", body.name},
                               {"runs", body.runs},
                               {"determined", body.determined},
-                              {"median_true_mm", body.median_true_mm},
-                              {"median_error_mm", body.median_error_mm},
-                              {"share_within_one_sigma", body.within_one_sigma},
-                              {"share_within_two_sigma", body.within_two_sigma}});
+                              {"median_true_mm", if_determined(body, body.median_true_mm)},
+                              {"median_error_mm", if_determined(body, body.median_error_mm)},
+                              {"share_within_one_sigma", if_determined(body, body.within_one_sigma)},
+                              {"share_within_two_sigma", if_determined(body, body.within_two_sigma)}});
   if (summary.within_one_sigma) json["share_within_one_sigma"] = *summary.within_one_sigma;
   if (summary.within_two_sigma) json["share_within_two_sigma"] = *summary.within_two_sigma;
   return json;
@@ -189,6 +191,9 @@ EvaluationFolder::EvaluationFolder(std::filesystem::path path, Json configuratio
                       "-o, or remove this one",
                       path_.string()));
     read_runs();
+    std::string bodies = std::string(kBodiesHeader) + "\n";
+    for (const EvaluatedRun& run : runs_) bodies += lines_of_bodies(run);
+    replace_text(path_ / kBodiesFile, bodies);
     return;
   }
   if (std::filesystem::exists(path_) && !std::filesystem::is_empty(path_))
@@ -227,9 +232,11 @@ void EvaluationFolder::read_runs() {
   read_bodies();
 }
 
-// Bodies are written before the line of their run: those of a run that was stopped are left out, and made again.
+// Bodies are written before the line of their run: those of a run that was stopped are left out, and made again with
+// it. Evaluations of before 2026-11-24 have no such file.
 void EvaluationFolder::read_bodies() {
   std::ifstream stream(path_ / kBodiesFile);
+  if (!stream) return;
   std::string line;
   std::getline(stream, line);
   if (line != kBodiesHeader) throw Error(fmt::format("{}: is of another version", (path_ / kBodiesFile).string()));
@@ -238,9 +245,6 @@ void EvaluationFolder::read_bodies() {
     } catch (const std::exception&) {
       throw Error(fmt::format("{}: line {} cannot be read: {}", (path_ / kBodiesFile).string(), number, line));
     }
-  std::string whole = std::string(kBodiesHeader) + "\n";
-  for (const EvaluatedRun& run : runs_) whole += lines_of_bodies(run);
-  replace_text(path_ / kBodiesFile, whole);
 }
 
 bool EvaluationFolder::has(int number) const {

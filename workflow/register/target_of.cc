@@ -141,8 +141,7 @@ std::vector<Target> structures_beside(const std::string& target, const Study& st
         std::ranges::find(kToldOf, structure.interpreted_type) == kToldOf.end())
       continue;
     try {
-      if (const Candidate candidate = candidate_of(structure, study); candidate.voxels > 0)
-        beside.push_back(target_from(candidate, study, ""));
+      beside.push_back(target_from(candidate_of(structure, study), study, ""));
     } catch (const Error&) {
       continue;  // drawn across the slices, say: a registration must not fail for what it only tells of
     }

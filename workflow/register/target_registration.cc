@@ -28,7 +28,7 @@ TargetRegistration::TargetRegistration(const Study& study, const RegistrationReq
       surrogate_(surrogate),
       bodies_(bodies),
       options_(setup.options()) {
-  options_.target_room_mm = choice.target.center_room_mm;
+  options_.target_patient_mm = study.planned_room_from_patient.inverse() * choice.target.center_room_mm;
 }
 
 const BentPatient& TargetRegistration::bent_patient() const {

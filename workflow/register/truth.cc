@@ -13,22 +13,50 @@
 
 namespace isoshift {
 
-Eigen::Isometry3d read_setup_error(const std::filesystem::path& path) {
+namespace {
+
+nlohmann::json parsed(const std::filesystem::path& path) {
   std::ifstream file(path);
   if (!file) throw Error(fmt::format("{}: cannot be opened", path.string()));
+  return nlohmann::json::parse(file);
+}
+
+Eigen::Vector3d vector_from(const nlohmann::json& json) {
+  return {json.at(0).get<double>(), json.at(1).get<double>(), json.at(2).get<double>()};
+}
+
+Eigen::Isometry3d motion_from(const nlohmann::json& json) {
+  Eigen::Isometry3d motion = Eigen::Isometry3d::Identity();
+  motion.translation() = vector_from(json.at("translation_mm"));
+  for (int row = 0; row < 3; ++row)
+    motion.linear().row(row) = vector_from(json.at("rotation_matrix").at(static_cast<std::size_t>(row)));
+  return motion;
+}
+
+}  // namespace
+
+Eigen::Isometry3d read_setup_error(const std::filesystem::path& path) {
   try {
-    const nlohmann::json json = nlohmann::json::parse(file);
-    const nlohmann::json& error = json.contains("setup_error") ? json.at("setup_error") : json.at("setup_error_room");
-    Eigen::Isometry3d setup_error = Eigen::Isometry3d::Identity();
-    for (int row = 0; row < 3; ++row) {
-      setup_error.translation()[row] = error.at("translation_mm").at(row);
-      for (int column = 0; column < 3; ++column)
-        setup_error.linear()(row, column) = error.at("rotation_matrix").at(row).at(column);
-    }
-    return setup_error;
+    const nlohmann::json json = parsed(path);
+    return motion_from(json.contains("setup_error") ? json.at("setup_error") : json.at("setup_error_room"));
   } catch (const nlohmann::json::exception& error) {
     throw Error(fmt::format("{}: holds no complete setup error (a result.json or truth.json is needed): {}",
                             path.string(), error.what()));
+  }
+}
+
+std::vector<BodyTruth> read_body_truths(const std::filesystem::path& path) {
+  try {
+    const nlohmann::json json = parsed(path);
+    std::vector<BodyTruth> truths;
+    const char* const list = json.contains("bodies") ? "bodies" : "levels";
+    if (json.contains("setup_error") || !json.contains(list)) return truths;
+    for (const nlohmann::json& body : json.at(list))
+      truths.push_back(
+          {.center_patient_mm = vector_from(body.at("center_patient_mm")), .setup_error = motion_from(body)});
+    return truths;
+  } catch (const nlohmann::json::exception& error) {
+    throw Error(fmt::format("{}: the motions of its bodies cannot be read: {}", path.string(), error.what()));
   }
 }
 

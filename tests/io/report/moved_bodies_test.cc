@@ -90,6 +90,9 @@ TEST(MovedBodies, TheTableBeginsAtTheTarget) {
   EXPECT_EQ(rows[5].value, "not determined");
   EXPECT_EQ(rows[6].name, "Structure Spinal^Cord");
   EXPECT_EQ(rows[6].value, "its center lies 1.3 mm off, its surface 4.3 mm at most, if it goes with the bones near it");
+  SetupResult report = bent_report(Verdict::kAccepted);
+  report.structures[0].is_determined = false;
+  EXPECT_EQ(rows_of(report)[6].value, "not determined");
   EXPECT_EQ(rows[7].value, "what lies off by 1 mm and more, 5 times as long");
 }
 

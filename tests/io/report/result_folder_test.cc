@@ -54,13 +54,19 @@ TEST_F(ResultFolderTest, IsReadBackWhole) {
 }
 
 TEST_F(ResultFolderTest, WhatBodiesDidIsReadBack) {
-  const SetupResult bent = bent_report(Verdict::kAccepted);
+  SetupResult bent = bent_report(Verdict::kAccepted);
+  bent.target_match = 0.91;
+  bent.target_match_of_parts = 0.97;
   const SetupResult read = report_from_json(json_report(bent), "result.json");
   EXPECT_EQ(json_report(read), json_report(bent));
   ASSERT_EQ(read.bodies.size(), bent.bodies.size());
   EXPECT_EQ(read.target_deformation_mm, bent.target_deformation_mm);
   EXPECT_EQ(read.target_image_share, bent.target_image_share);
   ASSERT_EQ(read.structures.size(), 1U);
+  EXPECT_EQ(read.target_match, 0.91);
+  EXPECT_EQ(read.target_match_of_parts, 0.97);
+  EXPECT_EQ(read.structures[0].name, bent.structures[0].name);
+  EXPECT_EQ(read.structures[0].most_mm, bent.structures[0].most_mm);
   EXPECT_EQ(read.structures[0].displacement_mm, bent.structures[0].displacement_mm);
   for (std::size_t n = 0; n < bent.bodies.size(); ++n) {
     EXPECT_EQ(read.bodies[n].name, bent.bodies[n].name);
@@ -82,8 +88,8 @@ TEST_F(ResultFolderTest, TheCovarianceIsReadBackAndOlderResultsHaveSigmas) {
   EXPECT_EQ(read.uncertainty->covariance, report.uncertainty->covariance);
   json["uncertainty"].erase("covariance");
   const SetupResult older = report_from_json(json.dump(), "result.json");
-  EXPECT_LT((older.uncertainty->translation_mm() - report.uncertainty->translation_mm()).norm(), 1e-12);
-  EXPECT_LT((older.uncertainty->rotation_rad() - report.uncertainty->rotation_rad()).norm(), 1e-12);
+  EXPECT_LT((older.uncertainty->sigma_translation_mm() - report.uncertainty->sigma_translation_mm()).norm(), 1e-12);
+  EXPECT_LT((older.uncertainty->sigma_rotation_rad() - report.uncertainty->sigma_rotation_rad()).norm(), 1e-12);
 }
 
 TEST_F(ResultFolderTest, ResultsWithoutBodiesAreThoseOfTheWholePatient) {

@@ -4,6 +4,7 @@
 campaign.py make --tool make_cases --ct-root DATA -o CASES --seeds 1000-1019
 campaign.py run CASES --isoshift isoshift --ct-root DATA -o RESULTS [--jobs 2] [-- FLAG...]
 campaign.py table CASES RESULTS
+campaign.py read CASES_FOUND.csv
 """
 
 import argparse
@@ -182,6 +183,17 @@ def coverage_line(name, rows):
     return f"| {name} | {within[0]} | {within[1]} |"
 
 
+def rows_from(path):
+    """What table() wrote to cases_found.csv."""
+    with path.open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    for row in rows:
+        row.update({name: row[name] == "True" for name in ("determined", "is_bodies")})
+        row.update({name: float(row[name]) if row[name] else None for name in ("center_mm", "box_mm")})
+        row["sigmas_off"] = json.loads(row["sigmas_off"]) if row["sigmas_off"] else None
+    return rows
+
+
 def table(options):
     rows = [row_of(name, truth, options.output) for name, truth in truths(options.cases).items()]
     if not rows:
@@ -191,18 +203,28 @@ def table(options):
         writer = csv.DictWriter(file, fieldnames=list(rows[0]))
         writer.writeheader()
         writer.writerows(rows)
+    text = text_of(rows)
+    (options.output / "table.md").write_text(text)
+    print(text, end="")
+    return 0
+
+
+def read(options):
+    print(text_of(rows_from(options.found)), end="")
+    return 0
+
+
+def text_of(rows):
+    strata = [name for name in STRATA if any(row["stratum"] == name for row in rows)]
     lines = ["| stratum | determined | under 1 mm, of these | accepted, of those under 1 mm | median mm | "
              "accepted above 1.5 mm | accepted above 2 mm |", "| --- " * 7 + "|"]
-    lines += [summary_line(name, [row for row in rows if row["stratum"] == name]) for name in STRATA]
+    lines += [summary_line(name, [row for row in rows if row["stratum"] == name]) for name in strata]
     lines += [summary_line(name, [row for row in rows if row["anatomy"] == name]) for name in ("head", "chest")]
     lines.append(summary_line("all", rows))
     lines += ["", "| answer of | axes within one sigma | within two sigma |", "| --- | --- | --- |",
               coverage_line("bodies", [row for row in rows if row["is_bodies"]]),
               coverage_line("the whole", [row for row in rows if not row["is_bodies"]])]
-    text = "\n".join(lines) + "\n"
-    (options.output / "table.md").write_text(text)
-    print(text, end="")
-    return 0
+    return "\n".join(lines) + "\n"
 
 
 def main():
@@ -228,6 +250,9 @@ def main():
     command.add_argument("cases", type=folder)
     command.add_argument("output", type=folder, help="what `run` wrote")
     command.set_defaults(run=table)
+    command = commands.add_parser("read", help="print the table of what was once found")
+    command.add_argument("found", type=folder, help="a cases_found.csv")
+    command.set_defaults(run=read)
     options = parser.parse_args()
     return options.run(options)
 

@@ -3,10 +3,11 @@
 
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <numbers>
 
 #include "base/error.h"
 #include "tests/support/temporary_folder.h"
-#include "workflow/evaluate/body_truth.h"
+#include "workflow/evaluate/compared_bodies.h"
 #include "workflow/evaluate/evaluation_files.h"
 
 namespace isoshift {
@@ -37,6 +38,12 @@ TEST(EvaluatedBodies, AreComparedWithTheNearestTruth) {
   EXPECT_LT((compared[1].true_mm - Vector3d(0, 3, 0)).norm(), 1e-12);
   EXPECT_EQ(compared[1].found_mm, Vector3d(0, 2.5, 0));
   EXPECT_TRUE(compared_bodies(found, {}, moved_by({1, 2, 3}), planned).empty());
+  // A target that is turned: what lies 50 mm above it is brought back along its own axes.
+  Eigen::Isometry3d target = moved_by({1, 2, 3});
+  target.linear() = Eigen::AngleAxisd(0.5 * std::numbers::pi, Vector3d::UnitZ()).toRotationMatrix();
+  const auto turned = compared_bodies(std::span(found).subspan(1, 1), truths, target, planned);
+  // Truth puts (0, 50, 3) at (1, 55, 6); less the target's translation (0, 53, 3), turned back (53, 0, 3).
+  EXPECT_LT((turned.at(0).true_mm - Vector3d(53, -50, 0)).norm(), 1e-12);
 }
 
 class BodyFilesTest : public testing::Test {
@@ -58,6 +65,7 @@ TEST_F(BodyFilesTest, TruthsAreBodiesOrLevelsOrNone) {
     EXPECT_EQ(truths[0].setup_error * Vector3d(1, 0, 0), Vector3d(4, 6, 6));
   }
   EXPECT_TRUE(read_body_truths(written("{}")).empty());
+  EXPECT_TRUE(read_body_truths(written(R"({"setup_error": {}, "bodies": [{"name": "of a result.json"}]})")).empty());
   EXPECT_THROW(read_body_truths(written(R"({"bodies": [{"name": "skull"}]})")), Error);
 }
 
@@ -85,6 +93,9 @@ TEST_F(BodyFilesTest, BodiesAreReadBackWithTheirRuns) {
   EXPECT_EQ(read.sigma_mm, skull.sigma_mm);
   folder.append({.number = 4, .bodies = {skull}});
   EXPECT_EQ(EvaluationFolder(folder_ / "evaluation").runs()[1].bodies.size(), 1U);
+  // Older evaluations do not have the file.
+  std::filesystem::remove(folder_ / "evaluation" / "bodies.csv");
+  EXPECT_TRUE(EvaluationFolder(folder_ / "evaluation").runs()[1].bodies.empty());
 }
 
 }  // namespace

@@ -1,0 +1,56 @@
+#include "registration/bodies/target_match.h"
+
+#include <gtest/gtest.h>
+
+#include "tests/support/bent_scene.h"
+
+namespace isoshift {
+namespace {
+
+using Eigen::Vector3d;
+
+BentScene column() {
+  return bent_column({{.translation_mm = {1.0, -1.0, 1.0}, .rotation_deg = {-2.0, 0.0, 0.5}},
+                      {.translation_mm = {1.0, -1.0, 0.5}, .rotation_deg = {-0.5, 0.5, 0.0}},
+                      {.translation_mm = {1.5, -1.0, 0.0}, .rotation_deg = {1.5, -1.0, 0.5}}});
+}
+
+// Around the isocenter, with every body off its true place by as much.
+TargetMatch match_at(const BentScene& scene, const Vector3d& off_room_mm) {
+  const RenderedBodies rendered = rendered_bodies(scene, scene.bodies);
+  const FixedViews views = scene.views();
+  const BodyScene searched{.bodies = scene.bodies,
+                           .fine = rendered,
+                           .coarse = rendered,
+                           .views = views,
+                           .whole_room_from_patient = scene.planned};
+  BodyPoses poses;
+  for (const Eigen::Isometry3d& truth : scene.truth)
+    poses.emplace_back(scene.images.size(), Eigen::Translation3d(off_room_mm) * truth * scene.planned);
+  return match_near_target(searched, Vector3d::Zero(), poses);
+}
+
+TEST(TargetMatch, TellsTheRightPlaceFromOthers) {
+  const BentScene scene = column();
+  const TargetMatch right = match_at(scene, Vector3d::Zero()), wrong = match_at(scene, {0.0, 12.0, 0.0});
+  EXPECT_GT(right.of_all, 0.95);
+  EXPECT_GT(right.of_parts, 0.95);
+  EXPECT_LT(wrong.of_all, 0.7);
+  EXPECT_LT(wrong.of_parts, 0.7);
+}
+
+// Fluid whose level runs through the surroundings: one strong edge that the CT does not have.
+TEST(TargetMatch, OfPartsIsHardlySpoiledByContrastThatHasChanged) {
+  BentScene scene = column();
+  for (FixedImage& image : scene.images)
+    for (int row = 0; row < image.line_integral.rows; ++row)
+      for (int column = 0; column < image.line_integral.columns; ++column)
+        if (column > image.line_integral.columns / 2 + row / 8) image.line_integral.at(row, column) += 1.5F;
+  const TargetMatch match = match_at(scene, Vector3d::Zero());
+  EXPECT_LT(match.of_all, 0.7);
+  EXPECT_GT(match.of_parts, 0.8);
+  EXPECT_LT(match_at(scene, {0.0, 12.0, 0.0}).of_parts, 0.7);
+}
+
+}  // namespace
+}  // namespace isoshift
