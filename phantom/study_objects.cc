@@ -79,6 +79,12 @@ std::string time_of_day(double after_1015_s) {
   return fraction == 0 ? whole : fmt::format("{}.{:06}", whole, fraction);
 }
 
+void put_exposure(DicomItem dataset, const Imager& imager) {
+  DicomItem exposure = dataset.append_item(DCM_ExposureSequence);
+  exposure.put(DCM_KVP, imager.is_megavoltage ? 6000.0 : 120.0);
+  exposure.put(DCM_NumberOfBlocks, 0);
+}
+
 }  // namespace
 
 std::string Uids::next() {
@@ -236,9 +242,7 @@ void write_xray(const PhantomOptions& options, const StudyUids& study, const std
   dataset.put(DCM_PatientSupportAngle, options.placement.couch_angle_deg);
   dataset.put(DCM_TableTopPitchAngle, 0.0);
   dataset.put(DCM_TableTopRollAngle, 0.0);
-  DicomItem exposure = dataset.append_item(DCM_ExposureSequence);
-  exposure.put(DCM_KVP, imager.is_megavoltage ? 6000.0 : 120.0);
-  exposure.put(DCM_NumberOfBlocks, 0);
+  put_exposure(dataset, imager);
   dataset.append_reference(DCM_ReferencedRTPlanSequence, UID_RTPlanStorage, study.plan);
   dataset.put(DCM_ReferencedBeamNumber, fmt::format("{}", number + 1));
   put_pixel_format(dataset, {.columns = imager.pixels, .rows = imager.pixels});

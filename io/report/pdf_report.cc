@@ -251,7 +251,8 @@ class PdfReport {
       y_ += height;
     }
     if (n == first) return n;
-    const std::string legend = fmt::format("{}{}", page_.picture_words, n < report_.views.size() ? " More on the next page." : "");
+    const std::string legend =
+        fmt::format("{}{}", page_.picture_words, n < report_.views.size() ? " More on the next page." : "");
     y_ += canvas_.text(kMargin, y_, legend, legend_style()) + 2.0;
     return n;
   }

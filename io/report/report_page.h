@@ -60,7 +60,7 @@ struct ReportPage {
   std::optional<Display> display;
   std::string left_over_words;  // empty: there is no remaining error
   std::vector<LeftOver> left_over;
-  std::string picture_words;              // what lines and colors in the pictures mean
+  std::string picture_words;  // what lines and colors in the pictures mean
   std::vector<std::string> conventions;
   std::vector<std::string> warnings, overrides, left_aside;
   std::vector<Section> details;  // geometry as understood, stages, checks, hashes, versions

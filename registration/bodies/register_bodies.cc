@@ -82,6 +82,10 @@ void report_match(const BodyScene& scene, const Carriers& carriers, const Carrie
   }
 }
 
+// Bones two vertebrae and more from the target end short of where they lie: in `chest-bent` and in bent phantoms a
+// third to two thirds of the axes lay within two of the covariance's sigmas.
+constexpr double kSigmaOfMotions = 2.0;
+
 // How every bone moved against the target: where its center lies, and how it is turned, once the target is right.
 std::vector<BodyMotion> motions_of(const JointedBodies& bodies, const BodyRenderers& renderers,
                                    const Carriers& carriers, const CarriedTarget& target,
@@ -107,7 +111,7 @@ std::vector<BodyMotion> motions_of(const JointedBodies& bodies, const BodyRender
                        .center_room_mm = center,
                        .displacement_mm = against * center - center,
                        .rotation_rad = rotation_vector(against.linear()),
-                       .sigma_mm = variance.cwiseSqrt(),
+                       .sigma_mm = kSigmaOfMotions * variance.cwiseSqrt(),
                        .carries_target = carriers.shares()[n],
                        .image_share = image_share(own * certainty.covariance * own.transpose(),
                                                   own * certainty.covariance_on_loose_springs * own.transpose()),
