@@ -185,6 +185,7 @@ std::vector<SuccessBin> success_bins(std::span<const EvaluatedRun> runs, bool by
     bin.successes += is_success(run, by_mrpd) ? 1 : 0;
   }
   std::vector<SuccessBin> list;
+  list.reserve(bins.size());
   for (const auto& [start_mm, bin] : bins) list.push_back(bin);
   return list;
 }
