@@ -150,6 +150,7 @@ Json target_json(const SetupResult& report, const ShownShift& shown) {
   Json extent = Json::array(), displacement = Json::array();
   for (const Eigen::Vector3d& point : target.extent_room_mm) extent.push_back(array_of(point));
   for (const auto& component : shown.target_mm) displacement.push_back(or_null(component));
+  const auto of_bodies = [&](double value) { return report.bodies.empty() ? Json(nullptr) : Json(value); };
   return {{"name", target.name},
           {"chosen_by", target.chosen_by},
           {"surrogate", target.surrogate},
@@ -157,10 +158,10 @@ Json target_json(const SetupResult& report, const ShownShift& shown) {
           {"extent_room_mm", extent},
           {"displacement_mm", displacement},
           {"sigma_mm", sigma_json(report.uncertainty.has_value(), shown.target_sigma_mm)},
-          {"image_share", report.bodies.empty() ? Json(nullptr) : Json(report.target_image_share)},
-          {"match", report.bodies.empty() ? Json(nullptr) : Json(report.target_match)},
-          {"match_of_parts", report.bodies.empty() ? Json(nullptr) : Json(report.target_match_of_parts)},
-          {"deformation_mm", report.bodies.empty() ? Json(nullptr) : Json(report.target_deformation_mm)}};
+          {"image_share", of_bodies(report.target_image_share)},
+          {"match", of_bodies(report.target_match)},
+          {"match_of_parts", of_bodies(report.target_match_of_parts)},
+          {"deformation_mm", of_bodies(report.target_deformation_mm)}};
 }
 
 Json structures_json(const SetupResult& report) {

@@ -43,8 +43,9 @@ Json rows_of(const std::vector<BodyTruth>& truths) {
 }
 
 // All that the runs depend on: an evaluation is continued only where it is the same.
-Json configuration_of(const RegistrationRequest& request, const std::string& intensity, const Study& study,
-                      const Renderer& renderer, const Target& target, const EvaluateOptions& options) {
+Json configuration_of(const EvaluateOptions& options, const Study& study, const Renderer& renderer,
+                      const Target& target) {
+  const RegistrationRequest& request = options.registration;
   const StartProtocol& protocol = options.protocol;
   Json images = Json::array(), settings = Json::object();
   for (const RtImage& image : study.rt_images) images.push_back(image.sop_instance_uid);
@@ -65,7 +66,7 @@ Json configuration_of(const RegistrationRequest& request, const std::string& int
           {"body_truths", rows_of(options.body_truths)},
           {"planned_room_from_patient", rows_of(study.planned_room_from_patient)},
           {"cameras", cameras},  // columns of each matrix
-          {"intensity", intensity},
+          {"intensity", options.study.intensity},
           {"structure_set", study.structures ? study.structures->sop_instance_uid : ""},
           {"renderer", to_string(renderer.kind())},
           {"device", renderer.device()},
@@ -223,8 +224,7 @@ EvaluationFolder evaluate_study(const EvaluateOptions& options, Notes& notes, Ob
   BodyStore bodies;
   const RegistrationSetup setup(options.registration, study, beams_of(study), renderers);
   const TargetRegistration registration(study, options.registration, setup, choice, surrogate, bodies);
-  EvaluationFolder folder(options.output, configuration_of(options.registration, options.study.intensity, study,
-                                                           setup.renderers().finest(), choice.target, options));
+  EvaluationFolder folder(options.output, configuration_of(options, study, setup.renderers().finest(), choice.target));
   run_missing(folder, study, choice.target, registration, options, jobs, observer);
   folder.write_summary();
   return folder;
