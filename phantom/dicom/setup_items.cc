@@ -73,9 +73,8 @@ void put_ball_target(DicomItem structures, const BallTarget& target, const std::
     std::vector<double> points;
     for (int n = 0; n < target.contour_points; ++n) {
       const double angle = 2.0 * std::numbers::pi * n / target.contour_points;
-      const Eigen::Vector3d point =
-          target.center_patient_mm + height_mm * target.slice_normal +
-          radius_mm * (std::cos(angle) * along_rows + std::sin(angle) * along_columns);
+      const Eigen::Vector3d point = target.center_patient_mm + height_mm * target.slice_normal +
+                                    radius_mm * (std::cos(angle) * along_rows + std::sin(angle) * along_columns);
       points.insert(points.end(), {point.x(), point.y(), point.z()});
     }
     DicomItem contour = drawn.append_item(DCM_ContourSequence);

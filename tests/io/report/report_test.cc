@@ -106,8 +106,8 @@ TEST(Report, AllFormatsShowTheSameNumbers) {
     report.setup_error.translation() = Eigen::Vector3d(uniform(-30, 30), uniform(-3, 3), uniform(-0.2, 0.2));
     report.setup_error.linear() = rotation_from_zxy({uniform(-0.1, 0.1), uniform(-0.02, 0.02), uniform(-0.002, 0.002)});
     const double wide = n % 2 == 0 ? 1.5 : 0.2;  // sigma: rounded to 1 or to 0.1
-    report.uncertainty = uncertainty_of_independent_axes(
-        {wide, 0.04, 0.1}, {rad_from_deg(0.05), rad_from_deg(wide), rad_from_deg(0.01)});
+    report.uncertainty = uncertainty_of_independent_axes({wide, 0.04, 0.1},
+                                                         {rad_from_deg(0.05), rad_from_deg(wide), rad_from_deg(0.01)});
     const auto json = nlohmann::json::parse(json_report(report));
     const std::string pdf = text_of_pdf(report, 1), html = html_of(report), text = text_of(report);
     const auto csv = csv_of(report);
