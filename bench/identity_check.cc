@@ -144,8 +144,7 @@ int check(int patient_count, std::optional<int> only) {
     try {
       const std::vector<FixedImage> images = prepared(xrays);
       result = register_views(renderers, images, planned, options);
-      const Eigen::Vector3d target_mm = result.actual_room_from_patient * *options.target_patient_mm;
-      if (may_have_bent(options, images, target_mm, result)) register_bodies(bent, images, planned, options, result);
+      if (may_have_bent(options, images, result)) register_bodies(bent, images, planned, options, result);
     } catch (const Error& error) {
       fmt::print("{},{},{},error,,,,,,,,,,,,\"{}\"\n", ct, of, what, error.what());
       return;

@@ -190,12 +190,13 @@ BentPatient::BentPatient(const Volume<float>& ct_hu, const AttenuationModel& att
       coarse(rendered(ct_hu, attenuation, beams, parts.bodies, kCoarseVoxelMm)) {}
 
 bool may_have_bent(const RegistrationOptions& options, std::span<const FixedImage> images,
-                   const Vector3d& target_room_mm, const RegistrationResult& whole) {
+                   const RegistrationResult& whole) {
   const bool is_whole = options.region == nullptr || !options.region->has_volume();
   if (!is_whole || options.dof != Dof::kRigid || !options.check_alternatives || !whole.unobservable_room.empty())
     return false;
   if (whole.verdict == Verdict::kReview) return true;
-  return whole.verdict == Verdict::kAccepted && !do_parts_match_near(images, target_room_mm, whole);
+  return whole.verdict == Verdict::kAccepted &&
+         !do_parts_match_near(images, target_found_room_mm(options, whole), whole);
 }
 
 void register_bodies(const BentPatient& patient, std::span<const FixedImage> images,

@@ -20,12 +20,12 @@ struct BentPatient {
   RenderedBodies fine, coarse;  // with voxels up to 1.4 and 3 mm
 };
 
-// Whether bodies may answer: what was found of the patient as a whole needs a review, or parts near the target, which
-// the whole puts at `target_room_mm`, do not show that they match; nothing but the whole image was chosen; and all six
+// Whether bodies may answer: what was found of the patient as a whole needs a review, or parts near the target do not
+// show that they match where the whole puts it; nothing but the whole image was chosen; and all six
 // degrees of freedom were searched and checked. What is rejected shows other anatomy: freedom to bend must not let it
 // in.
 bool may_have_bent(const RegistrationOptions& options, std::span<const FixedImage> images,
-                   const Eigen::Vector3d& target_room_mm, const RegistrationResult& whole);
+                   const RegistrationResult& whole);
 
 // Searches all bodies from the pose of the whole, and judges again. In the result, pose, uncertainty, similarities and
 // contradictions are those of the bodies that carry the target; `alternatives` gains what the images say of a spine one

@@ -27,9 +27,9 @@ constexpr double kMaxSpreadMm = 1.0, kMaxSpreadRad = rad_from_deg(1.0);
 // distance 2 % off in one of them 0.68 mm and more (docs/evaluation.md).
 constexpr double kMaxContradictionMm = 0.5, kMaxContradictionSigmas = 3.0;
 constexpr double kMaxTwoSigmaMm = 1.0, kMaxTwoSigmaRad = rad_from_deg(1.0);
-// Other patients of the same kind, whose bones were free to follow, had at most 0.85 and 0.946 (two phantoms that differ
-// little; others 0.72 and 0.88). Right patients had 0.86 and more, or, with contrast that has changed near the target, in
-// noise, or far bent, mostly 0.95 and more of the median part.
+// Other patients of the same kind, whose bones were free to follow, had at most 0.85 and 0.946 (two phantoms that
+// differ little; others 0.72 and 0.88). Right patients had 0.86 and more, or, with contrast that has changed near the
+// target, in noise, or far bent, mostly 0.95 and more of the median part.
 constexpr double kMinTargetMatch = 0.86, kMinTargetMatchOfParts = 0.95;
 constexpr double kMinImageShare = 0.3, kMaxDeformationMm = 2.0;
 // What carries a target is small, and turns less surely than a whole patient; what counts is where its surface lies.
@@ -190,15 +190,18 @@ std::vector<Eigen::Vector3d> unobservable_directions(std::span<const XrayView> v
   return {sum.normalized()};
 }
 
+Eigen::Vector3d target_found_room_mm(const RegistrationOptions& options, const RegistrationResult& result) {
+  if (!options.target_patient_mm) return Eigen::Vector3d::Zero();
+  return result.actual_room_from_patient * *options.target_patient_mm;
+}
+
 void judge(std::span<const double> parameters, const RegistrationOptions& options, RegistrationResult& result) {
   result.reasons.clear();
   result.verdict = Verdict::kAccepted;
   judge_search(parameters, options, result);
   judge_views(options.region != nullptr && options.region->has_volume(), result);
   judge_contradiction(result);
-  judge_uncertainty(options.target_patient_mm ? result.actual_room_from_patient * *options.target_patient_mm
-                                              : Eigen::Vector3d::Zero(),
-                    result);
+  judge_uncertainty(target_found_room_mm(options, result), result);
   if (!result.bodies.empty()) judge_bodies(result);
   judge_alternatives(result);
   if (!options.check_alternatives)

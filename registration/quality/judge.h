@@ -11,6 +11,9 @@ namespace isoshift {
 // rays lie within 30 degrees of each other, as with a single view.
 std::vector<Eigen::Vector3d> unobservable_directions(std::span<const XrayView> views);
 
+// Where the pose found puts the target: the isocenter if the options name none.
+Eigen::Vector3d target_found_room_mm(const RegistrationOptions& options, const RegistrationResult& result);
+
 // Sets verdict and reasons from everything else in the result, and from the parameters of the pose found
 // (pose_parameters.h).
 void judge(std::span<const double> parameters, const RegistrationOptions& options, RegistrationResult& result);

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include "base/error.h"
-#include "setup/couch_shift.h"
 
 namespace isoshift {
 
@@ -34,9 +33,7 @@ TargetRegistration::TargetRegistration(const Study& study, const RegistrationReq
 const BentPatient& TargetRegistration::bent_patient() const {
   std::call_once(bent_once_, [&] {
     const std::shared_ptr<const CtBodies> of_ct = bodies_.get(study_.ct);
-    const Eigen::Vector3d center_patient_mm =
-        study_.planned_room_from_patient.inverse() * choice_.target.center_room_mm;
-    PatientBodies parts = patient_bodies(of_ct->map, of_ct->masks, center_patient_mm);
+    PatientBodies parts = patient_bodies(of_ct->map, of_ct->masks, *options_.target_patient_mm);
     if (surrogate_.drawn) {
       parts.named_carriers = shares_of_bone_in(parts, *surrogate_.drawn);
       if (parts.named_carriers.empty())
@@ -53,10 +50,7 @@ RegistrationResult TargetRegistration::from(const Eigen::Isometry3d& start_room_
   RegistrationResult found = register_views(setup_.renderers(), images, start_room_from_patient, options_,
                                             [&](double share) { observer.progress("Registering", share); });
   observer.progress("Registering", 1.0);
-  const Eigen::Vector3d target_room_mm =
-      setup_error_from_poses(study_.planned_room_from_patient, found.actual_room_from_patient) *
-      choice_.target.center_room_mm;
-  if (may_have_bent(options_, images, target_room_mm, found))
+  if (may_have_bent(options_, images, found))
     register_bodies(bent_patient(), images, study_.planned_room_from_patient, options_, found,
                     [&](double share) { observer.progress("Registering the target", share); });
   for (const std::string& doubt : study_.doubts) found.demote(Verdict::kReview, doubt);

@@ -107,8 +107,9 @@ struct SeenWhole {
     for (const double x : {80.0, 100.0, 120.0})
       result.views[0].consistency.parts.push_back({.center_px = {x, 100.0}, .has_signal = true});
   }
-  bool may_have_bent(const RegistrationOptions& options, const Vector3d& target_mm = Vector3d::Zero()) const {
-    return isoshift::may_have_bent(options, images, target_mm, result);
+  bool may_have_bent(RegistrationOptions options, const Vector3d& target_mm = Vector3d::Zero()) const {
+    options.target_patient_mm = target_mm;  // the pose is the identity
+    return isoshift::may_have_bent(options, images, result);
   }
 };
 
