@@ -112,23 +112,46 @@ BodyRenderers::BodyRenderers(RendererKind kind, const Volume<float>& ct_hu, cons
   }
 }
 
-void BodyRenderers::add(std::size_t body, const XrayView& view, const Eigen::Isometry3d& room_from_patient,
-                        std::span<const std::uint32_t> pixels, std::span<float> line_integrals,
-                        std::span<MotionDerivatives> derivatives) const {
-  std::ranges::fill(derivatives, MotionDerivatives::Zero());
-  const Body& part = bodies_[body];
-  if (!part.renderer) return;
-  const std::vector<std::uint32_t> places = covered(pixels, view, room_from_patient, part.corners_patient_mm);
-  if (places.empty()) return;
+BodyDrr BodyRenderers::part(std::size_t body, const XrayView& view, const Eigen::Isometry3d& room_from_patient,
+                            std::span<const std::uint32_t> pixels, bool with_derivatives) const {
+  BodyDrr part;
+  const Body& of = bodies_[body];
+  if (!of.renderer) return part;
+  const std::vector<std::uint32_t> places = covered(pixels, view, room_from_patient, of.corners_patient_mm);
+  if (places.empty()) return part;
   PixelSet listed{.of_view = {{}}};
   for (const std::uint32_t place : places) listed.of_view.front().push_back(pixels[place]);
   const auto views = std::span(&view, 1);
   const auto poses = std::span(&room_from_patient, 1);
-  const RenderResult drr = derivatives.empty() ? part.renderer->render(views, poses, listed)
-                                               : part.renderer->render_with_derivatives(views, poses, listed);
-  for (std::size_t n = 0; n < places.size(); ++n) line_integrals[places[n]] += drr.line_integrals(0, 0)[n];
-  if (derivatives.empty()) return;
-  for (std::size_t n = 0; n < places.size(); ++n) derivatives[places[n]] = drr.derivatives(0, 0)[n];
+  const RenderResult drr = with_derivatives ? of.renderer->render_with_derivatives(views, poses, listed)
+                                            : of.renderer->render(views, poses, listed);
+  for (std::size_t n = 0; n < places.size(); ++n) {
+    if (drr.line_integrals(0, 0)[n] == 0.0F) continue;
+    part.places.push_back(places[n]);
+    part.line_integrals.push_back(drr.line_integrals(0, 0)[n]);
+    if (with_derivatives) part.derivatives.push_back(drr.derivatives(0, 0)[n]);
+  }
+  return part;
+}
+
+BodyDrr BodyRenderers::part_with_derivatives(std::size_t body, const XrayView& view,
+                                             const Eigen::Isometry3d& room_from_patient,
+                                             std::span<const std::uint32_t> pixels) const {
+  return part(body, view, room_from_patient, pixels, true);
+}
+
+void BodyRenderers::add(std::size_t body, const XrayView& view, const Eigen::Isometry3d& room_from_patient,
+                        std::span<const std::uint32_t> pixels, std::span<float> line_integrals) const {
+  const BodyDrr drr = part(body, view, room_from_patient, pixels, false);
+  for (std::size_t n = 0; n < drr.places.size(); ++n) line_integrals[drr.places[n]] += drr.line_integrals[n];
+}
+
+double BodyRenderers::distance_mm(std::size_t body, const Eigen::Isometry3d& one,
+                                  const Eigen::Isometry3d& other) const {
+  double farthest = 0.0;
+  for (const Eigen::Vector3d& corner : bodies_[body].corners_patient_mm)
+    farthest = std::max(farthest, (one * corner - other * corner).norm());
+  return farthest;
 }
 
 }  // namespace isoshift

@@ -15,6 +15,13 @@ namespace isoshift {
 // interpolated, outside it is 0. Shares of all bodies of a CT that add up to 255 everywhere divide the CT without rest.
 using BodyShare = Volume<std::uint8_t>;
 
+// What one body adds to pixels of a view.
+struct BodyDrr {
+  std::vector<std::uint32_t> places;  // in the list of pixels: of those whose rays meet the body
+  std::vector<float> line_integrals;  // of these
+  std::vector<MotionDerivatives> derivatives;  // of these, by this body's motion
+};
+
 class BodyRenderers {
  public:
   // Renders on the CPU, with kind `cpu` or, as the oracle, `trilinear`. Bodies may be empty.
@@ -23,12 +30,16 @@ class BodyRenderers {
 
   std::size_t count() const { return bodies_.size(); }
 
-  // Adds one body's line integrals in one view to those of the listed pixels (row * columns + column), and where
-  // `derivatives` is not empty, sets what each pixel's sum changes by with this body's motion (0 where the body is
-  // not). Only pixels that the body's box covers are rendered.
+  // One body's part of the listed pixels (row * columns + column). Only pixels that the body's box covers are rendered.
+  BodyDrr part_with_derivatives(std::size_t body, const XrayView& view, const Eigen::Isometry3d& room_from_patient,
+                                std::span<const std::uint32_t> pixels) const;
+
+  // Adds one body's line integrals to those of the listed pixels.
   void add(std::size_t body, const XrayView& view, const Eigen::Isometry3d& room_from_patient,
-           std::span<const std::uint32_t> pixels, std::span<float> line_integrals,
-           std::span<MotionDerivatives> derivatives = {}) const;
+           std::span<const std::uint32_t> pixels, std::span<float> line_integrals) const;
+
+  // How far apart two poses put any corner of the body's box; 0 for a body of nothing.
+  double distance_mm(std::size_t body, const Eigen::Isometry3d& one, const Eigen::Isometry3d& other) const;
 
   // Where the body's attenuation has its center.
   const Eigen::Vector3d& center_patient_mm(std::size_t body) const { return bodies_[body].center_patient_mm; }
@@ -39,6 +50,9 @@ class BodyRenderers {
     std::vector<Eigen::Vector3d> corners_patient_mm;  // of its box, a voxel wider
     Eigen::Vector3d center_patient_mm = Eigen::Vector3d::Zero();
   };
+  BodyDrr part(std::size_t body, const XrayView& view, const Eigen::Isometry3d& room_from_patient,
+               std::span<const std::uint32_t> pixels, bool with_derivatives) const;
+
   std::vector<Body> bodies_;
 };
 

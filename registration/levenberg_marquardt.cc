@@ -46,9 +46,11 @@ class Climb {
     const bool first = result_.evaluations == 1;
     const double gain = first ? 0.0 : model.value - model_.value;
     if (!first) {
-      constexpr double kPoor = 0.25, kGood = 0.75;
+      constexpr double kPoor = 0.25, kGood = 0.75, kBetterThanPromised = 1.5, kLeastShare = 0.25;
       if (gain < kPoor * promised_) radius_ = kPoor * step_length_;
       if (gain > kGood * promised_ && step_length_ > 0.9 * radius_) radius_ *= 2.0;
+      if (gain > kBetterThanPromised * promised_) curvature_share_ = std::max(kLeastShare, 0.5 * curvature_share_);
+      if (gain < kGood * promised_) curvature_share_ = std::min(1.0, 2.0 * curvature_share_);
     }
     if (first || gain > 0.0) {
       result_.best = next_;
@@ -78,7 +80,7 @@ class Climb {
       return end("evaluation limit reached");
     }
     Eigen::VectorXd gradient = model_.gradient.cwiseProduct(steps_);
-    Eigen::MatrixXd curvature = steps_.asDiagonal() * model_.curvature * steps_.asDiagonal();
+    Eigen::MatrixXd curvature = curvature_share_ * (steps_.asDiagonal() * model_.curvature * steps_.asDiagonal());
     for (std::size_t axis = 0; axis < next_.size(); ++axis)
       if (is_held(axis)) {
         const auto n = static_cast<Eigen::Index>(axis);
@@ -104,6 +106,9 @@ class Climb {
   QuadraticModel model_;  // at the best point
   OptimizerResult result_;
   double radius_ = 1.0, step_length_ = 0.0, promised_ = 0.0;
+  // Of the models' curvature. Gauss-Newton's is too large where residuals weigh less the larger they are: steps end
+  // short, and gain more than they promise.
+  double curvature_share_ = 1.0;
   bool running_ = true;
 };
 

@@ -57,9 +57,10 @@ QuadraticModel no_model(std::size_t parameters) {
 
 BodyObjective::BodyObjective(const JointedBodies& bodies, const BodyRenderers& renderers, const Objective& pixels,
                              double tile_mm)
-    : bodies_(bodies), renderers_(renderers), pixels_(pixels) {
+    : bodies_(bodies), pixels_(pixels) {
   for (std::size_t view = 0; view < pixels.views().size(); ++view) {
     const XrayView& camera = pixels.views()[view];
+    drrs_.emplace_back(renderers, camera, pixels.rendered_pixels(view));
     const int edge = std::max(1, static_cast<int>(std::lround(tile_mm * pixels_per_mm(camera))));
     std::map<int, std::vector<std::uint32_t>> tiles;  // by their places
     const std::span<const std::uint32_t> compared = pixels.compared_pixels(view);
@@ -78,26 +79,16 @@ BodyObjective::BodyObjective(const JointedBodies& bodies, const BodyRenderers& r
   }
 }
 
-BodyObjective::Drr BodyObjective::drr_of(std::size_t view, const BodyPoses& poses) const {
-  const std::span<const std::uint32_t> pixels = pixels_.rendered_pixels(view);
-  Drr drr{.line_integrals = std::vector<float>(pixels.size()),
-          .derivatives = {renderers_.count(), std::vector<MotionDerivatives>(pixels.size())}};
-  for (std::size_t body = 0; body < renderers_.count(); ++body)
-    renderers_.add(body, pixels_.views()[view], poses[body][view], pixels, drr.line_integrals, drr.derivatives[body]);
-  return drr;
-}
-
 // Adds what a tile says, by the motions of the slots.
-void BodyObjective::add_tile(const Tile& tile, const Drr& drr, const PoseSlots& slots,
-                             QuadraticModel& by_motions) const {
+void BodyObjective::add_tile(const Tile& tile, const PoseSlots& slots, QuadraticModel& by_motions) const {
   const Comparison& comparison = pixels_.comparison(tile.view);
   const std::span<const Neighbors> neighbors = comparison.neighbors();
+  const MovingBodies& drr = drrs_[tile.view];
   std::vector<std::size_t> present;  // bodies
-  for (std::size_t body = 0; body < drr.derivatives.size(); ++body)
+  for (std::size_t body = 0; body < drr.count(); ++body)
     if (std::ranges::any_of(tile.compared, [&](std::uint32_t n) {
-          const std::vector<MotionDerivatives>& of = drr.derivatives[body];
-          return !of[neighbors[n].left].isZero() || !of[neighbors[n].right].isZero() ||
-                 !of[neighbors[n].above].isZero() || !of[neighbors[n].below].isZero();
+          return drr.covers(body, neighbors[n].left) || drr.covers(body, neighbors[n].right) ||
+                 drr.covers(body, neighbors[n].above) || drr.covers(body, neighbors[n].below);
         }))
       present.push_back(body);
   const auto rows = static_cast<Index>(tile.compared.size()), columns = static_cast<Index>(6 * present.size());
@@ -108,11 +99,9 @@ void BodyObjective::add_tile(const Tile& tile, const Drr& drr, const PoseSlots& 
       const std::uint32_t at = tile.compared[static_cast<std::size_t>(n)];
       const std::uint32_t from = neighbors[at].*direction.from, to = neighbors[at].*direction.to;
       x[n] = (comparison.xray_gradients().*direction.xray)[at];
-      y[n] = drr.line_integrals[to] - drr.line_integrals[from];
-      for (std::size_t b = 0; b < present.size(); ++b) {
-        const std::vector<MotionDerivatives>& of = drr.derivatives[present[b]];
-        of_y.row(n).segment<6>(static_cast<Index>(6 * b)) = (of[to] - of[from]).transpose();
-      }
+      y[n] = drr.line_integrals()[to] - drr.line_integrals()[from];
+      for (std::size_t b = 0; b < present.size(); ++b)
+        of_y.row(n).segment<6>(static_cast<Index>(6 * b)) = drr.derivatives_between(present[b], from, to).transpose();
     }
     const QuadraticModel correlation = correlation_model(std::move(x), std::move(y), std::move(of_y));
     const double weight = 0.25 * tile.residuals;  // half of n/2
@@ -130,16 +119,19 @@ void BodyObjective::add_tile(const Tile& tile, const Drr& drr, const PoseSlots& 
 }
 
 std::vector<QuadraticModel> BodyObjective::view_models(const PoseSlots& slots,
-                                                       std::span<const double> parameters) const {
+                                                       std::span<const double> parameters) {
   const BodyPoses poses = slots.poses(parameters);
-  std::vector<Drr> drrs(pixels_.views().size());
-  parallel_for(std::size_t{0}, drrs.size(), [&](std::size_t view) { drrs[view] = drr_of(view, poses); });
+  parallel_for(std::size_t{0}, drrs_.size(), [&](std::size_t view) {
+    std::vector<Eigen::Isometry3d> in_view;
+    for (const std::vector<Eigen::Isometry3d>& of_body : poses) in_view.push_back(of_body[view]);
+    drrs_[view].move_to(in_view);
+  });
   // Sums of fixed runs of tiles of one view: rounding must not depend on how the work is spread.
   std::vector<QuadraticModel> sums(runs_.size(), no_model(parameters.size()));
   parallel_for(std::size_t{0}, runs_.size(), [&](std::size_t run) {
-    for (const Tile& tile : runs_[run]) add_tile(tile, drrs[tile.view], slots, sums[run]);
+    for (const Tile& tile : runs_[run]) add_tile(tile, slots, sums[run]);
   });
-  std::vector<QuadraticModel> views(drrs.size(), no_model(parameters.size()));
+  std::vector<QuadraticModel> views(drrs_.size(), no_model(parameters.size()));
   for (std::size_t run = 0; run < runs_.size(); ++run) views[runs_[run].front().view] += sums[run];
   // From motions to parameters, slot by slot.
   for (std::size_t slot = 0; slot < slots.count(); ++slot) {
@@ -183,11 +175,11 @@ QuadraticModel BodyObjective::Parts::of_all_views() const {
   return sum;
 }
 
-BodyObjective::Parts BodyObjective::parts(const PoseSlots& slots, std::span<const double> parameters) const {
+BodyObjective::Parts BodyObjective::parts(const PoseSlots& slots, std::span<const double> parameters) {
   return {.views = view_models(slots, parameters), .springs = spring_model(slots, parameters)};
 }
 
-QuadraticModel BodyObjective::model(const PoseSlots& slots, std::span<const double> parameters) const {
+QuadraticModel BodyObjective::model(const PoseSlots& slots, std::span<const double> parameters) {
   const Parts both = parts(slots, parameters);
   QuadraticModel sum = both.of_all_views();
   return sum += both.springs;

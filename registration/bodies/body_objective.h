@@ -6,13 +6,15 @@
 // counts as one independent residual. Its variance is the tile's own and
 // is not known: what the DRR cannot show (bowel, metal, a heart that beats) explains a tile badly whatever the pose is,
 // and must not pull. So the logarithm of the likelihood of n residuals is -n/2 ln(1 - rho), tile by tile; half of it
-// for the gradients along rows and half for those along columns. Springs are Gaussian.
+// for the gradients along rows and half for those along columns. Springs are Gaussian. Bodies that hardly moved from one
+// call to the next are not rendered again (MovingBodies).
 
 #include <Eigen/Core>
 #include <span>
 #include <vector>
 
 #include "registration/bodies/jointed_bodies.h"
+#include "registration/bodies/moving_bodies.h"
 #include "registration/bodies/pose_slots.h"
 #include "registration/objective.h"
 
@@ -25,7 +27,7 @@ class BodyObjective {
   BodyObjective(const JointedBodies& bodies, const BodyRenderers& renderers, const Objective& pixels, double tile_mm);
 
   // The model at some parameters of the slots.
-  QuadraticModel model(const PoseSlots& slots, std::span<const double> parameters) const;
+  QuadraticModel model(const PoseSlots& slots, std::span<const double> parameters);
 
   // The same, taken apart.
   struct Parts {
@@ -33,7 +35,7 @@ class BodyObjective {
     QuadraticModel springs;
     QuadraticModel of_all_views() const;
   };
-  Parts parts(const PoseSlots& slots, std::span<const double> parameters) const;
+  Parts parts(const PoseSlots& slots, std::span<const double> parameters);
 
  private:
   // A place of one view where X-ray and DRR are compared.
@@ -42,20 +44,15 @@ class BodyObjective {
     std::vector<std::uint32_t> compared;  // of the view's compared pixels
     double residuals = 1.0;               // independent ones
   };
-  struct Drr {
-    std::vector<float> line_integrals;                        // of the rendered pixels
-    std::vector<std::vector<MotionDerivatives>> derivatives;  // [body][rendered pixel], 0 where the body is not
-  };
 
-  Drr drr_of(std::size_t view, const BodyPoses& poses) const;
-  std::vector<QuadraticModel> view_models(const PoseSlots& slots, std::span<const double> parameters) const;
+  std::vector<QuadraticModel> view_models(const PoseSlots& slots, std::span<const double> parameters);
   QuadraticModel spring_model(const PoseSlots& slots, std::span<const double> parameters) const;
-  void add_tile(const Tile& tile, const Drr& drr, const PoseSlots& slots, QuadraticModel& by_motions) const;
+  void add_tile(const Tile& tile, const PoseSlots& slots, QuadraticModel& by_motions) const;
 
   const JointedBodies& bodies_;
-  const BodyRenderers& renderers_;
   const Objective& pixels_;
   std::vector<std::vector<Tile>> runs_;  // of tiles that follow each other in one view
+  std::vector<MovingBodies> drrs_;       // of the views
 };
 
 }  // namespace isoshift

@@ -25,7 +25,7 @@ JointedBodies with_soft_tissue_held(JointedBodies bodies, double sigmas) {
 }
 
 // One climb of all slots from their base.
-OptimizerResult climb_from_base(const BodyObjective& objective, const PoseSlots& slots, const BodyStage& stage,
+OptimizerResult climb_from_base(BodyObjective& objective, const PoseSlots& slots, const BodyStage& stage,
                                 double bound_mm) {
   const std::size_t count = kParameters * slots.count();
   const OptimizerOptions options{.kind = OptimizerKind::kLevenbergMarquardt,
@@ -108,7 +108,7 @@ BodySearchResult search_bodies(const BodyScene& scene, const BodyPoses& start, s
     const auto begin = std::chrono::steady_clock::now();
     const Objective pixels = pixels_of(scene, stage);
     const JointedBodies held = with_soft_tissue_held(scene.bodies, stage.soft_sigmas);
-    const BodyObjective objective(held, scene.of(stage).apart, pixels, stage.tile_mm);
+    BodyObjective objective(held, scene.of(stage).apart, pixels, stage.tile_mm);
     const PoseSlots slots(scene.bodies, scene.fine.apart, result.poses);
     const OptimizerResult climbed = climb_from_base(objective, slots, stage, bound_mm);
     result.poses = slots.poses(climbed.best);
@@ -121,7 +121,7 @@ BodySearchResult search_bodies(const BodyScene& scene, const BodyPoses& start, s
 
 BodyCertainty certainty_of(const BodyScene& scene, const BodyPoses& poses, const BodyStage& stage) {
   const Objective pixels = pixels_of(scene, stage);
-  const BodyObjective objective(scene.bodies, scene.of(stage).apart, pixels, stage.tile_mm);
+  BodyObjective objective(scene.bodies, scene.of(stage).apart, pixels, stage.tile_mm);
   const PoseSlots slots(scene.bodies, scene.fine.apart, poses);
   const std::vector<double> at_base(kParameters * slots.count(), 0.0);
   const BodyObjective::Parts parts = objective.parts(slots, at_base);

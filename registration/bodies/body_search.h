@@ -35,7 +35,7 @@ struct BodySearchOptions {
                                     .soft_sigmas = 0.1,
                                     .initial_step_mm = 4.0},
                                    {.pixel_mm = 2.0, .least_gain = 1.0, .max_evaluations = 15},
-                                   {.pixel_mm = 1.3, .tile_mm = 10.0, .initial_step_mm = 1.0}};
+                                   {.pixel_mm = 1.3, .tile_mm = 7.0, .initial_step_mm = 1.0, .least_gain = 2.0}};
   double bound_mm = 40.0;  // of every parameter and stage
 };
 

@@ -59,7 +59,7 @@ void report_match(const BodyScene& scene, const Carriers& carriers, const Carrie
   result.target_match = near.of_all;
   result.target_match_of_parts = near.of_parts;
   const Objective pixels(*scene.fine.as_one, level, about, {.similarity = SimilarityKind::kGradientCorrelation});
-  const BodyObjective objective(scene.bodies, scene.fine.apart, pixels, BodyStage().tile_mm);
+  BodyObjective objective(scene.bodies, scene.fine.apart, pixels, BodyStage().tile_mm);
   const PoseSlots slots(scene.bodies, scene.fine.apart, poses);
   const std::vector<double> at_base(PoseSlots::kParameters * slots.count(), 0.0);
   const BodyObjective::Parts parts = objective.parts(slots, at_base);

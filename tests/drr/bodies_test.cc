@@ -132,9 +132,9 @@ TEST_F(BodiesTest, DerivativesAreThoseOfTheSumByOneBodysMotion) {
   const std::vector<Eigen::Isometry3d> poses = random_poses(3);
   const std::vector<std::uint32_t> pixels = all_pixels(view);
   for (std::size_t body = 0; body < 3; ++body) {
-    std::vector<float> sum(pixels.size());
-    std::vector<MotionDerivatives> derivatives(pixels.size(), MotionDerivatives::Ones());
-    bodies_.add(body, view, poses[body], pixels, sum, derivatives);
+    const BodyDrr part = bodies_.part_with_derivatives(body, view, poses[body], pixels);
+    std::vector<MotionDerivatives> derivatives(pixels.size(), MotionDerivatives::Zero());
+    for (std::size_t n = 0; n < part.places.size(); ++n) derivatives[part.places[n]] = part.derivatives[n];
     std::vector<Eigen::Isometry3d> before = poses, behind = poses;
     constexpr double kStep = 0.2;
     before[body] = Eigen::Translation3d(0.0, -kStep, 0.0) * poses[body];

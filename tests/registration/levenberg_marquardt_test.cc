@@ -42,6 +42,22 @@ TEST(LevenbergMarquardt, FollowsACurvedValleyToItsEnd) {
   EXPECT_LT(result.evaluations, 60);
 }
 
+// -ln(1 + |r|^2), with the curvature that its weights have: where residuals are large it is too large by far.
+TEST(LevenbergMarquardt, TakesLongerStepsWhereTheyGainMoreThanTheyPromise) {
+  const auto robust = [](const std::vector<double>& x) {
+    const Eigen::Vector2d residual(x[0] - 3.0, 2.0 * (x[1] + 4.0));
+    const Eigen::Vector2d slopes(1.0, 2.0);
+    const double weight = 2.0 / (1.0 + residual.squaredNorm());
+    return QuadraticModel{.value = -std::log1p(residual.squaredNorm()),
+                          .gradient = -weight * slopes.cwiseProduct(residual),
+                          .curvature = Eigen::Vector2d(8.0 * weight * slopes.cwiseAbs2()).asDiagonal()};
+  };
+  const OptimizerResult result = climb_alone(batched(robust), from({-6.0, 6.0}));
+  EXPECT_NEAR(result.best[0], 3.0, 1e-3);
+  EXPECT_NEAR(result.best[1], -4.0, 1e-3);
+  EXPECT_LT(result.evaluations, 40);  // 109 with all of the curvature
+}
+
 TEST(LevenbergMarquardt, StaysInTheBox) {
   OptimizerOptions options = from({-1.2, 1.0});
   options.upper = {0.5, 10.0};

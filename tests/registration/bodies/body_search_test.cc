@@ -130,7 +130,7 @@ TEST(BodyObjective, GradientsAreDifferencesOfTheValue) {
   const auto whole = make_renderer(RendererKind::kCpu, scene.ct, {}, std::array{Beam::kKilovoltage});
   const std::vector<FixedImage> images = scene.views().reduced_to(3.0, scene.planned, 5.0);
   const Objective pixels(*whole, images, scene.planned, {.similarity = SimilarityKind::kGradientCorrelation});
-  const BodyObjective objective(bodies, renderers, pixels, 25.0);
+  BodyObjective objective(bodies, renderers, pixels, 25.0);
   const BodyPoses planned(3, std::vector<Eigen::Isometry3d>(2, scene.planned));
   const PoseSlots slots(bodies, renderers, planned);
   ASSERT_EQ(slots.count(), 4U);
