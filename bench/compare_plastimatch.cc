@@ -32,6 +32,7 @@
 #include <thread>
 
 #include "base/error.h"
+#include "base/median.h"
 #include "base/output_folder.h"
 #include "bench/scene.h"
 #include "geometry/patient_setup.h"
@@ -129,12 +130,6 @@ Volume<float> read_ct(const std::filesystem::path& folder) {
         if ((voxel == 0).any() || (voxel == hu.size.array() - 1).any()) hu.at(i, j, k) = -1000.0F;
       }
   return hu;
-}
-
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::ranges::nth_element(values, middle);
-  return *middle;
 }
 
 struct Rendered {

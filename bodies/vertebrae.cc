@@ -6,6 +6,7 @@
 #include <optional>
 #include <utility>
 
+#include "base/median.h"
 #include "base/parallel.h"
 #include "bodies/disc_comb.h"
 #include "bodies/lattice.h"
@@ -114,8 +115,7 @@ std::optional<Reach> reach_of(const DiscMean& mean, const Eigen::Vector3d& cente
       if (const auto edge = edge_mm(values)) edges.push_back(*edge * std::cos(turn_rad));
     }
     if (edges.size() < 3) return -1.0;
-    std::ranges::nth_element(edges, edges.begin() + static_cast<std::ptrdiff_t>(edges.size() / 2));
-    return edges[edges.size() / 2];
+    return median(std::move(edges));
   };
   const Reach reach{toward(1, 0), toward(-1, 0), toward(0, -1), toward(0, 1)};
   if (reach.left < 0 || reach.right < 0 || reach.front < 0 || reach.back < 0) return std::nullopt;
@@ -196,8 +196,7 @@ class RowFinder {
     std::vector<float> inside;
     for (int s = discs.front().at; s < discs.back().at; ++s)
       if (!std::isnan(profile_[s])) inside.push_back(profile_[s]);
-    std::ranges::nth_element(inside, inside.begin() + static_cast<std::ptrdiff_t>(inside.size() / 2));
-    return inside[inside.size() / 2];
+    return median(std::move(inside));
   }
 
   // How far bone goes on beyond a disc, up or down, mm; and whether it is the CT that ends.

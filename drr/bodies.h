@@ -17,8 +17,8 @@ using BodyShare = Volume<std::uint8_t>;
 
 // What one body adds to pixels of a view.
 struct BodyDrr {
-  std::vector<std::uint32_t> places;  // in the list of pixels: of those whose rays meet the body
-  std::vector<float> line_integrals;  // of these
+  std::vector<std::uint32_t> places;           // in the list of pixels: of those whose rays meet the body
+  std::vector<float> line_integrals;           // of these
   std::vector<MotionDerivatives> derivatives;  // of these, by this body's motion
 };
 

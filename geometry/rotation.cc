@@ -15,6 +15,10 @@ Eigen::Matrix3d cross_matrix(const Eigen::Vector3d& v) {
   return (Eigen::Matrix3d() << 0.0, -v.z(), v.y(), v.z(), 0.0, -v.x(), -v.y(), v.x(), 0.0).finished();
 }
 
+Eigen::Matrix<double, 3, 6> place_per_motion(const Eigen::Vector3d& place) {
+  return (Eigen::Matrix<double, 3, 6>() << Eigen::Matrix3d::Identity(), -cross_matrix(place)).finished();
+}
+
 Eigen::Matrix3d rotation_x(double angle_rad) {
   return Eigen::AngleAxisd(angle_rad, Eigen::Vector3d::UnitX()).toRotationMatrix();
 }

@@ -15,6 +15,9 @@ double wrapped_rad(double angle_rad);
 // The matrix of the cross product: cross_matrix(v) * x is v x x.
 Eigen::Matrix3d cross_matrix(const Eigen::Vector3d& v);
 
+// How a place moves with small motions: by translation, and by rotation about the origin (a rotation vector, in rad).
+Eigen::Matrix<double, 3, 6> place_per_motion(const Eigen::Vector3d& place);
+
 Eigen::Matrix3d rotation_x(double angle_rad);
 Eigen::Matrix3d rotation_y(double angle_rad);
 Eigen::Matrix3d rotation_z(double angle_rad);

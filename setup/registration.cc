@@ -28,8 +28,7 @@ const char* to_string(IrradiatedField::Origin origin) {
 Eigen::Vector3d Uncertainty::sigma_translation_mm() const { return covariance.diagonal().head<3>().cwiseSqrt(); }
 
 Eigen::Matrix3d Uncertainty::covariance_at_mm2(const Eigen::Vector3d& found_room_mm) const {
-  Eigen::Matrix<double, 3, 6> per_motion;
-  per_motion << Eigen::Matrix3d::Identity(), -cross_matrix(found_room_mm);
+  const Eigen::Matrix<double, 3, 6> per_motion = place_per_motion(found_room_mm);
   return per_motion * covariance * per_motion.transpose();
 }
 

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <map>
 
 #include "base/parallel.h"
 #include "geometry/rotation.h"
@@ -61,29 +60,21 @@ BodyObjective::BodyObjective(const JointedBodies& bodies, const BodyRenderers& r
   for (std::size_t view = 0; view < pixels.views().size(); ++view) {
     const XrayView& camera = pixels.views()[view];
     drrs_.emplace_back(renderers, camera, pixels.rendered_pixels(view));
-    const int edge = std::max(1, static_cast<int>(std::lround(tile_mm * pixels_per_mm(camera))));
-    std::map<int, std::vector<std::uint32_t>> tiles;  // by their places
-    const std::span<const std::uint32_t> compared = pixels.compared_pixels(view);
-    for (std::uint32_t n = 0; n < compared.size(); ++n) {
-      const int column = static_cast<int>(compared[n]) % camera.columns;
-      const int row = static_cast<int>(compared[n]) / camera.columns;
-      tiles[row / edge * camera.columns + column / edge].push_back(n);
-    }
-    for (auto& [place, numbers] : tiles) {
-      const double covered = static_cast<double>(numbers.size()) / (edge * edge);
-      if (covered < kLeastCovered) continue;
-      if (runs_.empty() || runs_.back().front().view != view || runs_.back().size() == kTilesOfARun)
-        runs_.emplace_back();
-      runs_.back().push_back({.view = view, .compared = std::move(numbers), .residuals = covered});
+    for (Tile& tile : tiles_of(camera, pixels.compared_pixels(view), tile_mm)) {
+      if (tile.covered < kLeastCovered) continue;
+      if (runs_.empty() || runs_.back().view != view || runs_.back().tiles.size() == kTilesOfARun)
+        runs_.push_back({.view = view, .tiles = {}});
+      runs_.back().tiles.push_back(std::move(tile));
     }
   }
 }
 
 // Adds what a tile says, by the motions of the slots.
-void BodyObjective::add_tile(const Tile& tile, const PoseSlots& slots, QuadraticModel& by_motions) const {
-  const Comparison& comparison = pixels_.comparison(tile.view);
+void BodyObjective::add_tile(std::size_t view, const Tile& tile, const PoseSlots& slots,
+                             QuadraticModel& by_motions) const {
+  const Comparison& comparison = pixels_.comparison(view);
   const std::span<const Neighbors> neighbors = comparison.neighbors();
-  const MovingBodies& drr = drrs_[tile.view];
+  const MovingBodies& drr = drrs_[view];
   std::vector<std::size_t> present;  // bodies
   for (std::size_t body = 0; body < drr.count(); ++body)
     if (std::ranges::any_of(tile.compared, [&](std::uint32_t n) {
@@ -104,22 +95,21 @@ void BodyObjective::add_tile(const Tile& tile, const PoseSlots& slots, Quadratic
         of_y.row(n).segment<6>(static_cast<Index>(6 * b)) = drr.derivatives_between(present[b], from, to).transpose();
     }
     const QuadraticModel correlation = correlation_model(std::move(x), std::move(y), std::move(of_y));
-    const double weight = 0.25 * tile.residuals;  // half of n/2
+    const double weight = 0.25 * tile.covered;  // half of n/2, with n the share covered
     const double rest = std::max(kLeastRest, 1.0 - correlation.value);
     by_motions.value -= weight * std::log(rest);
     for (std::size_t a = 0; a < present.size(); ++a) {
-      const auto of_a = static_cast<Index>(6 * a), at_a = static_cast<Index>(6 * slots.of(present[a], tile.view));
+      const auto of_a = static_cast<Index>(6 * a), at_a = static_cast<Index>(6 * slots.of(present[a], view));
       by_motions.gradient.segment<6>(at_a) += weight / rest * correlation.gradient.segment<6>(of_a);
       for (std::size_t b = 0; b < present.size(); ++b) {
-        const auto of_b = static_cast<Index>(6 * b), at_b = static_cast<Index>(6 * slots.of(present[b], tile.view));
+        const auto of_b = static_cast<Index>(6 * b), at_b = static_cast<Index>(6 * slots.of(present[b], view));
         by_motions.curvature.block<6, 6>(at_a, at_b) += weight / rest * correlation.curvature.block<6, 6>(of_a, of_b);
       }
     }
   }
 }
 
-std::vector<QuadraticModel> BodyObjective::view_models(const PoseSlots& slots,
-                                                       std::span<const double> parameters) {
+std::vector<QuadraticModel> BodyObjective::view_models(const PoseSlots& slots, std::span<const double> parameters) {
   const BodyPoses poses = slots.poses(parameters);
   parallel_for(std::size_t{0}, drrs_.size(), [&](std::size_t view) {
     std::vector<Eigen::Isometry3d> in_view;
@@ -129,10 +119,10 @@ std::vector<QuadraticModel> BodyObjective::view_models(const PoseSlots& slots,
   // Sums of fixed runs of tiles of one view: rounding must not depend on how the work is spread.
   std::vector<QuadraticModel> sums(runs_.size(), no_model(parameters.size()));
   parallel_for(std::size_t{0}, runs_.size(), [&](std::size_t run) {
-    for (const Tile& tile : runs_[run]) add_tile(tile, slots, sums[run]);
+    for (const Tile& tile : runs_[run].tiles) add_tile(runs_[run].view, tile, slots, sums[run]);
   });
   std::vector<QuadraticModel> views(drrs_.size(), no_model(parameters.size()));
-  for (std::size_t run = 0; run < runs_.size(); ++run) views[runs_[run].front().view] += sums[run];
+  for (std::size_t run = 0; run < runs_.size(); ++run) views[runs_[run].view] += sums[run];
   // From motions to parameters, slot by slot.
   for (std::size_t slot = 0; slot < slots.count(); ++slot) {
     const auto at = static_cast<Index>(6 * slot);

@@ -6,8 +6,8 @@
 // counts as one independent residual. Its variance is the tile's own and
 // is not known: what the DRR cannot show (bowel, metal, a heart that beats) explains a tile badly whatever the pose is,
 // and must not pull. So the logarithm of the likelihood of n residuals is -n/2 ln(1 - rho), tile by tile; half of it
-// for the gradients along rows and half for those along columns. Springs are Gaussian. Bodies that hardly moved from one
-// call to the next are not rendered again (MovingBodies).
+// for the gradients along rows and half for those along columns. Springs are Gaussian. Bodies that hardly moved from
+// one call to the next are not rendered again (MovingBodies).
 
 #include <Eigen/Core>
 #include <span>
@@ -17,6 +17,7 @@
 #include "registration/bodies/moving_bodies.h"
 #include "registration/bodies/pose_slots.h"
 #include "registration/objective.h"
+#include "registration/similarity/tiles.h"
 
 namespace isoshift {
 
@@ -38,21 +39,20 @@ class BodyObjective {
   Parts parts(const PoseSlots& slots, std::span<const double> parameters);
 
  private:
-  // A place of one view where X-ray and DRR are compared.
-  struct Tile {
+  // Tiles that follow each other in one view.
+  struct Run {
     std::size_t view = 0;
-    std::vector<std::uint32_t> compared;  // of the view's compared pixels
-    double residuals = 1.0;               // independent ones
+    std::vector<Tile> tiles;
   };
 
   std::vector<QuadraticModel> view_models(const PoseSlots& slots, std::span<const double> parameters);
   QuadraticModel spring_model(const PoseSlots& slots, std::span<const double> parameters) const;
-  void add_tile(const Tile& tile, const PoseSlots& slots, QuadraticModel& by_motions) const;
+  void add_tile(std::size_t view, const Tile& tile, const PoseSlots& slots, QuadraticModel& by_motions) const;
 
   const JointedBodies& bodies_;
   const Objective& pixels_;
-  std::vector<std::vector<Tile>> runs_;  // of tiles that follow each other in one view
-  std::vector<MovingBodies> drrs_;       // of the views
+  std::vector<Run> runs_;
+  std::vector<MovingBodies> drrs_;  // of the views
 };
 
 }  // namespace isoshift

@@ -100,9 +100,7 @@ CarriedTarget Carriers::target_at(const BodyPoses& poses, const BodyCertainty& c
   target.deformation_mm = off_from(target.setup_error, poses).most_mm;
   const Eigen::MatrixXd per_motions = motion_per_motions();
   target.covariance = per_motions * certainty.covariance * per_motions.transpose();
-  Eigen::Matrix<double, 3, 6> at_center;
-  at_center << Eigen::Matrix3d::Identity(), -cross_matrix(target.setup_error * center_room_mm_);
-  const Eigen::MatrixXd to_center = at_center * per_motions;
+  const Eigen::MatrixXd to_center = place_per_motion(target.setup_error * center_room_mm_) * per_motions;
   target.image_share = image_share(to_center * certainty.covariance * to_center.transpose(),
                                    to_center * certainty.covariance_on_loose_springs * to_center.transpose());
   target.left_mm = (to_center * certainty.motions_left).norm();

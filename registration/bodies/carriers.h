@@ -25,9 +25,9 @@ inline constexpr double kCarriersNearMm = 20.0;
 class Carriers {
  public:
   // Bones carry a target if they lie within 20 mm of its center or surface; the nearer they are, the larger their
-  // shares. Where a person names the carriers by their shares, these alone do.
+  // shares. Where a person names the carriers by their shares (`named` is not empty), these alone do.
   Carriers(const PatientBodies& patient, const Target& target, const Eigen::Isometry3d& planned_room_from_patient,
-           const std::vector<double>& named = {});
+           const std::vector<double>& named);
 
   // Whether bones lie that near.
   bool exist() const { return !at_center_.empty(); }

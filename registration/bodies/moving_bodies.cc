@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "geometry/rotation.h"
+#include "registration/preprocess/preprocess.h"
 
 namespace isoshift {
 namespace {

@@ -100,8 +100,7 @@ std::vector<BodyMotion> motions_of(const JointedBodies& bodies, const BodyRender
     const Eigen::Isometry3d against = target.setup_error.inverse() * poses[n].front() * planned.inverse();
     Eigen::MatrixXd difference = -target_motion;
     difference.middleCols<6>(static_cast<Eigen::Index>(6 * n)) += Eigen::Matrix<double, 6, 6>::Identity();
-    Eigen::Matrix<double, 3, 6> at_center;
-    at_center << Eigen::Matrix3d::Identity(), -cross_matrix(poses[n].front() * renderers.center_patient_mm(n));
+    const Eigen::Matrix<double, 3, 6> at_center = place_per_motion(poses[n].front() * renderers.center_patient_mm(n));
     const Eigen::MatrixXd per_motions = target.setup_error.linear().transpose() * at_center * difference;
     const Vector3d variance = (per_motions * certainty.covariance * per_motions.transpose()).diagonal();
     Eigen::MatrixXd own = Eigen::MatrixXd::Zero(3, difference.cols());
@@ -141,7 +140,7 @@ std::vector<StructureMotion> motions_of_structures(const BentPatient& patient, c
   constexpr double kMost = 0.8;
   std::vector<StructureMotion> motions;
   for (const Target& structure : patient.structures) {
-    const Carriers carriers(patient.parts, structure, planned);
+    const Carriers carriers(patient.parts, structure, planned, {});
     if (!carriers.exist()) continue;
     const Carriers::Off off = carriers.off_from(setup_error, poses);
     motions.push_back({.name = structure.name,

@@ -2,9 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
 #include <utility>
 #include <vector>
+
+#include "registration/similarity/tiles.h"
 
 namespace isoshift {
 namespace {
@@ -29,21 +30,8 @@ std::vector<FixedImage> surroundings(const BodyScene& scene, const Vector3d& tar
   return level;
 }
 
-// Numbers of compared pixels, part by part.
-std::vector<std::vector<std::size_t>> parts_of(const XrayView& view, std::span<const std::uint32_t> compared) {
-  const int edge = std::max(1, static_cast<int>(std::lround(kPartMm * pixels_per_mm(view))));
-  std::map<std::pair<int, int>, std::vector<std::size_t>> by_place;
-  for (std::size_t n = 0; n < compared.size(); ++n)
-    by_place[{static_cast<int>(compared[n]) / view.columns / edge, static_cast<int>(compared[n]) % view.columns / edge}]
-        .push_back(n);
-  std::vector<std::vector<std::size_t>> parts;
-  for (auto& [place, pixels] : by_place)
-    if (pixels.size() >= kLeastPixelsOfAPart) parts.push_back(std::move(pixels));
-  return parts;
-}
-
 // Centered.
-Eigen::VectorXd values_of(const std::vector<float>& all, const std::vector<std::size_t>& numbers) {
+Eigen::VectorXd values_of(const std::vector<float>& all, const std::vector<std::uint32_t>& numbers) {
   Eigen::VectorXd values(static_cast<Eigen::Index>(numbers.size()));
   for (std::size_t n = 0; n < numbers.size(); ++n) values[static_cast<Eigen::Index>(n)] = all[numbers[n]];
   return values.array() - values.mean();
@@ -64,12 +52,15 @@ double weighted_median(std::vector<std::pair<double, double>> values) {
 double match_of_parts(const XrayView& view, std::span<const std::uint32_t> compared, const Gradients& xray,
                       const Gradients& drr) {
   std::vector<std::pair<double, double>> correlations;
-  for (const std::vector<std::size_t>& part : parts_of(view, compared))
+  for (const Tile& part : tiles_of(view, compared, kPartMm)) {
+    if (part.compared.size() < kLeastPixelsOfAPart) continue;
     for (const auto direction : {&Gradients::along_row, &Gradients::along_column}) {
-      const Eigen::VectorXd there = values_of(xray.*direction, part), here = values_of(drr.*direction, part);
+      const Eigen::VectorXd there = values_of(xray.*direction, part.compared),
+                            here = values_of(drr.*direction, part.compared);
       const double norms = there.norm() * here.norm();
       correlations.emplace_back(norms > 0.0 ? there.dot(here) / norms : 0.0, here.norm());
     }
+  }
   return weighted_median(std::move(correlations));
 }
 

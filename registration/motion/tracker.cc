@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "base/error.h"
+#include "base/median.h"
 #include "registration/pose_parameters.h"
 #include "registration/quality/judge.h"
 #include "setup/couch_shift.h"
@@ -19,11 +20,6 @@ constexpr int kLostMoments = 5;     // in a row: the target is looked for anew
 constexpr double kFilterAcceleration = 400.0;
 constexpr double kLeastSimilarity = 0.2;  // of gradient correlation: what chance reaches is a tenth of that
 constexpr double kLongestCoastS = 1.0;    // after the last measurement the filter's speed counts no longer than this
-
-double median(std::vector<double> values) {
-  std::ranges::nth_element(values, values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2));
-  return values[values.size() / 2];
-}
 
 }  // namespace
 

@@ -6,6 +6,8 @@
 #include <numbers>
 #include <span>
 
+#include "base/median.h"
+
 namespace isoshift {
 namespace {
 
@@ -28,13 +30,6 @@ constexpr double kMostMisfit = 3.0;        // logarithm: a block that the line m
 constexpr double kNearlyMisfit = 0.5;      // mean logarithm: what fits worse by less fits nearly as well
 // Sigmas of the penumbra.
 constexpr double kFirstPenumbraMm = 0.9, kLeastPenumbraMm = 0.25, kMostPenumbraMm = 2.5;
-
-double middle_value(std::vector<double> values) {
-  if (values.empty()) return 0.0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::ranges::nth_element(values, middle);
-  return *middle;
-}
 
 // The mean profile of a block of rows, outside first.
 struct Block {
@@ -263,7 +258,7 @@ std::vector<SideLine> measured_lines(const std::vector<SideToMeasure>& sides, do
     const auto coarse = side.best_line(slope);
     const std::vector<double> off = side.off_line(coarse.place_mm, slope);
     line.seen = static_cast<double>(off.size()) / side.blocks();
-    line.scatter_mm = off.empty() ? 1e3 : 1.48 * middle_value(off);
+    line.scatter_mm = off.empty() ? 1e3 : 1.48 * median(off);
     line.misfit = std::exp(0.5 * coarse.misfit / side.blocks());
     line.wide_mm = side.reach_mm(coarse, slope);
     const double reach_mm = kPlaceStepMm * 1.2;
@@ -298,7 +293,7 @@ double brightness_beyond(const UprightXray& xray, int at, int sign, int first, i
     }
     rises.push_back(std::log((beyond + 1e-3) / (inside + 1e-3)));
   }
-  return middle_value(rises);
+  return rises.empty() ? 0.0 : median(std::move(rises));
 }
 
 }  // namespace isoshift

@@ -6,6 +6,8 @@
 #include <numbers>
 #include <opencv2/imgproc.hpp>
 
+#include "base/median.h"
+
 namespace isoshift {
 namespace {
 
@@ -17,12 +19,6 @@ constexpr double kMiddleShare = 0.6;              // of a side, off its corners
 constexpr double kMostScatterMm = 0.5;            // of the outline about a rectangle's sides or a circle
 constexpr double kRoundShare = 0.85;  // of its rectangle that a field with round outline covers at most: pi / 4
 constexpr int kRays = 180;
-
-double middle_value(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::ranges::nth_element(values, middle);
-  return *middle;
-}
 
 // The largest connected place that is brighter than `level`, without the holes in it.
 cv::Mat largest_place(const cv::Mat& intensity, double level, cv::Rect& bounds) {
@@ -105,7 +101,7 @@ struct Shape {
 
 double scatter(std::vector<double> off) {
   for (double& value : off) value = std::abs(value);
-  return 1.48 * middle_value(std::move(off));
+  return 1.48 * median(std::move(off));
 }
 
 Shape circle_through(const std::vector<Eigen::Vector2d>& outline) {
@@ -145,7 +141,7 @@ std::optional<Shape> rectangle_through(const std::vector<Eigen::Vector2d>& outli
         places.push_back(at[axis]);
     }
     if (places.size() < kLeastPoints) return std::nullopt;
-    shape.sides[side] = middle_value(places);
+    shape.sides[side] = median(places);
     for (double& place : places) place -= shape.sides[side];
     shape.scatter_px = std::max(shape.scatter_px, scatter(std::move(places)));
   }

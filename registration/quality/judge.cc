@@ -122,8 +122,8 @@ void judge_contradiction(RegistrationResult& result) {
 void judge_bodies(RegistrationResult& result) {
   if (!(result.target_match >= kMinTargetMatch || result.target_match_of_parts >= kMinTargetMatchOfParts))
     review(result,
-           fmt::format("the target's surroundings match poorly (gradient correlation {:.2f}, {:.2f} is expected; of "
-                       "parts by themselves {:.2f}, {:.2f} is expected): they may be another patient's, or the target "
+           fmt::format("the target's surroundings match poorly (gradient correlation {:.3f}, {:.2f} is expected; of "
+                       "parts by themselves {:.3f}, {:.2f} is expected): they may be another patient's, or the target "
                        "may lie elsewhere",
                        result.target_match, kMinTargetMatch, result.target_match_of_parts, kMinTargetMatchOfParts));
   if (!(result.target_image_share >= kMinImageShare))

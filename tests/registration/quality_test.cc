@@ -93,7 +93,7 @@ TEST(Quality, SurroundingsOfTheTargetThatMatchPoorlyNeedAReview) {
   };
   expect_accepted(bent(0.88, 0.6, 1.0));
   expect_review(bent(0.8, 0.6, 1.0),
-                "the target's surroundings match poorly (gradient correlation 0.80, 0.86 is expected");
+                "the target's surroundings match poorly (gradient correlation 0.800, 0.86 is expected");
   // Or most of their parts match: contrast that has changed spoils a few.
   expect_accepted([&](RegistrationResult& result) {
     bent(0.6, 0.6, 1.0)(result);

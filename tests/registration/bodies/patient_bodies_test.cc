@@ -92,17 +92,17 @@ TEST(PatientBodies, AllHangTogether) {
 TEST(Carriers, AreTheBonesNearTheTarget) {
   const PatientBodies patient = small_patient({0, 0, 0});
   const Eigen::Isometry3d planned = Eigen::Isometry3d::Identity();
-  const Carriers in_vertebra(patient, target_at({0, 0, 0}, 10.0), planned);
+  const Carriers in_vertebra(patient, target_at({0, 0, 0}, 10.0), planned, {});
   ASSERT_TRUE(in_vertebra.exist());
   EXPECT_GT(in_vertebra.shares()[1], 0.95);
   // Between two vertebrae both carry.
-  const Carriers between(patient, target_at({0, 0, 15}, 8.0), planned);
+  const Carriers between(patient, target_at({0, 0, 15}, 8.0), planned, {});
   ASSERT_TRUE(between.exist());
   EXPECT_NEAR(between.shares()[1], 0.5, 0.15);
   EXPECT_NEAR(between.shares()[2], 0.5, 0.15);
   // In soft tissue far from every bone there are none, and near the surface of a large target there are.
-  EXPECT_FALSE(Carriers(patient, target_at({40, -60, 0}, 10.0), planned).exist());
-  EXPECT_TRUE(Carriers(patient, target_at({0, -60, 0}, 40.0), planned).exist());
+  EXPECT_FALSE(Carriers(patient, target_at({40, -60, 0}, 10.0), planned, {}).exist());
+  EXPECT_TRUE(Carriers(patient, target_at({0, -60, 0}, 40.0), planned, {}).exist());
   double sum = 0.0;
   for (const double share : between.shares()) sum += share;
   EXPECT_NEAR(sum, 1.0, 1e-9);
@@ -133,7 +133,7 @@ TEST(Carriers, AreTheBonesInAStructureThatIsNamed) {
 TEST(Carriers, MoveTheTargetAsTheyMove) {
   const PatientBodies patient = small_patient({0, 0, 0});
   const Eigen::Isometry3d planned = Eigen::Isometry3d::Identity();
-  const Carriers carriers(patient, target_at({0, 0, 0}, 10.0), planned);
+  const Carriers carriers(patient, target_at({0, 0, 0}, 10.0), planned, {});
   Eigen::Isometry3d motion = Eigen::Isometry3d::Identity();
   motion.linear() = Eigen::AngleAxisd(0.05, Vector3d(1, 2, 3).normalized()).toRotationMatrix();
   motion.translation() = Vector3d(3, -4, 5);

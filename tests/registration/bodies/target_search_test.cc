@@ -30,7 +30,7 @@ struct Column {
     patient.to_bone_mm = Volume<float>(scene.ct.size, scene.ct.patient_from_voxel);
   }
 
-  Carriers carriers() const { return Carriers(patient, target, scene.planned); }
+  Carriers carriers() const { return Carriers(patient, target, scene.planned, {}); }
 
   // With the whole found too far toward the patient's head.
   TargetSearchResult searched_from(double too_far_mm) const {
