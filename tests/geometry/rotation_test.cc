@@ -19,6 +19,13 @@ TEST(Rotation, IsRightHandedAboutEveryAxis) {
               VectorNear(Eigen::Vector3d(0, 1, 0), 1e-15));
 }
 
+TEST(Rotation, PlacesMoveWithSmallMotions) {
+  const Eigen::Vector3d place(20.0, -30.0, 50.0), translation(1e-4, 2e-4, -3e-4), turn(2e-6, -1e-6, 3e-6);
+  const Eigen::Vector3d moved = rotation_from_vector(turn) * place + translation;
+  const Eigen::Vector<double, 6> motion = (Eigen::Vector<double, 6>() << translation, turn).finished();
+  EXPECT_THAT(Eigen::Vector3d(place + place_per_motion(place) * motion), VectorNear(moved, 1e-9));
+}
+
 TEST(Rotation, ZxyAnglesComposeAndDecompose) {
   std::mt19937_64 random(1);
   std::uniform_real_distribution<double> turn(-3.14, 3.14), tilt(-1.57, 1.57);
