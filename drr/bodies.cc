@@ -28,7 +28,7 @@ std::array<Eigen::Vector3d, 8> corners_of(const VoxelBox& box, double wider) {
 
 // The voxels of a CT where a share is not 0, or becomes so within a voxel of its own lattice.
 VoxelBox box_in(const Volume<float>& ct, const BodyShare& share) {
-  const VoxelBox occupied = occupied_voxels(share.voxels.data(), share.size);
+  VoxelBox occupied = occupied_voxels(share.voxels.data(), share.size);
   if (occupied.is_empty()) return occupied;
   const Eigen::Affine3d ct_from_share = ct.patient_from_voxel.inverse() * share.patient_from_voxel;
   Eigen::AlignedBox3d reached;
