@@ -125,10 +125,11 @@ BodyDrr BodyRenderers::part(std::size_t body, const XrayView& view, const Eigen:
   const auto poses = std::span(&room_from_patient, 1);
   const RenderResult drr = with_derivatives ? of.renderer->render_with_derivatives(views, poses, listed)
                                             : of.renderer->render(views, poses, listed);
+  const std::span<const float> line_integrals = drr.line_integrals(0, 0);
   for (std::size_t n = 0; n < places.size(); ++n) {
-    if (drr.line_integrals(0, 0)[n] == 0.0F) continue;
+    if (line_integrals[n] == 0.0F) continue;
     part.places.push_back(places[n]);
-    part.line_integrals.push_back(drr.line_integrals(0, 0)[n]);
+    part.line_integrals.push_back(line_integrals[n]);
     if (with_derivatives) part.derivatives.push_back(drr.derivatives(0, 0)[n]);
   }
   return part;

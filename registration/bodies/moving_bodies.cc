@@ -32,13 +32,12 @@ void MovingBodies::render(std::size_t body, const Eigen::Isometry3d& room_from_p
   Body& of = bodies_[body];
   of.drr = renderers_.part_with_derivatives(body, view_, room_from_patient, pixels_);
   of.rendered_at = room_from_patient;
-  of.is_rendered = true;
   of.entry_of.assign(pixels_.size(), 0);
   for (std::uint32_t n = 0; n < of.drr.places.size(); ++n) of.entry_of[of.drr.places[n]] = n + 1;
 }
 
 void MovingBodies::add(const Body& body, const Eigen::Isometry3d& room_from_patient) {
-  const MotionDerivatives motion = motion_between(body.rendered_at, room_from_patient);
+  const MotionDerivatives motion = motion_between(*body.rendered_at, room_from_patient);
   for (std::size_t n = 0; n < body.drr.places.size(); ++n)
     line_integrals_[body.drr.places[n]] += body.drr.line_integrals[n] + body.drr.derivatives[n].dot(motion);
 }
@@ -47,8 +46,8 @@ void MovingBodies::move_to(std::span<const Eigen::Isometry3d> room_from_patient)
   std::ranges::fill(line_integrals_, 0.0F);
   for (std::size_t body = 0; body < bodies_.size(); ++body) {
     const Eigen::Isometry3d& pose = room_from_patient[body];
-    if (!bodies_[body].is_rendered || renderers_.distance_mm(body, bodies_[body].rendered_at, pose) > hardly_mm_)
-      render(body, pose);
+    const std::optional<Eigen::Isometry3d>& at = bodies_[body].rendered_at;
+    if (!at || renderers_.distance_mm(body, *at, pose) > hardly_mm_) render(body, pose);
     add(bodies_[body], pose);
   }
 }

@@ -3,6 +3,7 @@
 
 #include <Eigen/Geometry>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -35,8 +36,7 @@ class MovingBodies {
 
  private:
   struct Body {
-    bool is_rendered = false;
-    Eigen::Isometry3d rendered_at = Eigen::Isometry3d::Identity();
+    std::optional<Eigen::Isometry3d> rendered_at;
     BodyDrr drr;
     std::vector<std::uint32_t> entry_of;  // of drr, by pixel; counted from 1, 0 where the body is not
 

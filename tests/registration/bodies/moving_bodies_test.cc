@@ -40,7 +40,7 @@ TEST_F(MovingBodiesTest, FollowSmallAndLargeMotions) {
   moving.move_to(start);
   const std::vector<float> at_start = copy_of(moving.line_integrals());
   EXPECT_LT(relative_error(at_start, rendered(start)), 1e-6);
-  // Pixels of 6 mm on the receptor: half a millimeter and more is rendered anew, less is not.
+  // The first two are less than a tenth of a pixel, and not rendered anew.
   for (const double far_mm : {0.05, 0.2, 5.0}) {
     std::vector<Eigen::Isometry3d> poses = start;
     poses[1] = Eigen::Translation3d(0.0, far_mm, 0.0) * Eigen::AngleAxisd(far_mm / 500.0, Vector3d::UnitX()) * start[1];
