@@ -5,14 +5,12 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include <algorithm>
 #include <memory>
-#include <nlohmann/json.hpp>
-#include <tuple>
 
 #include "base/error.h"
 #include "base/system_user.h"
 #include "cli/commands/commands.h"
+#include "cli/switches/text_on_one_line.h"
 #include "io/config/watch_file.h"
 #include "io/report/result_folder.h"
 #include "workflow/room/deliver.h"
@@ -22,23 +20,9 @@
 namespace isoshift {
 namespace {
 
-// The name stands in the release, in the audit log and on pages.
-void check_name(const std::string& by) {
-  if (by.find_first_not_of(' ') == std::string::npos)
-    throw UsageError("--by: expected the name of the person who releases the session");
-  const auto is_control = [](unsigned char c) { return c < 0x20 || c == 0x7F; };
-  if (std::ranges::any_of(by, is_control))
-    throw UsageError("--by: the name holds a line break or another control character; expected a name on one line");
-  try {
-    std::ignore = nlohmann::json(by).dump();
-  } catch (const nlohmann::json::exception&) {
-    throw UsageError("--by: the name is not valid UTF-8 text");
-  }
-}
-
 void run_release(const std::filesystem::path& file, const std::string& session, const std::string& by,
                  bool despite_other_xrays, Console& console) {
-  check_name(by);
+  check_text_on_one_line("--by", by, "the name of the person who releases the session");
   const WatchFile watch = read_watch_file(file);
   // The user who runs watch could not read files that another user writes.
   struct stat of_results{};
@@ -46,7 +30,7 @@ void run_release(const std::filesystem::path& file, const std::string& session, 
     throw Error(fmt::format(
         "{}: belongs to another user, who runs isoshift watch: release the session as that user (sudo -u USER)",
         watch.results.string()));
-  ResultsTree tree(watch.results);
+  ResultsTree tree(watch);
   const SystemUser user = system_user();
   const Release release = tree.release(
       session, {.by = by, .user = user.name, .sudo_user = user.sudo_user, .despite_objection = despite_other_xrays},

@@ -140,12 +140,15 @@ WatchFile read_watch_file(const fs::path& path) {
       throw Error(fmt::format("{}: peer {}: the name {} is there twice", path.string(), n + 1, peer.name));
     watch.peers.push_back(std::move(peer));
   }
+  if (section.find<std::string>("signing_key", "the name of a file"))
+    watch.signing_key = read.file(section, "signing_key");
   section.end();
   return watch;
 }
 
 std::vector<std::string> WatchFile::names_of_peers() const {
   std::vector<std::string> names;
+  names.reserve(peers.size());
   for (const DicomPeer& peer : peers) names.push_back(peer.name);
   return names;
 }

@@ -6,6 +6,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <chrono>
@@ -19,16 +20,30 @@
 #include "base/error.h"
 #include "base/local_time.h"
 #include "base/output_folder.h"
+#include "workflow/room/audit_chain.h"
 
 namespace isoshift {
 namespace {
 
 using Json = nlohmann::ordered_json;
 
-std::string line_of(const std::string& event, const Json& details) {
+Json line_of(const std::string& event, const Json& details) {
   Json line = {{"on", local_time()}, {"event", event}};
   line.update(details);
-  return line.dump() + "\n";
+  return line;
+}
+
+// What the first line to come covers with its link, of a log of so many bytes.
+std::string end_of_log(int descriptor, off_t size) {
+  constexpr off_t kFirst = 4096, kGrowth = 8;
+  for (off_t length = kFirst;; length *= kGrowth) {
+    std::string text(static_cast<std::size_t>(std::min(size, length)), '\0');
+    if (::pread(descriptor, text.data(), text.size(), size - static_cast<off_t>(text.size())) < 0) return "";
+    if (static_cast<off_t>(text.size()) == size) return std::string(unlinked_end(text));
+    const std::size_t whole = text.find('\n') + 1;  // where the first whole line begins, if there is one
+    const std::string_view lines = std::string_view(text).substr(whole), end = unlinked_end(lines);
+    if (whole > 0 && end.size() < lines.size()) return std::string(end);
+  }
 }
 
 // Empty where the line has no such text.
@@ -68,12 +83,14 @@ void AuditLog::lock(int descriptor) const {
 }
 
 void AuditLog::append(const std::string& event, const Json& details) {
-  write(kept_ + line_of(event, details));
+  std::vector<Json> lines = kept_;
+  lines.push_back(line_of(event, details));
+  write(lines);
   kept_.clear();
 }
 
 void AuditLog::note(const std::string& event, const Json& details) {
-  kept_ += line_of(event, details);
+  kept_.push_back(line_of(event, details));
   try {
     write_kept();
   } catch (const Error&) {
@@ -87,14 +104,20 @@ void AuditLog::write_kept() {
   kept_.clear();
 }
 
-void AuditLog::write(const std::string& lines) const {
+void AuditLog::write(const std::vector<Json>& lines) const {
   const int descriptor = ::open(path_.c_str(), O_RDWR | O_APPEND | O_CREAT | O_CLOEXEC, 0640);
   if (descriptor < 0) throw Error(fmt::format("{}: cannot be written: {}", path_.string(), std::strerror(errno)));
   lock(descriptor);
   const off_t before = ::lseek(descriptor, 0, SEEK_END);
   char last = '\n';  // a line that was cut off gets an end
   const bool is_cut = before > 0 && ::pread(descriptor, &last, 1, before - 1) == 1 && last != '\n';
-  const int failure = append_and_flush(descriptor, (is_cut ? "\n" : "") + lines);
+  std::string covered = end_of_log(descriptor, before) + (is_cut ? "\n" : ""), text = is_cut ? "\n" : "";
+  for (Json line : lines) {
+    link(line, covered);
+    covered = line.dump() + "\n";
+    text += covered;
+  }
+  const int failure = append_and_flush(descriptor, text);
   // What was written of a line is taken back. In a log that can only grow it stays, and the next line begins after it.
   [[maybe_unused]] const int undone = failure != 0 ? ::ftruncate(descriptor, before) : 0;
   ::close(descriptor);
@@ -104,12 +127,11 @@ void AuditLog::write(const std::string& lines) const {
 
 void AuditLog::Proofs::add_lines(const std::string& text) {
   std::istringstream lines(text);
-  for (std::string line; std::getline(lines, line);) add(line);
+  for (std::string line; std::getline(lines, line);) add(Json::parse(line, nullptr, false));
 }
 
 // A line that was cut off proves nothing.
-void AuditLog::Proofs::add(const std::string& text) {
-  const Json line = Json::parse(text, nullptr, false);
+void AuditLog::Proofs::add(const Json& line) {
   if (!line.is_object()) return;
   const std::string event = text_of(line, "event"), session = text_of(line, "session");
   if (event == "registered") registrations[session] = text_of(line, "record");
@@ -147,12 +169,24 @@ const AuditLog::Proofs& AuditLog::proofs() const {
   const std::string text{std::istreambuf_iterator<char>(file), {}};
   if (!file) throw Error(fmt::format("{}: cannot be read", path_.string()));
   if (!text.starts_with(read_lines_)) refuse_another_log();
+  const AuditChain chain = chain_of(text);
+  if (!chain.broken.empty())
+    throw Error(fmt::format(
+        "{}: line {} does not follow from those before it: lines were changed, taken out or put in. Nothing "
+        "is released or sent until a person has looked (isoshift audit) and has recorded that",
+        path_.string(), chain.broken.front()));
   Proofs proofs;
   proofs.add_lines(text);
+  head_ = chain.head;
   proofs_ = std::move(proofs);
   read_version_ = {.inode = status.st_ino, .size = status.st_size, .written = status.st_mtim};
   read_lines_ = text.substr(0, text.rfind('\n') + 1);  // without a line that is being written, or was cut off
   return proofs_;
+}
+
+std::string AuditLog::head() const {
+  proofs();
+  return head_.empty() ? chain_of("").head : head_;
 }
 
 bool AuditLog::has_registration(const std::string& session, const std::string& record_sha256) const {
@@ -179,7 +213,7 @@ std::string AuditLog::newest_objection(const std::string& session) const {
 bool AuditLog::has_sending(const std::string& session, const std::string& peer,
                            const std::string& object_sha256) const {
   Proofs kept;
-  kept.add_lines(kept_);
+  for (const Json& line : kept_) kept.add(line);
   const std::array sending = {session, peer, object_sha256};
   return kept.sendings.contains(sending) || proofs().sendings.contains(sending);
 }

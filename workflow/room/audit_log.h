@@ -1,7 +1,7 @@
 #pragma once
-// The audit log of a results tree: one JSON object per line. Lines are only added. The log holds no names of patients
-// and no UIDs. It also proves which registrations and releases took place: their lines contain the SHA-256 of their
-// files.
+// The audit log of a results tree: one JSON object per line. Lines are only added, and each is linked to those before
+// it (audit_chain.h). The log holds no names of patients and no UIDs. It also proves which registrations and releases
+// took place: their lines contain the SHA-256 of their files.
 
 #include <sys/types.h>
 
@@ -14,6 +14,7 @@
 #include <set>
 #include <string>
 #include <utility>
+#include <vector>
 
 namespace isoshift {
 
@@ -29,8 +30,11 @@ class AuditLog {
   // Writes the lines that were kept. Throws Error if they still cannot be written.
   void write_kept();
 
-  // The following say what the lines prove. They throw Error if the log exists and cannot be read, and if it is not the
-  // log that was read before, with more lines: a line may have been taken out.
+  // The link of the next line: it stands for all lines so far, those that were kept left out. Throws Error as below.
+  std::string head() const;
+
+  // The following say what the lines prove. They throw Error if the log exists and cannot be read, if it is not the log
+  // that was read before, with more lines, and if a link is broken: a line may have been taken out.
   // True if the newest registration of the session has this record.
   bool has_registration(const std::string& session, const std::string& record_sha256) const;
   bool has_been_released(const std::string& session) const;
@@ -61,18 +65,19 @@ class AuditLog {
     std::set<std::array<std::string, 3>> sendings;  // session, peer, SHA-256 of the object
 
     void add_lines(const std::string& text);
-    void add(const std::string& line);
+    void add(const nlohmann::ordered_json& line);
   };
-  void write(const std::string& lines) const;
+  void write(const std::vector<nlohmann::ordered_json>& lines) const;
   // Waits a few seconds for other writers. Closes the file and throws Error if one of them does not end.
   void lock(int descriptor) const;
   const Proofs& proofs() const;  // reads the log again if it has changed
   [[noreturn]] void refuse_another_log() const;
 
   std::filesystem::path path_;
-  std::string kept_;  // lines that could not be written yet
+  std::vector<nlohmann::ordered_json> kept_;  // lines that could not be written yet
   mutable Version read_version_;
   mutable std::string read_lines_;  // the whole lines that were read: a log only grows
+  mutable std::string head_;
   mutable Proofs proofs_;
 };
 

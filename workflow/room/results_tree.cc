@@ -72,6 +72,14 @@ Json json_of(const Objection& objection) {
 // Of its text in the file.
 std::string sha256_of(const Objection& objection) { return isoshift::sha256_of(text_of(json_of(objection))); }
 
+constexpr const char* kSignatureKey = "signature";
+
+// What is signed of a release: all of it, with its keys sorted, in as few characters as JSON allows.
+std::string signed_text(nlohmann::json release) {
+  release.erase(kSignatureKey);
+  return release.dump();
+}
+
 // Folders of registrations under way: ".NAME.registering-PROCESS", and what isoshift register writes beside them.
 constexpr const char* kRegistering = ".registering-";
 
@@ -88,6 +96,10 @@ ResultsTree::ResultsTree(fs::path path) : path_(std::move(path)), audit_(path_ /
     fs::create_directories(path_ / folder, error);
     if (error) throw Error(fmt::format("{}: cannot be made: {}", (path_ / folder).string(), error.message()));
   }
+}
+
+ResultsTree::ResultsTree(const WatchFile& watch) : ResultsTree(watch.results) {
+  if (!watch.signing_key.empty()) key_.emplace(watch.signing_key);
 }
 
 std::optional<FileLock> ResultsTree::try_lock() const { return FileLock::try_take(path_ / ".watch.lock"); }
@@ -206,6 +218,7 @@ std::optional<Release> ResultsTree::release_of(const std::string& session) const
                     "file, or it was changed since, or another release followed it. Nothing of the session is sent. "
                     "Remove the file, and release the session with isoshift release",
                     path.string(), session));
+  check_signature(path, file.json);
   Release release;
   try {
     release = release_from(file.json);
@@ -218,6 +231,17 @@ std::optional<Release> ResultsTree::release_of(const std::string& session) const
                     "Remove the file, and release the session with isoshift release",
                     path.string()));
   return release;
+}
+
+void ResultsTree::check_signature(const fs::path& file, const nlohmann::json& release) const {
+  if (!key_) return;
+  const nlohmann::json signature =
+      release.is_object() ? release.value(kSignatureKey, nlohmann::json()) : nlohmann::json();
+  if (!signature.is_string() || !key_->has_signed(signed_text(release), signature))
+    throw Error(fmt::format(
+        "{}: is not signed by the signing_key of the watch file. Nothing of the session is sent. Remove the "
+        "file, and release the session with isoshift release",
+        file.string()));
 }
 
 // Only one process releases at a time.
@@ -291,6 +315,8 @@ void ResultsTree::put_release(const Release& release) {
   Json json = {{"schema", 1}, {"on", release.on}};
   json.update(release_json(release));
   if (!release.despite.empty()) json["despite"] = release.despite;
+  json[kAuditHeadKey] = audit_.head();
+  if (key_) json[kSignatureKey] = key_->sign(signed_text(nlohmann::json::parse(text_of(json))));
   const std::string text = text_of(json);
   replace_text(aside, text);
   std::error_code ignored;

@@ -22,6 +22,8 @@
 #include <vector>
 
 #include "base/file_lock.h"
+#include "base/signing_key.h"
+#include "io/config/watch_file.h"
 #include "workflow/room/audit_log.h"
 #include "workflow/room/session_record.h"
 
@@ -44,6 +46,9 @@ struct Objection {
 
   bool operator==(const Objection&) const = default;
 };
+
+// In the file of a release: the head of the audit log that the release saw.
+inline constexpr const char* kAuditHeadKey = "audit_head";
 
 struct Release {
   struct Object {
@@ -70,6 +75,8 @@ class ResultsTree {
  public:
   // Makes the folders that do not exist. Throws Error if that fails.
   explicit ResultsTree(std::filesystem::path path);
+  // That of a watch file, with its key: releases are signed, and those that the key has not signed do not count.
+  explicit ResultsTree(const WatchFile& watch);
 
   const std::filesystem::path& path() const { return path_; }
   std::filesystem::path session(const std::string& name) const { return path_ / "sessions" / name; }
@@ -140,6 +147,7 @@ class ResultsTree {
   // The record of a session. Throws Error if the session's folder has changed since its registration.
   SessionRecord checked(const std::string& session) const;
   FileLock lock_releases() const;
+  void check_signature(const std::filesystem::path& file, const nlohmann::json& release) const;
   void check_objects_are_new(const Release& release) const;
   void put_release(const Release& release);
   std::filesystem::path sent_file(const Delivery& delivery) const;
@@ -149,6 +157,7 @@ class ResultsTree {
 
   std::filesystem::path path_;
   AuditLog audit_;
+  std::optional<SigningKey> key_;
   std::set<std::string> delivered_;  // sessions that all of their peers have confirmed
 };
 

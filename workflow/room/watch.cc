@@ -30,7 +30,7 @@ FileLock only_watch_of(const ResultsTree& tree) {
 Watch::Watch(const WatchFile& watch, const Parts& parts)
     : watch_(watch),
       parts_(parts),
-      tree_(watch.results),
+      tree_(watch),
       lock_(only_watch_of(tree_)),
       objections_(tree_.objections(), parts.takes_other_xrays),
       kept_objections_(objections_.by_session()),

@@ -14,13 +14,14 @@
 #include "base/error.h"
 #include "tests/support/file_size_limit.h"
 #include "tests/support/temporary_folder.h"
+#include "workflow/room/audit_chain.h"
 
 namespace isoshift {
 namespace {
 
 namespace fs = std::filesystem;
-using testing::EndsWith;
 using testing::HasSubstr;
+using testing::IsEmpty;
 using testing::Not;
 
 class AuditLogTest : public testing::Test {
@@ -84,18 +85,26 @@ TEST_F(AuditLogTest, LinesThatWereTakenOutAreNoticed) {
   EXPECT_THROW(log_.has_registration("a", "r1"), Error);
   fs::remove(path_);
   EXPECT_THROW(log_.has_registration("a", "r1"), Error);
-  std::ofstream(path_) << earlier << earlier << earlier;  // another file
+  for (int n = 0; n < 3; ++n) AuditLog(path_).append("registered", registration("r1"));  // another file
   EXPECT_THROW(log_.has_registration("a", "r1"), Error);
   EXPECT_TRUE(AuditLog(path_).has_registration("a", "r1"));  // started again
 }
 
 TEST_F(AuditLogTest, LinesThatAreNoneAreSkipped) {
   log_.append("registered", registration("r1"));
-  add("x\n[]\n7\nnull\n{\"event\": 7, \"session\": []}\n{\"event\":\"released\",\"objects\":7}\n\n{\"event\":\"regis");
+  add("x\n[]\n7\nnull\n\n{\"event\":\"regis");
   EXPECT_TRUE(log_.has_registration("a", "r1"));
   log_.append("registered", registration("r2"));  // begins a line of its own
   EXPECT_TRUE(log_.has_registration("a", "r2"));
   EXPECT_THAT(text(), HasSubstr("{\"event\":\"regis\n{\"on\":"));
+}
+
+// A version of isoshift without links wrote it.
+TEST_F(AuditLogTest, LinesOfOtherKindsProveNothing) {
+  add("{\"event\": 7, \"session\": []}\n{\"event\":\"released\",\"objects\":7}\n");
+  log_.append("registered", registration("r1"));
+  EXPECT_TRUE(log_.has_registration("a", "r1"));
+  EXPECT_FALSE(log_.has_been_released("a"));
 }
 
 TEST_F(AuditLogTest, ALineThatCannotBeWrittenIsKeptOnlyIfItsStepWasTaken) {
@@ -139,8 +148,10 @@ TEST_F(AuditLogTest, LinesOfManyProcessesDoNotMix) {
   }
   std::ifstream file(path_);
   int lines = 0;
-  for (std::string line; std::getline(file, line); ++lines) EXPECT_THAT(line, EndsWith("\"record\":\"r\"}"));
+  for (std::string line; std::getline(file, line); ++lines)
+    EXPECT_THAT(line, HasSubstr("\"record\":\"r\",\"before\":"));
   EXPECT_EQ(lines, kThreads * kLines);
+  EXPECT_THAT(chain_of(text()).broken, IsEmpty());
 }
 
 }  // namespace

@@ -1,0 +1,63 @@
+#include "base/signing_key.h"
+
+#include <fmt/format.h>
+#include <openssl/evp.h>
+#include <openssl/pem.h>
+#include <sys/stat.h>
+
+#include <array>
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
+
+#include "base/error.h"
+
+namespace isoshift {
+namespace {
+
+constexpr std::size_t kSignatureBytes = 64;
+
+struct Deleter {
+  void operator()(EVP_MD_CTX* context) const { EVP_MD_CTX_free(context); }
+  void operator()(std::FILE* file) const { std::fclose(file); }
+};
+template <class T>
+using Owned = std::unique_ptr<T, Deleter>;
+
+const unsigned char* bytes_of(std::string_view text) { return reinterpret_cast<const unsigned char*>(text.data()); }
+
+}  // namespace
+
+SigningKey::SigningKey(const std::filesystem::path& path) {
+  const Owned<std::FILE> file(std::fopen(path.c_str(), "rbe"));
+  struct stat status{};
+  if (!file || ::fstat(::fileno(file.get()), &status) != 0)
+    throw Error(fmt::format("{}: cannot be read: {}", path.string(), std::strerror(errno)));
+  if ((status.st_mode & (S_IRWXG | S_IRWXO)) != 0)
+    throw Error(fmt::format("{}: other users can read or write this key: chmod 600 {}", path.string(), path.string()));
+  char no_passphrase[] = "";
+  key_.reset(PEM_read_PrivateKey(file.get(), nullptr, nullptr, no_passphrase), EVP_PKEY_free);
+  if (!key_ || EVP_PKEY_id(key_.get()) != EVP_PKEY_ED25519)
+    throw Error(fmt::format(
+        "{}: holds no private Ed25519 key without passphrase in PEM; openssl genpkey -algorithm ed25519 makes one",
+        path.string()));
+}
+
+std::string SigningKey::sign(std::string_view text) const {
+  const Owned<EVP_MD_CTX> context(EVP_MD_CTX_new());
+  std::array<unsigned char, kSignatureBytes> signature{};
+  std::size_t size = signature.size();
+  if (!context || EVP_DigestSignInit(context.get(), nullptr, nullptr, nullptr, key_.get()) != 1 ||
+      EVP_DigestSign(context.get(), signature.data(), &size, bytes_of(text), text.size()) != 1)
+    throw Error("the text cannot be signed");
+  std::array<unsigned char, 4 * (kSignatureBytes + 2) / 3 + 1> base64{};
+  const int length = EVP_EncodeBlock(base64.data(), signature.data(), static_cast<int>(size));
+  return {base64.begin(), base64.begin() + length};
+}
+
+bool SigningKey::has_signed(std::string_view text, const std::string& signature) const {
+  // Ed25519 signs the same text always in the same way.
+  return sign(text) == signature;
+}
+
+}  // namespace isoshift
