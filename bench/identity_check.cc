@@ -144,7 +144,8 @@ int check(int patient_count, std::optional<int> only) {
     try {
       const std::vector<FixedImage> images = prepared(xrays);
       result = register_views(renderers, images, planned, options);
-      if (may_have_bent(options, images, result)) register_bodies(bent, images, planned, options, result);
+      if (may_have_bent(options, images, result) || may_target_lie_elsewhere(renderers, images, options, result))
+        register_bodies(bent, images, planned, options, result);
     } catch (const Error& error) {
       fmt::print("{},{},{},error,,,,,,,,,,,,\"{}\"\n", ct, of, what, error.what());
       return;

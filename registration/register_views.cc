@@ -80,14 +80,18 @@ void RegistrationOptions::check() const {
   if (stages.empty()) throw UsageError("stages is empty, expected at least one");
 }
 
+FixedViews compared_views(const RegistrationOptions& options, std::span<const FixedImage> images) {
+  static const ProjectedRegion everything;
+  return {.images = restricted_to(options.rectangles, images),
+          .region = options.region != nullptr ? *options.region : everything};
+}
+
 RegistrationResult register_views(const RendererPyramid& renderers, std::span<const FixedImage> images,
                                   const Eigen::Isometry3d& start_room_from_patient, const RegistrationOptions& options,
                                   const SearchProgress& progress) {
   options.check();
   const auto begin = std::chrono::steady_clock::now();
-  const ProjectedRegion everything;
-  FixedViews fixed{.images = restricted_to(options.rectangles, images),
-                   .region = options.region != nullptr ? *options.region : everything};
+  FixedViews fixed = compared_views(options, images);
   std::vector<XrayView> views;
   for (FixedImage& image : fixed.images) {
     views.push_back(image.view);

@@ -46,6 +46,9 @@ struct RegistrationResult : Registration {
   std::vector<ViewMatch> views;
 };
 
+// What of the X-rays is compared, by the options' rectangles and region.
+FixedViews compared_views(const RegistrationOptions& options, std::span<const FixedImage> images);
+
 // Searches from `start_room_from_patient`, the planned pose, and judges what it finds. `images`: the X-ray of each
 // view, as prepared() returns it. Throws Error where the CT does not appear in a view.
 RegistrationResult register_views(const RendererPyramid& renderers, std::span<const FixedImage> images,

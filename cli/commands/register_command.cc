@@ -11,6 +11,7 @@
 #include "cli/commands/commands.h"
 #include "cli/switches/registration_switches.h"
 #include "cli/switches/study_switches.h"
+#include "geometry/patient_setup.h"
 #include "io/objects/spatial_registration.h"
 #include "io/report/formats.h"
 #include "io/report/result_folder.h"
@@ -31,16 +32,31 @@ int exit_status_of(Verdict verdict) {
 
 namespace {
 
+// Where the target's center was planned.
+Eigen::Vector3d planned_target_patient_mm(const SetupResult& report) {
+  const auto position = patient_position_from(report.patient_position);
+  if (!position || !report.target) return report.isocenter_patient_mm;
+  return planned_room_from_patient(*position, report.table, report.isocenter_patient_mm).inverse() *
+         report.target->center_room_mm;
+}
+
 int run_register(RegisterOptions options, const std::filesystem::path& truth_file, bool as_json, Console& console) {
   options.registration.settle();
   std::optional<Eigen::Isometry3d> truth;
-  if (!truth_file.empty()) truth = read_setup_error(truth_file);
+  std::vector<BodyTruth> body_truths;
+  if (!truth_file.empty()) {
+    truth = read_setup_error(truth_file);
+    body_truths = read_body_truths(truth_file);
+  }
+  const bool names_target = !options.target.empty();
   SharedWork none;
   ConsoleObserver observer(console);
   const SetupResult report = register_study(options, none, observer);
   print_warnings(report.warnings, console);
   console.out << (as_json ? json_report(report) : text_report(report_page(report)));
   if (!as_json) {
+    if (truth && names_target)
+      truth = truth_at(planned_target_patient_mm(report), *truth, report.isocenter_patient_mm, body_truths);
     if (truth) console.out << "\n" << compared_with_truth(report.setup_error, *truth);
     console.out << fmt::format("\nWritten to {}\n",
                                std::filesystem::absolute(options.output).lexically_normal().string());

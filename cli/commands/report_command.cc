@@ -20,9 +20,21 @@ struct ReportOptions {
   bool overwrite = false;
 };
 
+// A report cannot answer for another target than its registration did.
+void check_target_is_the_sites(const SetupResult& report, const ReportOptions& options) {
+  if (options.site.empty() || !report.target) return;
+  const std::string& of_site = report.site->target;
+  if (!of_site.empty() && of_site != report.target->name && of_site != "isocenter")
+    throw Error(
+        fmt::format("{}: is the result for {}, and the target of {} is {}. Register the study again with this site "
+                    "file, or report without it",
+                    (options.result / kResultFile).string(), report.target->name, options.site.string(), of_site));
+}
+
 void run_report(const ReportOptions& options, Console& console) {
   SetupResult report = read_result(options.result);
   report.site = chosen_site(named_site(options.site), options.anatomy, report.site);
+  check_target_is_the_sites(report, options);
   OutputFolder output(options.output.empty() ? options.result : options.output, options.overwrite);
   write_result(report, output.path());
   if (options.site.empty())  // nothing in it has changed

@@ -1,8 +1,10 @@
 #include "io/config/site_file.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <regex>
+#include <set>
 
 #include "base/error.h"
 #include "base/json_file.h"
@@ -134,10 +136,14 @@ std::optional<ActionLevel> action_level(const SiteFile& site, std::string_view a
   const auto level = site.action_levels.find(anatomy.empty() ? "default" : anatomy);
   if (level != site.action_levels.end()) return level->second;
   if (anatomy.empty() || site.targets.contains(anatomy) || site.surrogates.contains(anatomy)) return std::nullopt;
-  std::string names;
-  for (const auto& [name, unused] : site.action_levels) names += (names.empty() ? "" : ", ") + name;
-  throw UsageError(fmt::format("--anatomy {}: site file \"{}\" has action levels for {}", anatomy, site.name,
-                               names.empty() ? "none" : names));
+  std::set<std::string> names;
+  for (const auto& [name, unused] : site.action_levels) names.insert(name);
+  for (const NameByAnatomy* named : {&site.targets, &site.surrogates})
+    for (const auto& [name, unused] : *named) names.insert(name);
+  throw UsageError(
+      fmt::format("--anatomy {}: site file \"{}\" has this anatomy neither in action_levels nor in targets "
+                  "or surrogates. It has: {}",
+                  anatomy, site.name, names.empty() ? "none" : fmt::format("{}", fmt::join(names, ", "))));
 }
 
 std::string target_named(const SiteFile& site, std::string_view anatomy) { return name_for(site.targets, anatomy); }

@@ -121,10 +121,10 @@ const Structure& structure_named(const RtStructures& structures, std::string_vie
   if (meant.size() != 1) {
     std::vector<std::string> there;
     for (const Structure& structure : structures.structures) there.push_back(fmt::format("\"{}\"", structure.name));
-    throw Error(fmt::format("{}: {} structure{} named \"{}\" ({}), expected one.\n       There are: {}", where,
+    throw Error(fmt::format("{}: {} structure{} named \"{}\" ({}), expected one.\n       There are: {}{}", where,
                             meant.empty() ? "no" : fmt::format("{}", meant.size()), meant.empty() ? "" : "s", name,
-                            described(DCM_ROIName),
-                            there.empty() ? "none" : fmt::format("{}", fmt::join(there, ", "))));
+                            described(DCM_ROIName), there.empty() ? "none" : fmt::format("{}", fmt::join(there, ", ")),
+                            meant.size() > 1 ? ".\n       Names must differ: rename one in the planning system" : ""));
   }
   if (meant.front()->contours.empty())
     throw Error(fmt::format("{}: structure {} \"{}\" has no closed contour ({} CLOSED_PLANAR), so it encloses nothing",

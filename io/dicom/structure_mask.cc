@@ -118,7 +118,10 @@ Volume<std::uint8_t> mask_of(const Structure& structure, const Eigen::Vector3i& 
     fill_rows(k, mask);
   }
   if (std::ranges::find(mask.voxels, std::uint8_t{1}) == mask.voxels.end())
-    throw Error(fmt::format("{}: no voxel of the CT lies in it ({})", name_of(structure), described(DCM_ContourData)));
+    throw Error(
+        fmt::format("{}: no voxel of the CT lies in it ({}): it is drawn outside of the CT, or is smaller than a "
+                    "voxel. Name another structure, or the CT on which this one was drawn (--ct FOLDER)",
+                    name_of(structure), described(DCM_ContourData)));
   return mask;
 }
 

@@ -112,7 +112,10 @@ std::string bent_words(const ShownShift& shown, LengthUnit unit) {
     if (*body.mm > kLeastMm && (farthest == nullptr || *body.mm > *farthest->mm)) farthest = &body;
     if (*body.deg > kLeastDeg && (most_turned == nullptr || *body.deg > *most_turned->deg)) most_turned = &body;
   }
-  if (std::ranges::none_of(shown.moved, counts)) return "What the bones did against the target is not determined";
+  // What carries the target cannot have moved against it by much, and says nothing of the others.
+  const auto is_other = [&](const Moved& body) { return counts(body) && !(body.carries_target > 0.0); };
+  if (std::ranges::none_of(shown.moved, is_other))
+    return "What the other bones did against the target is not determined";
   const std::string once = "Once the target is right, ";
   const std::string headward = spine_words(shown.moved, 1), footward = spine_words(shown.moved, -1);
   if (!headward.empty() || !footward.empty())

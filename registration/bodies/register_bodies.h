@@ -27,6 +27,11 @@ struct BentPatient {
 bool may_have_bent(const RegistrationOptions& options, std::span<const FixedImage> images,
                    const RegistrationResult& whole);
 
+// The same of a patient who was accepted as a whole, by what the target's surroundings show: a jaw that has opened far
+// matches nowhere near, and no part of the images says where it went.
+bool may_target_lie_elsewhere(const RendererPyramid& renderers, std::span<const FixedImage> images,
+                              const RegistrationOptions& options, const RegistrationResult& whole);
+
 // Searches all bodies from the pose of the whole, and judges again. In the result, pose, uncertainty, similarities and
 // contradictions are those of the bodies that carry the target; `alternatives` gains what the images say of a spine one
 // vertebra higher or lower; `bodies` and `structures` hold what the others did. Bones carry the target by their shares

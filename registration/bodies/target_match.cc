@@ -16,8 +16,9 @@ constexpr double kPixelMm = 4.0, kReachMm = 40.0, kPartMm = 12.0;
 constexpr std::ptrdiff_t kLeastPixels = 200;
 constexpr std::size_t kLeastPixelsOfAPart = 6;
 
-std::vector<FixedImage> surroundings(const BodyScene& scene, const Vector3d& target_room_mm) {
-  std::vector<FixedImage> level = scene.views.reduced_to(kPixelMm, scene.whole_room_from_patient, 0.0);
+std::vector<FixedImage> surroundings(const FixedViews& views, const Eigen::Isometry3d& about,
+                                     const Vector3d& target_room_mm) {
+  std::vector<FixedImage> level = views.reduced_to(kPixelMm, about, 0.0);
   for (FixedImage& image : level) {
     const auto center = image.view.project(target_room_mm);
     Image<std::uint8_t> near = image.field;
@@ -64,22 +65,53 @@ double match_of_parts(const XrayView& view, std::span<const std::uint32_t> compa
   return weighted_median(std::move(correlations));
 }
 
-}  // namespace
-
-TargetMatch match_near_target(const BodyScene& scene, const Vector3d& target_room_mm, const BodyPoses& poses) {
-  const std::vector<FixedImage> level = surroundings(scene, target_room_mm);
-  const Objective pixels(*scene.fine.as_one, level, poses.front().front(),
-                         {.similarity = SimilarityKind::kGradientCorrelation});
-  const double share = 1.0 / static_cast<double>(level.size());
+// Of the line integrals, by view, of the pixels that `pixels` renders.
+TargetMatch match_of(const Objective& pixels, std::span<const std::vector<float>> drrs) {
+  const double share = 1.0 / static_cast<double>(drrs.size());
   TargetMatch match;
-  for (std::size_t view = 0; view < level.size(); ++view) {
+  for (std::size_t view = 0; view < drrs.size(); ++view) {
     const Comparison& comparison = pixels.comparison(view);
-    const std::vector<float> drr = scene.fine.line_integrals(pixels, poses, view);
+    const std::vector<float>& drr = drrs[view];
     match.of_all += share * comparison.of(drr);
     match.of_parts += share * match_of_parts(pixels.views()[view], pixels.compared_pixels(view),
                                              comparison.xray_gradients(), gradients(drr, comparison.neighbors()));
   }
   return match;
+}
+
+TargetMatch match_of_whole(std::span<const FixedImage> level, Renderer& renderer,
+                           const Eigen::Isometry3d& room_from_patient) {
+  Objective pixels(renderer, level, room_from_patient, {.similarity = SimilarityKind::kGradientCorrelation});
+  const RenderResult rendered = pixels.render(std::span(&room_from_patient, 1));
+  std::vector<std::vector<float>> drrs;
+  drrs.reserve(level.size());
+  for (std::size_t view = 0; view < level.size(); ++view) {
+    const auto drr = rendered.line_integrals(0, view);
+    drrs.emplace_back(drr.begin(), drr.end());
+  }
+  return match_of(pixels, drrs);
+}
+
+}  // namespace
+
+TargetMatch match_near_target(const BodyScene& scene, const Vector3d& target_room_mm, const BodyPoses& poses) {
+  const std::vector<FixedImage> level = surroundings(scene.views, scene.whole_room_from_patient, target_room_mm);
+  const Objective pixels(*scene.fine.as_one, level, poses.front().front(),
+                         {.similarity = SimilarityKind::kGradientCorrelation});
+  std::vector<std::vector<float>> drrs;
+  drrs.reserve(level.size());
+  for (std::size_t view = 0; view < level.size(); ++view)
+    drrs.push_back(scene.fine.line_integrals(pixels, poses, view));
+  return match_of(pixels, drrs);
+}
+
+TargetMatch match_near_target(const FixedViews& views, Renderer& renderer, const Eigen::Isometry3d& room_from_patient,
+                              const Vector3d& target_room_mm) {
+  return match_of_whole(surroundings(views, room_from_patient, target_room_mm), renderer, room_from_patient);
+}
+
+TargetMatch match_everywhere(const FixedViews& views, Renderer& renderer, const Eigen::Isometry3d& room_from_patient) {
+  return match_of_whole(views.reduced_to(kPixelMm, room_from_patient, 0.0), renderer, room_from_patient);
 }
 
 }  // namespace isoshift

@@ -17,4 +17,9 @@ struct TargetMatch {
 // Of what lies within 40 mm of the target; in small fields that show too little of it, of all that they show.
 TargetMatch match_near_target(const BodyScene& scene, const Eigen::Vector3d& target_room_mm, const BodyPoses& poses);
 
+// The same of a patient as a whole, and of all that the X-rays show of it.
+TargetMatch match_near_target(const FixedViews& views, Renderer& renderer, const Eigen::Isometry3d& room_from_patient,
+                              const Eigen::Vector3d& target_room_mm);
+TargetMatch match_everywhere(const FixedViews& views, Renderer& renderer, const Eigen::Isometry3d& room_from_patient);
+
 }  // namespace isoshift

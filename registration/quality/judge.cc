@@ -31,6 +31,7 @@ constexpr double kMaxTwoSigmaMm = 1.0, kMaxTwoSigmaRad = rad_from_deg(1.0);
 // differ little; others 0.72 and 0.88). Right patients had 0.86 and more, or, with contrast that has changed near the
 // target, in noise, or far bent, mostly 0.95 and more of the median part.
 constexpr double kMinTargetMatch = 0.86, kMinTargetMatchOfParts = 0.95;
+constexpr std::ptrdiff_t kMinDeterminedBones = 2;
 constexpr double kMinImageShare = 0.3, kMaxDeformationMm = 2.0;
 // What carries a target is small, and turns less surely than a whole patient; what counts is where its surface lies.
 constexpr double kMaxTwoSigmaRadOfBodies = rad_from_deg(2.0);
@@ -126,6 +127,9 @@ void judge_bodies(RegistrationResult& result) {
                        "parts by themselves {:.3f}, {:.2f} is expected): they may be another patient's, or the target "
                        "may lie elsewhere",
                        result.target_match, kMinTargetMatch, result.target_match_of_parts, kMinTargetMatchOfParts));
+  // What one bone alone wants, nothing confirms: one that is nearly straight fits as well where it has slid along.
+  if (std::ranges::count_if(result.bodies, &BodyMotion::is_determined) < kMinDeterminedBones)
+    review(result, "the images determine no bone but the one that carries the target: nothing confirms where it lies");
   if (!(result.target_image_share >= kMinImageShare))
     review(result, fmt::format("the images hardly show the bodies that carry the target: {:.0f} % of what is known of "
                                "their place comes from them, the rest from their neighbors",

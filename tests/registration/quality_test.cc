@@ -85,7 +85,7 @@ TEST(Quality, TooLittleToCheckForMovedAnatomyNeedsReview) {
 TEST(Quality, SurroundingsOfTheTargetThatMatchPoorlyNeedAReview) {
   const auto bent = [](double match, double image_share, double deformation_mm) {
     return [=](RegistrationResult& result) {
-      result.bodies.resize(3);
+      result.bodies.assign(3, {.image_share = 0.9});
       result.target_match = match;
       result.target_image_share = image_share;
       result.target_deformation_mm = deformation_mm;
@@ -101,6 +101,20 @@ TEST(Quality, SurroundingsOfTheTargetThatMatchPoorlyNeedAReview) {
   });
   expect_review(bent(0.9, 0.2, 1.0), "the images hardly show the bodies that carry the target");
   expect_review(bent(0.9, 0.6, 2.5), "the target itself is bent");
+}
+
+// One that is nearly straight fits where it has slid along, too.
+TEST(Quality, ABoneThatNoOtherConfirmsNeedsAReview) {
+  const auto with_determined = [](std::size_t count) {
+    return [=](RegistrationResult& result) {
+      result.bodies.assign(4, {.image_share = 0.0});
+      for (std::size_t n = 0; n < count; ++n) result.bodies[n].image_share = 0.9;
+      result.target_match = 0.9;
+      result.target_image_share = 0.6;
+    };
+  };
+  expect_accepted(with_determined(2));
+  expect_review(with_determined(1), "nothing confirms where it lies");
 }
 
 TEST(Quality, ViewsThatContradictEachOtherNeedReview) {

@@ -210,7 +210,7 @@ void run_missing(EvaluationFolder& folder, const Study& study, const Target& tar
 
 }  // namespace
 
-EvaluationFolder evaluate_study(const EvaluateOptions& options, Notes& notes, Observer& observer) {
+EvaluationFolder evaluate_study(EvaluateOptions options, Notes& notes, Observer& observer) {
   const RendererKind kind = options.registration.rendering.kind();
   if (uses_gl(kind) && options.jobs > 1)
     throw UsageError(
@@ -219,6 +219,9 @@ EvaluationFolder evaluate_study(const EvaluateOptions& options, Notes& notes, Ob
   const int jobs = uses_gl(kind) ? 1 : options.jobs > 0 ? options.jobs : cores;
   const Study study = load(options.study, notes, observer);
   const TargetChoice choice = target_of(study, {.by_person = options.target});
+  if (!options.target.empty())
+    options.truth = truth_at(study.planned_room_from_patient.inverse() * choice.target.center_room_mm, options.truth,
+                             study.isocenter_patient_mm, options.body_truths);
   const Surrogate surrogate = surrogate_of(study, choice.target, "");
   RendererStore renderers;
   BodyStore bodies;

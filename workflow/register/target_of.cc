@@ -40,8 +40,21 @@ struct Candidate {
   const Structure* structure;
   Volume<std::uint8_t> mask;
   bool holds_isocenter = false;
+  bool reaches_beyond_ct = false;
   std::size_t voxels = 0;
 };
+
+// Whether contours lie more than a voxel outside of the voxels' centers.
+bool reaches_beyond(const Volume<float>& ct, const Structure& structure) {
+  const Eigen::Affine3d voxel_from_patient = ct.patient_from_voxel.inverse();
+  const auto is_beyond = [&](const Eigen::Vector3d& point_patient_mm) {
+    const Eigen::Vector3d voxel = voxel_from_patient * point_patient_mm;
+    return (voxel.array() < -1.0).any() || (voxel.array() > ct.size.cast<double>().array()).any();
+  };
+  return std::ranges::any_of(structure.contours, [&](const Contour& contour) {
+    return std::ranges::any_of(contour.points_patient_mm, is_beyond);
+  });
+}
 
 bool is_drawn_here(const Structure& structure, const Study& study) {
   const std::string& frame = study.ct->frame_of_reference_uid;
@@ -55,6 +68,7 @@ Candidate candidate_of(const Structure& structure, const Study& study) {
   const Eigen::Vector3d voxel = ct.patient_from_voxel.inverse() * study.isocenter_patient_mm;
   const Eigen::Vector3i at = voxel.array().round().cast<int>();
   const bool inside = (at.array() >= 0).all() && (at.array() < ct.size.array()).all();
+  candidate.reaches_beyond_ct = reaches_beyond(ct, structure);
   candidate.holds_isocenter = inside && candidate.mask.at(at.x(), at.y(), at.z()) != 0;
   return candidate;
 }
@@ -79,43 +93,75 @@ Target target_from(const Candidate& candidate, const Study& study, std::string c
   return target;
 }
 
+TargetChoice choice_of(const Candidate& candidate, const Study& study, const std::string& why) {
+  TargetChoice choice{.target = target_from(candidate, study, why), .doubts = {}};
+  if (candidate.reaches_beyond_ct)
+    choice.doubts.push_back(
+        fmt::format("the target {} reaches beyond the CT: where its center lies, and what carries it, "
+                    "is known only of the part inside",
+                    choice.target.name));
+  return choice;
+}
+
 TargetChoice named(const Study& study, const std::string& name, const std::string& by) {
   if (name == kIsocenter) return {.target = surroundings(by), .doubts = {}};
   if (!study.structures)
     throw Error(
         fmt::format("target {} ({}): the study holds no RT Structure Set (--structures FILE names one)", name, by));
-  return {.target = target_from(candidate_of(structure_named(*study.structures, name), study), study, by),
-          .doubts = {}};
+  return choice_of(candidate_of(structure_named(*study.structures, name), study), study, by);
 }
 
 // Of several that fit, the smallest around the isocenter, or the smallest of all.
 TargetChoice chosen_among(std::vector<Candidate> candidates, const Study& study, const std::string& why) {
-  const bool any_holds = std::ranges::any_of(candidates, &Candidate::holds_isocenter);
-  if (any_holds) std::erase_if(candidates, [](const Candidate& candidate) { return !candidate.holds_isocenter; });
-  const Candidate& smallest = *std::ranges::min_element(candidates, {}, &Candidate::voxels);
-  TargetChoice choice{.target = target_from(smallest, study, why), .doubts = {}};
-  if (candidates.size() == 1) return choice;
   std::vector<std::string> names;
   names.reserve(candidates.size());
   for (const Candidate& candidate : candidates) names.push_back(candidate.structure->name);
+  const bool any_holds = std::ranges::any_of(candidates, &Candidate::holds_isocenter);
+  if (any_holds) std::erase_if(candidates, [](const Candidate& candidate) { return !candidate.holds_isocenter; });
+  TargetChoice choice = choice_of(*std::ranges::min_element(candidates, {}, &Candidate::voxels), study, why);
+  if (names.size() == 1) return choice;
   choice.doubts.push_back(fmt::format("several structures may be the target ({}); {} was taken. Name it: --target NAME",
                                       fmt::join(names, ", "), choice.target.name));
   return choice;
 }
 
+// Numbers of the ROIs to which the plan's dose references of type TARGET refer.
+std::vector<int> prescribed_rois(const Study& study) {
+  std::vector<int> numbers;
+  if (!study.plan) return numbers;
+  for (const RtPlan::DoseReference& reference : study.plan->dose_references)
+    if (reference.type == "TARGET" && reference.roi_number &&
+        std::ranges::find(numbers, *reference.roi_number) == numbers.end())
+      numbers.push_back(*reference.roi_number);
+  return numbers;
+}
+
+// Of those, the ones that are drawn on this CT.
 std::vector<Candidate> prescribed(const Study& study) {
   std::vector<Candidate> candidates;
-  if (!study.plan || !study.structures) return candidates;
-  for (const RtPlan::DoseReference& reference : study.plan->dose_references) {
-    if (reference.type != "TARGET" || !reference.roi_number) continue;
-    for (const Structure& structure : study.structures->structures) {
-      const auto is_this = [&](const Candidate& candidate) { return candidate.structure == &structure; };
-      if (structure.number == *reference.roi_number && is_drawn_here(structure, study) &&
-          std::ranges::none_of(candidates, is_this))
+  if (!study.structures) return candidates;
+  for (const int number : prescribed_rois(study))
+    for (const Structure& structure : study.structures->structures)
+      if (structure.number == number && is_drawn_here(structure, study))
         candidates.push_back(candidate_of(structure, study));
-    }
-  }
   return candidates;
+}
+
+// What the plan says of a target that cannot be followed.
+void doubt_lost_rois(const Study& study, TargetChoice& choice) {
+  if (!study.structures) return;  // whoever leaves it out knows; the report says so
+  for (const int number : prescribed_rois(study)) {
+    const std::string plans_target =
+        fmt::format("the plan's target is ROI number {} (ReferencedROINumber (3006,0084))", number);
+    const char* const instead = "Name the target: --target NAME or isocenter";
+    const auto found = std::ranges::find(study.structures->structures, number, &Structure::number);
+    const std::string file = study.structures->path.filename().string();
+    if (found == study.structures->structures.end())
+      choice.doubts.push_back(fmt::format("{}, which {} does not have. {}", plans_target, file, instead));
+    else if (!is_drawn_here(*found, study))
+      choice.doubts.push_back(fmt::format("{}, \"{}\", which has no closed contour on this CT in {}. {}", plans_target,
+                                          found->name, file, instead));
+  }
 }
 
 std::vector<Candidate> around_isocenter(const Study& study, std::string_view type) {
@@ -127,6 +173,17 @@ std::vector<Candidate> around_isocenter(const Study& study, std::string_view typ
     if (candidate.holds_isocenter) candidates.push_back(std::move(candidate));
   }
   return candidates;
+}
+
+TargetChoice chosen_by_plan(const Study& study) {
+  if (std::vector<Candidate> candidates = prescribed(study); !candidates.empty())
+    return chosen_among(std::move(candidates), study, "dose reference of the plan");
+  for (const char* type : {"PTV", "CTV", "GTV"})
+    if (std::vector<Candidate> candidates = around_isocenter(study, type); !candidates.empty())
+      return chosen_among(std::move(candidates), study, fmt::format("the {} that holds the isocenter", type));
+  return {.target = surroundings(study.structures ? "no target volume holds the isocenter"
+                                                  : "the study holds no RT Structure Set"),
+          .doubts = {}};
 }
 
 constexpr std::array kToldOf = {"PTV", "CTV", "GTV", "ORGAN", "AVOIDANCE", "CAVITY"};  // RT ROI Interpreted Types
@@ -152,12 +209,9 @@ std::vector<Target> structures_beside(const std::string& target, const Study& st
 TargetChoice target_of(const Study& study, const TargetWish& wish) {
   if (!wish.by_person.empty()) return named(study, wish.by_person, "--target");
   if (!wish.by_site.empty()) return named(study, wish.by_site, "the site file");
-  if (std::vector<Candidate> candidates = prescribed(study); !candidates.empty())
-    return chosen_among(std::move(candidates), study, "dose reference of the plan");
-  for (const char* type : {"PTV", "CTV", "GTV"})
-    if (std::vector<Candidate> candidates = around_isocenter(study, type); !candidates.empty())
-      return chosen_among(std::move(candidates), study, fmt::format("the {} that holds the isocenter", type));
-  return {.target = surroundings("no target volume holds the isocenter"), .doubts = {}};
+  TargetChoice choice = chosen_by_plan(study);
+  doubt_lost_rois(study, choice);
+  return choice;
 }
 
 }  // namespace isoshift

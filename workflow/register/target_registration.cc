@@ -50,7 +50,7 @@ RegistrationResult TargetRegistration::from(const Eigen::Isometry3d& start_room_
   RegistrationResult found = register_views(setup_.renderers(), images, start_room_from_patient, options_,
                                             [&](double share) { observer.progress("Registering", share); });
   observer.progress("Registering", 1.0);
-  if (may_have_bent(options_, images, found))
+  if (may_have_bent(options_, images, found) || may_target_lie_elsewhere(setup_.renderers(), images, options_, found))
     register_bodies(bent_patient(), images, study_.planned_room_from_patient, options_, found,
                     [&](double share) { observer.progress("Registering the target", share); });
   for (const std::string& doubt : study_.doubts) found.demote(Verdict::kReview, doubt);

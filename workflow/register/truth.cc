@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <fstream>
@@ -58,6 +59,15 @@ std::vector<BodyTruth> read_body_truths(const std::filesystem::path& path) {
   } catch (const nlohmann::json::exception& error) {
     throw Error(fmt::format("{}: the motions of its bodies cannot be read: {}", path.string(), error.what()));
   }
+}
+
+Eigen::Isometry3d truth_at(const Eigen::Vector3d& point_patient_mm, const Eigen::Isometry3d& at_isocenter,
+                           const Eigen::Vector3d& isocenter_patient_mm, std::span<const BodyTruth> bodies) {
+  const auto distance_mm = [&](const BodyTruth& body) { return (body.center_patient_mm - point_patient_mm).norm(); };
+  const auto nearest = std::ranges::min_element(bodies, {}, distance_mm);
+  const bool is_body =
+      nearest != bodies.end() && distance_mm(*nearest) < (isocenter_patient_mm - point_patient_mm).norm();
+  return is_body ? nearest->setup_error : at_isocenter;
 }
 
 namespace {

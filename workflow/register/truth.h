@@ -3,6 +3,7 @@
 
 #include <Eigen/Geometry>
 #include <filesystem>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -21,6 +22,11 @@ struct BodyTruth {
 // `bodies` of a truth.json, or its `levels`; empty if it has neither, and for a result.json. Throws Error naming the
 // file.
 std::vector<BodyTruth> read_body_truths(const std::filesystem::path& path);
+
+// The true setup error of the anatomy at a point: the body's whose center is nearest; `at_isocenter` where the
+// isocenter is nearer still, or no body is known.
+Eigen::Isometry3d truth_at(const Eigen::Vector3d& point_patient_mm, const Eigen::Isometry3d& at_isocenter,
+                           const Eigen::Vector3d& isocenter_patient_mm, std::span<const BodyTruth> bodies);
 
 // A table for a person: found, true and difference per axis, and the mean target registration error.
 std::string compared_with_truth(const Eigen::Isometry3d& found_error, const Eigen::Isometry3d& true_error);

@@ -100,7 +100,10 @@ TEST_F(SiteFileTest, AnAnatomyItDoesNotKnowIsRefused) {
         try {
           action_level(site, "pelvis");
         } catch (const UsageError& error) {
-          EXPECT_THAT(error.what(), HasSubstr("--anatomy pelvis: site file \"A\" has action levels for head"));
+          EXPECT_THAT(
+              error.what(),
+              HasSubstr("--anatomy pelvis: site file \"A\" has this anatomy neither in action_levels nor in targets or "
+                        "surrogates. It has: head"));
           throw;
         }
       },

@@ -156,10 +156,12 @@ TEST_F(RtStructuresTest, NamesAreFoundAsSpeltElseInOtherCase) {
   const RtStructures structures = read({{"Spine", {square_}}, {"SPINE", {square_}}, {"Cord", {square_}}});
   EXPECT_EQ(structure_named(structures, "SPINE").number, 2);
   EXPECT_EQ(structure_named(structures, "cord").number, 3);
-  EXPECT_EQ(error_of_naming(structures, "spine"),
-            study_.structures().string() +
-                ": 2 structures named \"spine\" (ROIName (3006,0026)), expected one.\n"
-                "       There are: \"Spine\", \"SPINE\", \"Cord\"");
+  EXPECT_EQ(
+      error_of_naming(structures, "spine"),
+      study_.structures().string() +
+          ": 2 structures named \"spine\" (ROIName (3006,0026)), expected one.\n"
+          "       There are: \"Spine\", \"SPINE\", \"Cord\".\n       Names must differ: rename one in the planning "
+          "system");
   EXPECT_THAT(error_of_naming(structures, "Spin"), HasSubstr("no structure named \"Spin\""));
 }
 

@@ -75,7 +75,14 @@ TEST(MovedBodies, WhatIsNotDeterminedOrBreathesIsNotNamed) {
   SetupResult report = bent_report(Verdict::kAccepted);
   EXPECT_THAT(words_of(report), Not(HasSubstr("bones")));
   for (BodyMotion& body : report.bodies) body.image_share = 0.0;
-  EXPECT_EQ(words_of(report), "What the bones did against the target is not determined");
+  EXPECT_EQ(words_of(report), "What the other bones did against the target is not determined");
+}
+
+TEST(MovedBodies, WhatCarriesTheTargetSaysNothingOfTheOthers) {
+  SetupResult report = bent_report(Verdict::kAccepted);
+  for (BodyMotion& body : report.bodies)
+    if (!(body.carries_target > 0.0)) body.image_share = 0.0;
+  EXPECT_EQ(words_of(report), "What the other bones did against the target is not determined");
 }
 
 TEST(MovedBodies, TheTableBeginsAtTheTarget) {

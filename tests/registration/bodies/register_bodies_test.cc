@@ -113,6 +113,22 @@ struct SeenWhole {
   }
 };
 
+// Too far for parts of the images to be found again where they went.
+TEST(RegisterBodies, ATargetThatMovedFarIsNotWhereTheWholePutsIt) {
+  const RegistrationOptions options = preset("setup");
+  const auto may_lie_elsewhere = [&](const BentScene& scene) {
+    const RendererPyramid renderers(RendererKind::kCpu, scene.ct, {}, std::array{Beam::kKilovoltage});
+    RegistrationResult whole;
+    whole.verdict = Verdict::kAccepted;
+    whole.actual_room_from_patient = scene.truth[0] * scene.planned;
+    return may_target_lie_elsewhere(renderers, scene.images, options, whole);
+  };
+  const MovedGroup still{.translation_mm = {1.0, -2.0, 1.5}},
+      far{.translation_mm = {1.0, 10.0, 16.0}, .rotation_deg = {20.0, 0.0, 0.0}};
+  EXPECT_FALSE(may_lie_elsewhere(bent_column({still, still, still})));
+  EXPECT_TRUE(may_lie_elsewhere(bent_column({still, far, still})));
+}
+
 TEST(RegisterBodies, OnlyPatientsWhoNeedAReviewMayHaveBent) {
   SeenWhole whole;
   RegistrationOptions options = preset("setup");

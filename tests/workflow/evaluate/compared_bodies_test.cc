@@ -9,6 +9,7 @@
 #include "tests/support/temporary_folder.h"
 #include "workflow/evaluate/compared_bodies.h"
 #include "workflow/evaluate/evaluation_files.h"
+#include "workflow/register/truth.h"
 
 namespace isoshift {
 namespace {
@@ -16,6 +17,18 @@ namespace {
 using Eigen::Vector3d;
 
 Eigen::Isometry3d moved_by(const Vector3d& mm) { return Eigen::Isometry3d(Eigen::Translation3d(mm)); }
+
+TEST(EvaluatedBodies, ATargetHasTheTruthOfTheNearestBody) {
+  const std::vector<BodyTruth> bodies = {{.center_patient_mm = {0, 0, 8}, .setup_error = moved_by({1, 0, 0})},
+                                         {.center_patient_mm = {0, 0, 60}, .setup_error = moved_by({2, 0, 0})}};
+  const auto x_at = [&](const Vector3d& point) {
+    return truth_at(point, moved_by({9, 0, 0}), Vector3d(0, 0, 0), bodies).translation().x();
+  };
+  EXPECT_EQ(x_at({0, 0, 55}), 2.0);
+  EXPECT_EQ(x_at({0, 0, 6}), 1.0);
+  EXPECT_EQ(x_at({0, 0, 3}), 9.0) << "the isocenter is nearer";
+  EXPECT_EQ(truth_at({0, 0, 55}, moved_by({9, 0, 0}), Vector3d::Zero(), {}).translation().x(), 9.0);
+}
 
 TEST(EvaluatedBodies, AreComparedWithTheNearestTruth) {
   // Head first, supine: (x, y, z) of the room is (x, z, -y) of the patient.

@@ -109,7 +109,51 @@ TEST(TargetOf, WithoutAVolumeAtTheIsocenterItIsTheSurroundings) {
   EXPECT_EQ(target_of(study, {}).target.chosen_by, "no target volume holds the isocenter");
   study.structures.reset();
   study.plan.reset();
-  EXPECT_EQ(target_of(study, {}).target.chosen_by, "no target volume holds the isocenter");
+  EXPECT_EQ(target_of(study, {}).target.chosen_by, "the study holds no RT Structure Set");
+  EXPECT_THAT(target_of(study, {}).doubts, IsEmpty());
+}
+
+// One of them 60 mm away.
+TEST(TargetOf, SeveralDoseReferencesAreADoubt) {
+  Study study = study_with({box(1, "PTV", "PTV", {10, 0, 0}, 40), box(2, "L4", "CTV", {10, 0, 60}, 24)});
+  study.plan->dose_references = {{.number = 1, .type = "TARGET", .roi_number = 1},
+                                 {.number = 2, .type = "TARGET", .roi_number = 2}};
+  const TargetChoice choice = target_of(study, {});
+  EXPECT_EQ(choice.target.name, "PTV");
+  ASSERT_EQ(choice.doubts.size(), 1U);
+  EXPECT_THAT(choice.doubts[0], HasSubstr("several structures may be the target (PTV, L4); PTV was taken"));
+}
+
+TEST(TargetOf, ADoseReferenceThatCannotBeFollowedIsADoubt) {
+  Study study = study_with({box(1, "PTV", "PTV", {10, 0, 0}, 40)});
+  study.structures->path = "in/RTSTRUCT.dcm";
+  study.structures->structures.push_back({.number = 2, .name = "Boost", .interpreted_type = "PTV"});
+  const auto only_doubt = [&](int roi) {
+    study.plan->dose_references = {{.number = 1, .type = "TARGET", .roi_number = roi}};
+    const TargetChoice choice = target_of(study, {});
+    EXPECT_EQ(choice.target.name, "PTV");
+    return choice.doubts.size() == 1 ? choice.doubts[0] : "";
+  };
+  EXPECT_EQ(only_doubt(7),
+            "the plan's target is ROI number 7 (ReferencedROINumber (3006,0084)), which RTSTRUCT.dcm does not have. "
+            "Name the target: --target NAME or isocenter");
+  EXPECT_THAT(only_doubt(2), HasSubstr("\"Boost\", which has no closed contour on this CT in RTSTRUCT.dcm"));
+  study.structures.reset();
+  EXPECT_THAT(target_of(study, {}).doubts, IsEmpty());
+  EXPECT_EQ(target_of(study, {}).target.chosen_by, "the study holds no RT Structure Set");
+}
+
+TEST(TargetOf, ATargetThatReachesBeyondTheCtIsADoubt) {
+  // The last slice lies at z = 80.
+  const Study inside = study_with({box(1, "PTV", "PTV", {10, 0, 60}, 32)}),
+              beyond = study_with({box(1, "PTV", "PTV", {10, 0, 76}, 32)}),
+              beside = study_with({box(1, "PTV", "PTV", {70, 0, 0}, 40)});
+  EXPECT_THAT(target_of(inside, {.by_person = "PTV"}).doubts, IsEmpty());
+  for (const Study* study : {&beyond, &beside}) {
+    const TargetChoice choice = target_of(*study, {.by_person = "PTV"});
+    ASSERT_EQ(choice.doubts.size(), 1U);
+    EXPECT_THAT(choice.doubts[0], HasSubstr("the target PTV reaches beyond the CT"));
+  }
 }
 
 TEST(TargetOf, ANameThatIsNotThereIsAnError) {
