@@ -2,10 +2,9 @@
 """Fails if docs/evaluation.md lacks a row of `isoshift evaluate` as bench/results/evaluation.json has it."""
 
 import json
-import pathlib
 import sys
 
-ROOT = pathlib.Path(__file__).resolve().parents[1]
+import documented_rows
 
 
 def share(of, runs):
@@ -44,19 +43,12 @@ def row_of_sigmas(words, key, summaries):
 
 
 def main():
-    results = json.loads((ROOT / "bench/results/evaluation.json").read_text())
+    results = json.loads((documented_rows.ROOT / "bench/results/evaluation.json").read_text())
     rows = [row(case, summary) for part in ("baseline", "setup") for case, summary in results[part].items()]
     rows += [row_of_target(case, summary) for case, summary in results["targets"].items()]
     rows += [row_of_sigmas(f"within {number} sigma", f"share_within_{number}_sigma", results["setup"].values())
              for number in ("one", "two")]
-    if "--print" in sys.argv:
-        print("\n".join(rows))
-        return 0
-    document = (ROOT / "docs/evaluation.md").read_text().splitlines()
-    missing = [line for line in rows if line not in document]
-    for line in missing:
-        print(f"docs/evaluation.md lacks the row {line}")
-    return 1 if missing else 0
+    return documented_rows.compare("docs/evaluation.md", rows)
 
 
 if __name__ == "__main__":

@@ -1,12 +1,10 @@
-"""Compares the tables of Table 1 in docs/renderers.md with what was measured (bench/results/table1-*.json).
-
-table1_tables.py REPOSITORY    exit status 1, and the rows that differ, if the docs say something else
-table1_tables.py --print REPOSITORY    the rows as they must be
-"""
+#!/usr/bin/env python3
+"""Fails if docs/renderers.md lacks a row of Table 1 as bench/results/table1-*.json have it."""
 
 import json
-import pathlib
 import sys
+
+import documented_rows
 
 PAPER = {  # of its Table 1, ms: the spine at thresholds 20 and 70 of 255, the pig at 10 and 60
     "wobbled splatting, basic": (58.1, 15.0, 68.9, 46.1),
@@ -26,8 +24,7 @@ def milliseconds(time):
     return f"{time['mean']:.{decimals}f} +/- {time['sd']:.{decimals}f}"
 
 
-def rows(measured):
-    tables = measured["tables"]
+def rows(tables):
     for of_method in zip(*(table["rows"] for table in tables)):
         method = of_method[0]["method"]
         cells = [milliseconds(row["wall_ms"]) for row in of_method]
@@ -36,20 +33,10 @@ def rows(measured):
 
 
 def main():
-    printing = sys.argv[1] == "--print"
-    repository = pathlib.Path(sys.argv[-1])
-    docs = (repository / "docs/renderers.md").read_text().splitlines()
-    missing = 0
-    for file in sorted((repository / "bench/results").glob("table1-*.json")):
-        if printing:
-            print(file.name)
-        for row in rows(json.loads(file.read_text())):
-            if printing:
-                print(row)
-            elif row not in docs:
-                print(f"docs/renderers.md lacks, from {file.name}: {row}")
-                missing += 1
-    return 1 if missing else 0
+    files = sorted((documented_rows.ROOT / "bench/results").glob("table1-*.json"))
+    return documented_rows.compare("docs/renderers.md",
+                                   [row for file in files for row in rows(json.loads(file.read_text())["tables"])])
 
 
-sys.exit(main())
+if __name__ == "__main__":
+    sys.exit(main())
