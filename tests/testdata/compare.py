@@ -8,7 +8,8 @@ write cannot be equal byte for byte:
 - dates and times are those of the run;
 - the commit, the processor's instruction set and the SHA-256 of inputs differ between builds, machines and Debian releases;
 - the search ends at slightly different places on processors with different SIMD instructions: translations may differ by 0.2 mm,
-  angles by 0.2 degrees; numbers that describe the search may differ at will, texts are compared without their numbers;
+  angles by 0.2 degrees. Where the verdict is "rejected" the search has found nothing, and its pose may be any. Numbers that
+  describe the search and how many steps it took may differ at will; texts are compared without their numbers;
 - drawn pages and pictures (PDF, HTML, SVG, PNG) depend on fonts and libraries: they must be there and not empty.
 """
 import json
@@ -25,7 +26,8 @@ RUN_DEPENDENT = re.compile(r"(results/.*|registrations/.*/spatial_registration\.
                            r"damaged/(result/.*|spatial-registration\.dcm))")
 DRAWN = (".pdf", ".html", ".svg", ".png")
 TOLERANCE = 0.2  # mm and degrees
-IGNORED_KEYS = {"made_on", "commit", "program", "device", "sha256", "ct_sha256", "plan_sha256", "termination", "seconds", "picture"}
+IGNORED_KEYS = {"made_on", "commit", "program", "device", "sha256", "ct_sha256", "plan_sha256", "termination", "seconds", "picture",
+                "best"}
 POSE_KEYS = {"setup_error", "couch_shift", "couch_target_deg"}
 IGNORED_KEYWORDS = {"EncapsulatedDocument", "EncapsulatedDocumentLength", "InstanceCreationDate", "InstanceCreationTime",
                     "ContentDate", "ContentTime", "TimezoneOffsetFromUTC", "SeriesDate", "SeriesTime", "SoftwareVersions"}
@@ -47,7 +49,7 @@ def without_numbers(text):
     return re.sub(r"[ +-]*\d+(\.\d+)?", "#", text)
 
 
-def json_differences(one, other, uids, path="", is_pose=False):
+def json_differences(one, other, uids, path="", is_pose=False, pose_keys=POSE_KEYS):
     if type(one) is not type(other) and not (isinstance(one, (int, float)) and isinstance(other, (int, float))):
         yield f"{path}: {one!r} and {other!r}"
     elif isinstance(one, dict):
@@ -55,12 +57,12 @@ def json_differences(one, other, uids, path="", is_pose=False):
             yield f"{path}: other keys: {sorted(one.keys() ^ other.keys())}"
         for key in one.keys() & other.keys():
             if key not in IGNORED_KEYS:
-                yield from json_differences(one[key], other[key], uids, f"{path}/{key}", is_pose or key in POSE_KEYS)
+                yield from json_differences(one[key], other[key], uids, f"{path}/{key}", is_pose or key in pose_keys, pose_keys)
     elif isinstance(one, list):
         if len(one) != len(other):
             yield f"{path}: {len(one)} and {len(other)} entries"
         for n, (a, b) in enumerate(zip(one, other)):
-            yield from json_differences(a, b, uids, f"{path}[{n}]", is_pose)
+            yield from json_differences(a, b, uids, f"{path}[{n}]", is_pose, pose_keys)
     elif isinstance(one, str):
         if UID.fullmatch(one) and UID.fullmatch(other):
             if not uids.are_same(one, other):
@@ -111,7 +113,9 @@ def run_differences(one, other, uids):
     if one.suffix == ".dcm":
         return list(dicom_differences(pydicom.dcmread(one), pydicom.dcmread(other), uids))
     if one.suffix == ".json":
-        return list(json_differences(json.loads(one.read_text()), json.loads(other.read_text()), uids))
+        result, remade = json.loads(one.read_text()), json.loads(other.read_text())
+        was_found = not isinstance(result, dict) or result.get("verdict") != "rejected"
+        return list(json_differences(result, remade, uids, pose_keys=POSE_KEYS if was_found else set()))
     return list(text_differences(one.read_text(), other.read_text()))
 
 
