@@ -132,7 +132,8 @@ int check(int patient_count, std::optional<int> only) {
   std::map<std::string, Count> counts;
   bool wrong_accepted = false;
   fmt::print(
-      "ct,xrays,case,verdict,answer_of,target_match,match_of_parts,mtre_mm,least_gradient_correlation,as_is,best_"
+      "ct,xrays,case,verdict,answer_of,match_within_40_mm,match_within_20_mm,mtre_mm,least_gradient_correlation,as_is,"
+      "best_"
       "alternative,disagreeing,seconds,"
       "err_sigma,reasons\n");
   RegistrationOptions options = preset("setup");
@@ -176,8 +177,9 @@ int check(int patient_count, std::optional<int> only) {
                             deg_from_rad(result.uncertainty->sigma_rotation_rad()[axis]));
     for (const std::string& reason : result.reasons) reasons += reason + "; ";
     fmt::print("{},{},{},{},{},{:.3f},{:.3f},{:.2f},{:.3f},{:.3f},{:.3f},{:.3f},{:.2f},{},\"{}\"\n", ct, of, what,
-               to_string(result.verdict), result.bodies.empty() ? "whole" : "bodies", result.target_match,
-               result.target_match_of_parts, mtre_mm, least, as_is, best, disagreeing, result.seconds, errors, reasons);
+               to_string(result.verdict), result.bodies.empty() ? "whole" : "bodies",
+               result.target_match.of_surroundings, result.target_match.of_target, mtre_mm, least, as_is, best,
+               disagreeing, result.seconds, errors, reasons);
     std::fflush(stdout);
     count.accepted += result.verdict == Verdict::kAccepted ? 1 : 0;
     wrong_accepted = wrong_accepted || (result.verdict == Verdict::kAccepted && (what != "right" || mtre_mm > 2.0));

@@ -123,6 +123,13 @@ struct StructureMotion {
   bool is_determined = true;                                  // the bones near it are, and do not breathe
 };
 
+// How well X-rays and DRRs match where the target was found: gradient correlations of the pixels that agree best, mean
+// over the views (registration/bodies/target_match.h).
+struct TargetMatch {
+  double of_surroundings = 0.0;  // within 40 mm of the target; in small fields that show too little, of all they show
+  double of_target = 0.0;        // within 20 mm: a small target that moved by itself could be trimmed away in 40 mm
+};
+
 struct Registration {
   Verdict verdict = Verdict::kRejected;
   std::vector<std::string> reasons = {"not run"};  // why the verdict is not `accepted`
@@ -137,9 +144,7 @@ struct Registration {
   std::vector<BodyMotion> bodies;
   std::vector<StructureMotion> structures;  // other than the target, near bones; where bodies answered
   double target_image_share = 0.0;  // of what is known about where the target lies; springs between bodies are the rest
-  // Mean over the views of the gradient correlation near the target, on coarse pixels; and of small parts by
-  // themselves.
-  double target_match = 0.0, target_match_of_parts = 0.0;
+  TargetMatch target_match;
   double target_deformation_mm = 0.0;  // how far the target's surface lies from where a rigid motion puts it, at most
   double seconds = 0.0, seconds_rendering = 0.0, seconds_similarity = 0.0;  // in all, and of that in the search
 

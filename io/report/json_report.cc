@@ -159,8 +159,8 @@ Json target_json(const SetupResult& report, const ShownShift& shown) {
           {"displacement_mm", displacement},
           {"sigma_mm", sigma_json(report.uncertainty.has_value(), shown.target_sigma_mm)},
           {"image_share", of_bodies(report.target_image_share)},
-          {"match", of_bodies(report.target_match)},
-          {"match_of_parts", of_bodies(report.target_match_of_parts)},
+          {"match_within_40_mm", of_bodies(report.target_match.of_surroundings)},
+          {"match_within_20_mm", of_bodies(report.target_match.of_target)},
           {"deformation_mm", of_bodies(report.target_deformation_mm)}};
 }
 

@@ -251,11 +251,9 @@ SetupResult report_from(const Json& json) {
                                  .is_determined = structure.at("is_determined")});
   if (!report.bodies.empty() && report.target) {
     report.target_image_share = json.at("target").at("image_share");
-    const auto match = [&](const char* name) {
-      return json.at("target").contains(name) ? or_nan(json.at("target").at(name)) : 0.0;
-    };
-    report.target_match = match("match");
-    report.target_match_of_parts = match("match_of_parts");
+    // Results of before 2026-11-25 have other measures instead.
+    report.target_match = {.of_surroundings = or_nan(json.at("target").value("match_within_40_mm", Json())),
+                           .of_target = or_nan(json.at("target").value("match_within_20_mm", Json()))};
     report.target_deformation_mm = json.at("target").at("deformation_mm");
   }
   const Json& error = json.at("setup_error");

@@ -55,9 +55,7 @@ void report_match(const BodyScene& scene, const Carriers& carriers, const Carrie
   const std::vector<FixedImage> as_whole = scene.views.reduced_to(similarity_pixel_mm, about, 0.0);
   const std::vector<double> at_start = scene.fine.matches(as_whole, planned),
                             at_end = scene.fine.matches(as_whole, poses);
-  const TargetMatch near = match_near_target(scene, target.setup_error * center_room_mm, poses);
-  result.target_match = near.of_all;
-  result.target_match_of_parts = near.of_parts;
+  result.target_match = match_near_target(scene, target.setup_error * center_room_mm, poses);
   const Objective pixels(*scene.fine.as_one, level, about, {.similarity = SimilarityKind::kGradientCorrelation});
   BodyObjective objective(scene.bodies, scene.fine.apart, pixels, BodyStage().tile_mm);
   const PoseSlots slots(scene.bodies, scene.fine.apart, poses);
@@ -208,14 +206,10 @@ bool may_target_lie_elsewhere(const RendererPyramid& renderers, std::span<const 
   const FixedViews views = compared_views(options, images);
   Renderer& renderer = renderers.with_voxels_up_to(kVoxelMm);
   const Eigen::Isometry3d& found = whole.actual_room_from_patient;
-  // Targets on jaws that had opened by 14 to 20 degrees had up to 0.70 and 0.89. Patients who were right, with metal
-  // near the target, had 0.54 and more, and all but four of 44 had 0.92 and more of parts. Coarse or noisy images match
-  // less everywhere, and cannot tell.
-  constexpr double kMinMatch = 0.86, kMinMatchOfParts = 0.92, kLeastEverywhere = 0.9, kLessThanEverywhere = 0.04;
+  // Coarse or noisy images match less everywhere, and cannot tell.
+  constexpr double kLeastEverywhere = 0.9;
   const TargetMatch near = match_near_target(views, renderer, found, target_found_room_mm(options, whole));
-  if (near.of_all >= kMinMatch || near.of_parts >= kMinMatchOfParts) return false;
-  const TargetMatch everywhere = match_everywhere(views, renderer, found);
-  return everywhere.of_parts >= kLeastEverywhere && near.of_parts < everywhere.of_parts - kLessThanEverywhere;
+  return !is_enough(near) && match_everywhere(views, renderer, found) >= kLeastEverywhere;
 }
 
 void register_bodies(const BentPatient& patient, std::span<const FixedImage> images,

@@ -2,116 +2,137 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
+#include <numbers>
+#include <numeric>
 #include <utility>
 #include <vector>
 
-#include "registration/similarity/tiles.h"
+#include "base/median.h"
 
 namespace isoshift {
 namespace {
 
 using Eigen::Vector3d;
 
-constexpr double kPixelMm = 4.0, kReachMm = 40.0, kPartMm = 12.0;
-constexpr std::ptrdiff_t kLeastPixels = 200;
-constexpr std::size_t kLeastPixelsOfAPart = 6;
+constexpr double kPixelMm = 2.0, kSurroundingsMm = 40.0, kTargetMm = 20.0;
+constexpr double kLeastShown = 0.6;  // share of the circle about the target; with less, all that is shown counts
+constexpr double kKept = 0.7;
+constexpr int kMostSteps = 20;
+constexpr double kSameScale = 1e-9;
 
-std::vector<FixedImage> surroundings(const FixedViews& views, const Eigen::Isometry3d& about,
-                                     const Vector3d& target_room_mm) {
-  std::vector<FixedImage> level = views.reduced_to(kPixelMm, about, 0.0);
+// Of each view what lies near the target.
+std::vector<FixedImage> within(double reach_mm, std::vector<FixedImage> level, const Vector3d& target_room_mm) {
   for (FixedImage& image : level) {
     const auto center = image.view.project(target_room_mm);
+    const double reach_px = reach_mm * pixels_per_mm(image.view);
     Image<std::uint8_t> near = image.field;
     for (int row = 0; row < near.rows; ++row)
       for (int column = 0; column < near.columns; ++column)
-        if (!center || (Eigen::Vector2d(column, row) - *center).norm() > kReachMm * pixels_per_mm(image.view))
-          near.at(column, row) = 0;
-    if (std::ranges::count(near.pixels, 1) >= kLeastPixels) image.field = std::move(near);
+        if (!center || (Eigen::Vector2d(column, row) - *center).norm() > reach_px) near.at(column, row) = 0;
+    const auto shown = static_cast<double>(std::ranges::count(near.pixels, 1));
+    if (shown >= kLeastShown * std::numbers::pi * reach_px * reach_px) image.field = std::move(near);
   }
   return level;
 }
 
-// Centered.
-Eigen::VectorXd values_of(const std::vector<float>& all, const std::vector<std::uint32_t>& numbers) {
-  Eigen::VectorXd values(static_cast<Eigen::Index>(numbers.size()));
-  for (std::size_t n = 0; n < numbers.size(); ++n) values[static_cast<Eigen::Index>(n)] = all[numbers[n]];
-  return values.array() - values.mean();
+using PlaneGradients = Eigen::Matrix<double, Eigen::Dynamic, 2>;  // a row per pixel
+
+// About their medians: a slope of scatter across the surroundings is no anatomy.
+PlaneGradients centered(const Gradients& gradients) {
+  PlaneGradients all(static_cast<Eigen::Index>(gradients.along_row.size()), 2);
+  for (const auto& [column, values] : {std::pair(0, &gradients.along_row), std::pair(1, &gradients.along_column)})
+    all.col(column) = Eigen::Map<const Eigen::VectorXf>(values->data(), all.rows()).cast<double>().array() -
+                      static_cast<double>(median(*values));
+  return all;
 }
 
-// Of pairs of value and weight.
-double weighted_median(std::vector<std::pair<double, double>> values) {
-  std::ranges::sort(values);
-  double all = 0.0, below = 0.0;
-  for (const auto& [value, weight] : values) all += weight;
-  for (const auto& [value, weight] : values) {
-    below += weight;
-    if (below > 0.5 * all) return value;
-  }
-  return 0.0;
-}
+// Line integrals, by view, of the pixels that an objective renders.
+using Rendering = std::function<std::vector<std::vector<float>>(Objective&)>;
 
-double match_of_parts(const XrayView& view, std::span<const std::uint32_t> compared, const Gradients& xray,
-                      const Gradients& drr) {
-  std::vector<std::pair<double, double>> correlations;
-  for (const Tile& part : tiles_of(view, compared, kPartMm)) {
-    if (part.compared.size() < kLeastPixelsOfAPart) continue;
-    for (const auto direction : {&Gradients::along_row, &Gradients::along_column}) {
-      const Eigen::VectorXd there = values_of(xray.*direction, part.compared),
-                            here = values_of(drr.*direction, part.compared);
-      const double norms = there.norm() * here.norm();
-      correlations.emplace_back(norms > 0.0 ? there.dot(here) / norms : 0.0, here.norm());
-    }
-  }
-  return weighted_median(std::move(correlations));
-}
-
-// Of the line integrals, by view, of the pixels that `pixels` renders.
-TargetMatch match_of(const Objective& pixels, std::span<const std::vector<float>> drrs) {
-  const double share = 1.0 / static_cast<double>(drrs.size());
-  TargetMatch match;
+double match_of(const std::vector<FixedImage>& level, Renderer& renderer, const Eigen::Isometry3d& about,
+                const Rendering& rendering) {
+  Objective pixels(renderer, level, about, {.similarity = SimilarityKind::kGradientCorrelation});
+  const std::vector<std::vector<float>> drrs = rendering(pixels);
+  double match = 0.0;
   for (std::size_t view = 0; view < drrs.size(); ++view) {
     const Comparison& comparison = pixels.comparison(view);
-    const std::vector<float>& drr = drrs[view];
-    match.of_all += share * comparison.of(drr);
-    match.of_parts += share * match_of_parts(pixels.views()[view], pixels.compared_pixels(view),
-                                             comparison.xray_gradients(), gradients(drr, comparison.neighbors()));
+    match += trimmed_correlation(comparison.xray_gradients(), gradients(drrs[view], comparison.neighbors())) /
+             static_cast<double>(drrs.size());
   }
   return match;
 }
 
-TargetMatch match_of_whole(std::span<const FixedImage> level, Renderer& renderer,
-                           const Eigen::Isometry3d& room_from_patient) {
-  Objective pixels(renderer, level, room_from_patient, {.similarity = SimilarityKind::kGradientCorrelation});
-  const RenderResult rendered = pixels.render(std::span(&room_from_patient, 1));
-  std::vector<std::vector<float>> drrs;
-  drrs.reserve(level.size());
-  for (std::size_t view = 0; view < level.size(); ++view) {
-    const auto drr = rendered.line_integrals(0, view);
-    drrs.emplace_back(drr.begin(), drr.end());
-  }
-  return match_of(pixels, drrs);
+Rendering of_whole(const Eigen::Isometry3d& room_from_patient) {
+  return [&room_from_patient](Objective& pixels) {
+    const RenderResult rendered = pixels.render(std::span(&room_from_patient, 1));
+    std::vector<std::vector<float>> drrs;
+    for (std::size_t view = 0; view < pixels.views().size(); ++view) {
+      const auto drr = rendered.line_integrals(0, view);
+      drrs.emplace_back(drr.begin(), drr.end());
+    }
+    return drrs;
+  };
+}
+
+TargetMatch near_target(const FixedViews& views, Renderer& renderer, const Eigen::Isometry3d& about,
+                        const Vector3d& target_room_mm, const Rendering& rendering) {
+  const std::vector<FixedImage> level = views.reduced_to(kPixelMm, about, 0.0);
+  return {.of_surroundings = match_of(within(kSurroundingsMm, level, target_room_mm), renderer, about, rendering),
+          .of_target = match_of(within(kTargetMm, level, target_room_mm), renderer, about, rendering)};
 }
 
 }  // namespace
 
+// Least trimmed squares by concentration steps: Rousseeuw and Van Driessen, Data Min Knowl Discov 12 (2006) 29-45,
+// section 2. Every step fits the scale to the pixels kept and then keeps those that fit it best.
+double trimmed_correlation(const Gradients& xray, const Gradients& drr) {
+  const PlaneGradients there = centered(xray), here = centered(drr);
+  const Eigen::VectorXd products = there.cwiseProduct(here).rowwise().sum(),
+                        there_squared = there.rowwise().squaredNorm(), here_squared = here.rowwise().squaredNorm();
+  std::vector<Eigen::Index> order(xray.along_row.size());
+  std::iota(order.begin(), order.end(), 0);
+  const auto most = static_cast<std::size_t>(std::lround(kKept * static_cast<double>(order.size())));
+  std::span<const Eigen::Index> kept = order;
+  double scale = 0.0, correlation = 0.0;
+  for (int step = 0; step < kMostSteps; ++step) {
+    double product = 0.0, norm2_there = 0.0, norm2_here = 0.0;
+    for (const Eigen::Index n : kept) {
+      product += products[n];
+      norm2_there += there_squared[n];
+      norm2_here += here_squared[n];
+    }
+    if (!(norm2_there > 0.0 && norm2_here > 0.0)) return 0.0;
+    correlation = product / std::sqrt(norm2_there * norm2_here);
+    const double fitted = product / norm2_here;
+    if (std::abs(fitted - scale) <= kSameScale * std::abs(fitted)) break;  // the same pixels would be kept
+    scale = fitted;
+    std::ranges::nth_element(order, order.begin() + static_cast<std::ptrdiff_t>(most), {}, [&](Eigen::Index n) {
+      return there_squared[n] + scale * (scale * here_squared[n] - 2.0 * products[n]);
+    });
+    kept = std::span(order).first(most);
+  }
+  return correlation;
+}
+
 TargetMatch match_near_target(const BodyScene& scene, const Vector3d& target_room_mm, const BodyPoses& poses) {
-  const std::vector<FixedImage> level = surroundings(scene.views, scene.whole_room_from_patient, target_room_mm);
-  const Objective pixels(*scene.fine.as_one, level, poses.front().front(),
-                         {.similarity = SimilarityKind::kGradientCorrelation});
-  std::vector<std::vector<float>> drrs;
-  drrs.reserve(level.size());
-  for (std::size_t view = 0; view < level.size(); ++view)
-    drrs.push_back(scene.fine.line_integrals(pixels, poses, view));
-  return match_of(pixels, drrs);
+  const auto rendering = [&](Objective& pixels) {
+    std::vector<std::vector<float>> drrs;
+    for (std::size_t view = 0; view < pixels.views().size(); ++view)
+      drrs.push_back(scene.fine.line_integrals(pixels, poses, view));
+    return drrs;
+  };
+  return near_target(scene.views, *scene.fine.as_one, poses.front().front(), target_room_mm, rendering);
 }
 
 TargetMatch match_near_target(const FixedViews& views, Renderer& renderer, const Eigen::Isometry3d& room_from_patient,
                               const Vector3d& target_room_mm) {
-  return match_of_whole(surroundings(views, room_from_patient, target_room_mm), renderer, room_from_patient);
+  return near_target(views, renderer, room_from_patient, target_room_mm, of_whole(room_from_patient));
 }
 
-TargetMatch match_everywhere(const FixedViews& views, Renderer& renderer, const Eigen::Isometry3d& room_from_patient) {
-  return match_of_whole(views.reduced_to(kPixelMm, room_from_patient, 0.0), renderer, room_from_patient);
+double match_everywhere(const FixedViews& views, Renderer& renderer, const Eigen::Isometry3d& room_from_patient) {
+  return match_of(views.reduced_to(kPixelMm, room_from_patient, 0.0), renderer, room_from_patient,
+                  of_whole(room_from_patient));
 }
 
 }  // namespace isoshift

@@ -1,25 +1,21 @@
 #pragma once
-// Whether X-rays show the target's surroundings where a search has put them.
+// Whether X-rays show the target and its surroundings where a search has put them. What is compared are the gradients
+// of X-rays and DRRs, of the 70 % of the pixels that agree best: what has changed in some places (metal, fluid, noise)
+// is trimmed away, while another patient or another vertebra disagrees in most.
 
 #include "registration/bodies/body_search.h"
+#include "setup/registration.h"
 
 namespace isoshift {
 
-struct TargetMatch {
-  // Gradient correlation near the target, mean over the views. On coarse pixels noise hardly counts: what does not
-  // match there is other anatomy, or the same anatomy with other contrast.
-  double of_all = 0.0;
-  // The same of small parts, each for itself: their median in a view, weighted by the gradients that the DRR has
-  // there. Contrast that has changed spoils the parts that show its edges, another patient's anatomy spoils most.
-  double of_parts = 0.0;
-};
-
-// Of what lies within 40 mm of the target; in small fields that show too little of it, of all that they show.
 TargetMatch match_near_target(const BodyScene& scene, const Eigen::Vector3d& target_room_mm, const BodyPoses& poses);
 
-// The same of a patient as a whole, and of all that the X-rays show of it.
+// The same of a patient as a whole, and the trimmed correlation of all that the X-rays show of it.
 TargetMatch match_near_target(const FixedViews& views, Renderer& renderer, const Eigen::Isometry3d& room_from_patient,
                               const Eigen::Vector3d& target_room_mm);
-TargetMatch match_everywhere(const FixedViews& views, Renderer& renderer, const Eigen::Isometry3d& room_from_patient);
+double match_everywhere(const FixedViews& views, Renderer& renderer, const Eigen::Isometry3d& room_from_patient);
+
+// Of two equally long lists of gradients, which have one scale between them; 0 where either is flat.
+double trimmed_correlation(const Gradients& xray, const Gradients& drr);
 
 }  // namespace isoshift

@@ -27,10 +27,6 @@ constexpr double kMaxSpreadMm = 1.0, kMaxSpreadRad = rad_from_deg(1.0);
 // distance 2 % off in one of them 0.68 mm and more (docs/evaluation.md).
 constexpr double kMaxContradictionMm = 0.5, kMaxContradictionSigmas = 3.0;
 constexpr double kMaxTwoSigmaMm = 1.0, kMaxTwoSigmaRad = rad_from_deg(1.0);
-// Other patients of the same kind, whose bones were free to follow, had at most 0.85 and 0.946 (two phantoms that
-// differ little; others 0.72 and 0.88). Right patients had 0.86 and more, or, with contrast that has changed near the
-// target, in noise, or far bent, mostly 0.95 and more of the median part.
-constexpr double kMinTargetMatch = 0.86, kMinTargetMatchOfParts = 0.95;
 constexpr std::ptrdiff_t kMinDeterminedBones = 2;
 constexpr double kMinImageShare = 0.3, kMaxDeformationMm = 2.0;
 // What carries a target is small, and turns less surely than a whole patient; what counts is where its surface lies.
@@ -121,12 +117,12 @@ void judge_contradiction(RegistrationResult& result) {
 
 // The answer is that of the bodies that carry the target: they must be seen, and the target must not be bent itself.
 void judge_bodies(RegistrationResult& result) {
-  if (!(result.target_match >= kMinTargetMatch || result.target_match_of_parts >= kMinTargetMatchOfParts))
-    review(result,
-           fmt::format("the target's surroundings match poorly (gradient correlation {:.3f}, {:.2f} is expected; of "
-                       "parts by themselves {:.3f}, {:.2f} is expected): they may be another patient's, or the target "
-                       "may lie elsewhere",
-                       result.target_match, kMinTargetMatch, result.target_match_of_parts, kMinTargetMatchOfParts));
+  if (!is_enough(result.target_match))
+    review(result, fmt::format("the target or its surroundings match poorly (correlation of most gradients within 40 "
+                               "mm {:.3f}, {:.2f} is expected; within 20 mm {:.3f}, {:.2f} is expected): they may be "
+                               "another patient's, or the target may lie elsewhere",
+                               result.target_match.of_surroundings, kLeastTargetMatch.of_surroundings,
+                               result.target_match.of_target, kLeastTargetMatch.of_target));
   // What one bone alone wants, nothing confirms: one that is nearly straight fits as well where it has slid along.
   if (std::ranges::count_if(result.bodies, &BodyMotion::is_determined) < kMinDeterminedBones)
     review(result, "the images determine no bone but the one that carries the target: nothing confirms where it lies");
@@ -178,6 +174,10 @@ void judge_alternatives(RegistrationResult& result) {
 }
 
 }  // namespace
+
+bool is_enough(const TargetMatch& match) {
+  return match.of_surroundings >= kLeastTargetMatch.of_surroundings && match.of_target >= kLeastTargetMatch.of_target;
+}
 
 std::vector<Eigen::Vector3d> unobservable_directions(std::span<const XrayView> views) {
   // Opposed views see the same two axes: directions count without their sign.

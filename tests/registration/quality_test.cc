@@ -83,7 +83,7 @@ TEST(Quality, TooLittleToCheckForMovedAnatomyNeedsReview) {
 
 // Of bodies: whether the target is seen, straight, and surrounded by what the CT shows.
 TEST(Quality, SurroundingsOfTheTargetThatMatchPoorlyNeedAReview) {
-  const auto bent = [](double match, double image_share, double deformation_mm) {
+  const auto bent = [](TargetMatch match, double image_share, double deformation_mm) {
     return [=](RegistrationResult& result) {
       result.bodies.assign(3, {.image_share = 0.9});
       result.target_match = match;
@@ -91,16 +91,14 @@ TEST(Quality, SurroundingsOfTheTargetThatMatchPoorlyNeedAReview) {
       result.target_deformation_mm = deformation_mm;
     };
   };
-  expect_accepted(bent(0.88, 0.6, 1.0));
-  expect_review(bent(0.8, 0.6, 1.0),
-                "the target's surroundings match poorly (gradient correlation 0.800, 0.86 is expected");
-  // Or most of their parts match: contrast that has changed spoils a few.
-  expect_accepted([&](RegistrationResult& result) {
-    bent(0.6, 0.6, 1.0)(result);
-    result.target_match_of_parts = 0.96;
-  });
-  expect_review(bent(0.9, 0.2, 1.0), "the images hardly show the bodies that carry the target");
-  expect_review(bent(0.9, 0.6, 2.5), "the target itself is bent");
+  expect_accepted(bent({0.92, 0.75}, 0.6, 1.0));
+  const std::string poorly = "the target or its surroundings match poorly";
+  expect_review(bent({0.89, 0.95}, 0.6, 1.0),
+                poorly + " (correlation of most gradients within 40 mm 0.890, 0.90 is expected; within 20 mm 0.950");
+  expect_review(bent({0.95, 0.65}, 0.6, 1.0), poorly);
+  expect_review(bent({std::nan(""), 0.95}, 0.6, 1.0), poorly);
+  expect_review(bent({0.95, 0.95}, 0.2, 1.0), "the images hardly show the bodies that carry the target");
+  expect_review(bent({0.95, 0.95}, 0.6, 2.5), "the target itself is bent");
 }
 
 // One that is nearly straight fits where it has slid along, too.
@@ -109,7 +107,7 @@ TEST(Quality, ABoneThatNoOtherConfirmsNeedsAReview) {
     return [=](RegistrationResult& result) {
       result.bodies.assign(4, {.image_share = 0.0});
       for (std::size_t n = 0; n < count; ++n) result.bodies[n].image_share = 0.9;
-      result.target_match = 0.9;
+      result.target_match = {0.95, 0.95};
       result.target_image_share = 0.6;
     };
   };
