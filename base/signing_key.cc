@@ -3,14 +3,11 @@
 #include <fmt/format.h>
 #include <openssl/evp.h>
 #include <openssl/pem.h>
-#include <sys/stat.h>
 
 #include <array>
-#include <cerrno>
-#include <cstdio>
-#include <cstring>
 
 #include "base/error.h"
+#include "base/secret_file.h"
 
 namespace isoshift {
 namespace {
@@ -19,7 +16,6 @@ constexpr std::size_t kSignatureBytes = 64;
 
 struct Deleter {
   void operator()(EVP_MD_CTX* context) const { EVP_MD_CTX_free(context); }
-  void operator()(std::FILE* file) const { std::fclose(file); }
 };
 template <class T>
 using Owned = std::unique_ptr<T, Deleter>;
@@ -29,12 +25,7 @@ const unsigned char* bytes_of(std::string_view text) { return reinterpret_cast<c
 }  // namespace
 
 SigningKey::SigningKey(const std::filesystem::path& path) {
-  const Owned<std::FILE> file(std::fopen(path.c_str(), "rbe"));
-  struct stat status{};
-  if (!file || ::fstat(::fileno(file.get()), &status) != 0)
-    throw Error(fmt::format("{}: cannot be read: {}", path.string(), std::strerror(errno)));
-  if ((status.st_mode & (S_IRWXG | S_IRWXO)) != 0)
-    throw Error(fmt::format("{}: other users can read or write this key: chmod 600 {}", path.string(), path.string()));
+  const auto file = open_secret(path);
   char no_passphrase[] = "";
   key_.reset(PEM_read_PrivateKey(file.get(), nullptr, nullptr, no_passphrase), EVP_PKEY_free);
   if (!key_ || EVP_PKEY_id(key_.get()) != EVP_PKEY_ED25519)

@@ -15,7 +15,7 @@ complain() {
 }
 
 # may_include FOLDER BELOW...: of our own folders FOLDER includes itself and these only.
-our_folders='base|geometry|bodies|setup|drr|io|registration|workflow|phantom|cli|tests|bench'
+our_folders='base|geometry|bodies|setup|drr|io|registration|workflow|serve|phantom|cli|tests|bench'
 may_include() {
   local folder=$1 allowed
   allowed="($(IFS='|' && echo "$*"))/"
@@ -28,7 +28,7 @@ may_include() {
 only_in() {
   local library=$1 folder
   shift
-  for folder in base geometry bodies setup drr io registration workflow phantom cli; do
+  for folder in base geometry bodies setup drr io registration workflow serve phantom cli; do
     while IFS=: read -r file included; do
       [[ ! $included =~ ^$library || $file =~ ^($(IFS='|' && echo "$*")) ]] || complain "$file must not include $included"
     done < <(includes "$folder")
@@ -48,8 +48,9 @@ may_include io/objects base geometry setup io/dicom io/config io/study
 may_include io/report base geometry setup io/dicom io/config io/study io/objects
 may_include registration base geometry bodies setup drr
 may_include workflow base geometry bodies setup drr io registration
+may_include serve base io/config io/report setup workflow
 may_include phantom base geometry setup io/dicom
-may_include cli base geometry bodies setup drr io registration workflow phantom
+may_include cli base geometry bodies setup drr io registration workflow serve phantom
 # The campaign reads and writes DICOM with isoshift and has a geometry of its own.
 may_include phantom/dicom io/dicom
 may_include tests/real_data/campaign base io/dicom phantom/dicom tests/support
@@ -60,6 +61,8 @@ only_in 'nlopt' registration/optimizer.cc
 only_in '(EGL|GL|epoxy|glm)/' drr registration/similarity/
 only_in 'CLI/' cli
 only_in 'curl/' io/network/
+only_in 'boost/' serve/http_server.cc
+only_in 'security/' serve/pam.cc
 only_in '(cairo|pango)' io/report/ io/objects/image_files.cc
 
 # The phantom shares no geometry with what it tests: a wrong sign would cancel.

@@ -15,7 +15,7 @@
 #include "io/report/result_folder.h"
 #include "workflow/room/deliver.h"
 #include "workflow/room/results_tree.h"
-#include "workflow/room/session_index.h"
+#include "workflow/room/session_list.h"
 
 namespace isoshift {
 namespace {

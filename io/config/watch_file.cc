@@ -1,50 +1,32 @@
 #include "io/config/watch_file.h"
 
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <algorithm>
-#include <fstream>
 
 #include "base/error.h"
 #include "base/json_file.h"
+#include "base/secret_file.h"
+#include "io/config/config_folder.h"
 
 namespace isoshift {
 namespace {
 
 namespace fs = std::filesystem;
 
-class Reader {
+class Reader : public ConfigFolder {
  public:
-  explicit Reader(fs::path folder) : folder_(std::move(folder)) {}
-
-  std::string text(JsonSection& section, const char* key, const char* expected) const {
-    std::string text = section.required<std::string>(key, expected);
-    if (text.find_first_not_of(' ') == std::string::npos) section.refuse(key, expected);
-    return text;
-  }
-
-  fs::path place(JsonSection& section, const char* key, const char* expected) const {
-    return (folder_ / text(section, key, expected)).lexically_normal();
-  }
-
-  // A file that is there.
-  fs::path file(JsonSection& section, const char* key) const {
-    fs::path path = place(section, key, "the name of a file");
-    if (::access(path.c_str(), R_OK) != 0)
-      throw Error(fmt::format("{}: {}: {} cannot be read", section.where(), key, path.string()));
-    return path;
-  }
+  using ConfigFolder::ConfigFolder;
 
   OrthancServer orthanc(JsonSection section) const {
     constexpr const char* kUrl = "http://HOST:PORT or https://HOST:PORT";
     OrthancServer server{.url = text(section, "url", kUrl)};
     if (!server.url.starts_with("http://") && !server.url.starts_with("https://")) section.refuse("url", kUrl);
     while (server.url.ends_with('/')) server.url.pop_back();
+    check_encryption(server.url, section);
     if (const auto user = section.find<std::string>("user", "a name")) {
       server.user = *user;
-      std::ifstream password(file(section, "password_file"));
-      std::getline(password, server.password);
+      server.password = secret_line(file(section, "password_file"));
     }
     if (section.find<std::string>("ca", "the name of a file")) server.ca = file(section, "ca");
     section.end();
@@ -80,6 +62,22 @@ class Reader {
   }
 
  private:
+  // Passwords do not belong into URLs, which logs and error messages show. What is read is about patients: it travels
+  // without encryption on this computer only, or where the file says so.
+  static void check_encryption(const std::string& url, JsonSection& section) {
+    const std::size_t begin = url.find("//") + 2;
+    const std::string host_and_port = url.substr(begin, url.find('/', begin) - begin);
+    if (host_and_port.find('@') != std::string::npos)
+      section.refuse("url", "no user and no password in it: they belong into user and password_file");
+    constexpr const char* kTls = "false: http without encryption to another computer is wanted";
+    const auto tls = section.find<bool>("tls", kTls);
+    if (tls.value_or(false)) section.refuse("tls", kTls);
+    const std::string host = host_and_port.substr(0, host_and_port.find_last_of(':'));
+    const bool is_here = host == "localhost" || host.starts_with("127.") || host == "[::1]";
+    if (url.starts_with("http://") && !is_here && !tls)
+      section.refuse("url", "https, or \"tls\": false where http without encryption to another computer is wanted");
+  }
+
   std::string aet(JsonSection& section, const char* key) const {
     constexpr const char* kExpected = "an application entity title of at most 16 characters";
     std::string title = text(section, key, kExpected);
@@ -101,8 +99,6 @@ class Reader {
       section.refuse("fingerprint", kExpected);
     return digits;
   }
-
-  fs::path folder_;
 };
 
 }  // namespace
@@ -110,7 +106,7 @@ class Reader {
 WatchFile read_watch_file(const fs::path& path) {
   const JsonFile json = read_json_file(path);
   JsonSection section(json.json, path.string());
-  const Reader read(fs::absolute(path).parent_path());
+  const Reader read(path);
   constexpr const char* kVersion = "1, the version of its format";
   if (section.required<int>("watch_file", kVersion) != 1) section.refuse("watch_file", kVersion);
   WatchFile watch{.path = path};

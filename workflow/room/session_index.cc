@@ -2,13 +2,12 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
+#include <functional>
 #include <regex>
 
 #include "base/output_folder.h"
 #include "base/sha256.h"
 #include "io/report/results_page.h"
-#include "setup/shown_shift.h"
 
 namespace isoshift {
 namespace {
@@ -26,16 +25,6 @@ std::string month_of(const std::string& acquired) {
 // A page's file, "sessions-2026-03.html".
 std::string page_of_month(const std::string& month) { return "sessions-" + month + ".html"; }
 
-// "KV_AP 2026-03-01 10:15:00; KV_LAT ...", of anything with a label and a time.
-template <class Xray>
-std::string times_in_words(const std::vector<Xray>& xrays) {
-  std::string words;
-  for (const Xray& xray : xrays)
-    words += fmt::format("{}{} {}", words.empty() ? "" : "; ", xray.label.empty() ? "X-ray" : xray.label,
-                         xray.acquired.empty() ? "at an unknown time" : xray.acquired);
-  return words;
-}
-
 ResultsPage::Row row_of(const WaitingSession& waiting) {
   const std::string verdict = waiting.has_failed ? "failed" : "waiting";
   return {.verdict = verdict,
@@ -49,56 +38,10 @@ ResultsPage::Row row_of(const WaitingSession& waiting) {
 
 }  // namespace
 
-std::string times_of(const std::vector<StudyFiles::Image>& images) { return times_in_words(images); }
-std::string times_of(const std::vector<SetupResult::View>& views) { return times_in_words(views); }
-
 void SessionIndex::add(const std::string& session, const SetupResult& report, const std::string& obstacle,
                        const std::string& reason_for_person) {
-  std::string held = "held";
-  if (!obstacle.empty())
-    held += ", cannot be released: " + obstacle;
-  else if (!reason_for_person.empty())
-    held += " for a person: " + reason_for_person;
-  Session added{.name = session,
-                .patient = fmt::format("{} ({})", report.identity.patient_name, report.identity.patient_id),
-                .verdict = std::string(to_string(report.verdict)),
-                .action = std::string(to_string(shown_shift(report).decision.action)),
-                .held = std::move(held),
-                .state = "",
-                .first = report.views.front().acquired,
-                .times = times_of(report.views)};
-  sessions_.insert(std::ranges::upper_bound(sessions_, added.first, std::ranges::greater(), &Session::first),
-                   std::move(added));
+  list_.add(session, report, obstacle, reason_for_person);
   is_written_ = false;
-}
-
-// Whether any is another one now.
-bool SessionIndex::update_states(const std::map<std::string, Objection>& objections) {
-  bool has_changed = false;
-  for (Session& session : sessions_) {
-    if (session.is_over) continue;
-    std::string state = session.held;
-    const auto objection = objections.find(session.name);
-    if (objection != objections.end()) state += "; " + objection->second.words;
-    session.is_over = session.verdict == to_string(Verdict::kRejected);
-    if (session.is_over) {
-      state = "rejected";
-    } else if (tree_.is_released(session.name)) {
-      try {
-        const Release release = tree_.release_of(session.name).value();
-        const auto left = tree_.pending_of(release).size();
-        session.is_over = left == 0;
-        state = fmt::format("released by {} on {}{}", to_string(release.releaser), release.on,
-                            release.despite.empty() ? "" : ", although " + release.despite);
-        if (left > 0) state += fmt::format("; {} to be sent", left);
-        if (left == 0 && !release.peers.empty()) state += "; sent";
-      } catch (const std::exception& error) {
-        state = error.what();
-      }
-    }
-    has_changed |= std::exchange(session.state, state) != state;
-  }
-  return has_changed;
 }
 
 void SessionIndex::write(const std::string& page, const std::string& html) {
@@ -110,7 +53,7 @@ void SessionIndex::write(const std::string& page, const std::string& html) {
 
 void SessionIndex::update(const std::vector<WaitingSession>& waiting, const std::vector<std::string>& troubles,
                           const std::map<std::string, Objection>& objections) {
-  const bool has_changed = update_states(objections);
+  const bool has_changed = list_.update(objections);
   if (is_written_ && !has_changed && waiting == waiting_ && troubles == troubles_) return;
   is_written_ = false;  // until all of it is
   waiting_ = waiting;
@@ -121,11 +64,11 @@ void SessionIndex::update(const std::vector<WaitingSession>& waiting, const std:
   newest.summary = {fmt::format(
       "{} sessions registered, {} waiting. A result is sent only after its release: by a person, with isoshift "
       "release SESSION --by NAME, or by the site's rule",
-      sessions_.size(), waiting.size())};
+      list_.sessions().size(), waiting.size())};
   for (const std::string& trouble : troubles) newest.summary.push_back("Trouble: " + trouble);
   for (const WaitingSession& one : waiting) newest.rows.push_back(row_of(one));
   std::map<std::string, ResultsPage, std::greater<>> months;
-  for (const Session& session : sessions_) {
+  for (const ListedSession& session : list_.sessions()) {
     ResultsPage::Row row{.verdict = session.verdict,
                          .cells = {{.text = session.name, .link = "sessions/" + session.name + "/report.html"},
                                    {.text = session.patient},

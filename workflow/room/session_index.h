@@ -6,26 +6,22 @@
 #include <string>
 #include <vector>
 
-#include "io/study/study_files.h"
 #include "setup/setup_result.h"
 #include "workflow/room/results_tree.h"
+#include "workflow/room/session_list.h"
 #include "workflow/room/waiting_session.h"
 
 namespace isoshift {
 
-// Labels and times of the X-rays of a session: "KV_AP 2026-03-01 10:15:00; KV_LAT 2026-03-01 10:15:10".
-std::string times_of(const std::vector<StudyFiles::Image>& images);
-std::string times_of(const std::vector<SetupResult::View>& views);
-
 class SessionIndex {
  public:
-  SessionIndex(const ResultsTree& tree, std::string site) : tree_(tree), site_(std::move(site)) {}
+  SessionIndex(const ResultsTree& tree, std::string site) : tree_(tree), site_(std::move(site)), list_(tree) {}
 
   // `obstacle`: why the session cannot be released; `reason_for_person`: why the site's rule does not release it.
   // Either is empty if nothing is in the way.
   void add(const std::string& session, const SetupResult& report, const std::string& obstacle,
            const std::string& reason_for_person = "");
-  std::size_t size() const { return sessions_.size(); }
+  std::size_t size() const { return list_.sessions().size(); }
 
   // Finds out which sessions have been released and sent, and writes the pages that have changed. `troubles`: the
   // current troubles, such as a full disk. `objections`: what other X-rays say against results, by session.
@@ -33,20 +29,11 @@ class SessionIndex {
               const std::map<std::string, Objection>& objections);
 
  private:
-  struct Session {
-    std::string name, patient, verdict, action;
-    std::string held;  // the state before it is released
-    std::string state;
-    std::string first;     // when the first X-ray was acquired, "2026-03-01 10:15:00"
-    std::string times;     // of all X-rays
-    bool is_over = false;  // the state cannot change any more
-  };
-  bool update_states(const std::map<std::string, Objection>& objections);
   void write(const std::string& page, const std::string& html);
 
   const ResultsTree& tree_;
   std::string site_;
-  std::vector<Session> sessions_;  // the newest first
+  SessionList list_;
   std::vector<WaitingSession> waiting_;
   std::vector<std::string> troubles_;
   bool is_written_ = false;

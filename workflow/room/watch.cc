@@ -35,6 +35,7 @@ Watch::Watch(const WatchFile& watch, const Parts& parts)
       objections_(tree_.objections(), parts.takes_other_xrays),
       kept_objections_(objections_.by_session()),
       index_(tree_, watch.site.name),
+      engine_(tree_.path(), parts.clock),
       deliverer_(watch, parts.sender, parts.clock),
       troubles_(parts.observer),
       sending_troubles_(parts.sending),
@@ -64,6 +65,7 @@ void Watch::round() {
   troubles_.attempt("releasing", [&] { release_automatically(); });
   troubles_.attempt("writing the audit log", [&] { tree_.write_kept_audit(); });
   troubles_.attempt("writing the index", [&] { index_.update(waiting_, troubles(), objections_.by_session()); });
+  troubles_.attempt("writing engine.json", [&] { engine_.update({.waiting = waiting_, .troubles = troubles()}); });
 }
 
 std::vector<std::string> Watch::troubles() const {
@@ -137,7 +139,7 @@ void Watch::take_result(const std::string& session, const std::optional<Running>
   const SetupResult report = read_report(tree_.session(session));
   if (report.views.empty()) throw Error(fmt::format("{}: names no views", tree_.session(session).string()));
   for (const auto& view : report.views) registered_.insert(view.sop_instance_uid);
-  const std::string obstacle = obstacle_to_release(session, report.verdict);
+  const std::string obstacle = obstacle_to_release(tree_, session, report.verdict);
   const std::string reason = reason_for_person(report, made);
   index_.add(session, report, obstacle, reason);
   objections_.add_result(session, report);
@@ -153,18 +155,6 @@ std::string Watch::reason_for_person(const SetupResult& result, const std::optio
   if (!result.site || result.site->sha256 != watch_.site.sha256) return "it was made under another site file";
   if (!made) return "an earlier run of watch registered it";  // X-rays may have come and gone since
   return made->names_plan ? "" : "not all of its X-rays name their plan";
-}
-
-// Empty: there is a record of its registration. What the folder holds is checked when it is released.
-std::string Watch::obstacle_to_release(const std::string& session, Verdict verdict) const {
-  try {
-    const SessionRecord record = tree_.registered(session);
-    if (record.verdict == to_string(verdict)) return "";
-    return fmt::format("session {}: its result says {}, the record of its registration {}: the result was changed",
-                       session, to_string(verdict), record.verdict);
-  } catch (const Error& error) {
-    return error.what();
-  }
 }
 
 // One at a time, those with the newest X-rays first: somebody waits for them.

@@ -21,6 +21,7 @@
 #include "workflow/observer.h"
 #include "workflow/room/clock.h"
 #include "workflow/room/deliver.h"
+#include "workflow/room/engine_state.h"
 #include "workflow/room/objections.h"
 #include "workflow/room/results_tree.h"
 #include "workflow/room/runner.h"
@@ -90,7 +91,6 @@ class Watch {
   // `made`: unset for what an earlier run has registered.
   void take_result(const std::string& session, const std::optional<Running>& made = std::nullopt);
   std::string reason_for_person(const SetupResult& result, const std::optional<Running>& made) const;
-  std::string obstacle_to_release(const std::string& session, Verdict verdict) const;
   void receive();
   void register_complete();
   std::vector<Complete> complete_sessions();
@@ -112,6 +112,7 @@ class Watch {
   Objections objections_;
   std::map<std::string, Objection> kept_objections_;  // those on the disk
   SessionIndex index_;
+  EngineFile engine_;
   Deliverer deliverer_;
   std::mutex sendable_mutex_;  // deliver() reads, round() writes
   Sendable sendable_;

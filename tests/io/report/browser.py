@@ -6,14 +6,18 @@ from selenium import webdriver
 from selenium.webdriver.chrome.service import Service
 
 
-def open_page(file, width, height):
+def new_browser(width, height):
     options = webdriver.ChromeOptions()
     options.binary_location = "/usr/bin/chromium"
     for argument in ("--headless=new", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage", f"--window-size={width},{height}",
                      "--user-data-dir=" + tempfile.mkdtemp(prefix="isoshift-browser-")):
         options.add_argument(argument)
     options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
-    browser = webdriver.Chrome(service=Service("/usr/bin/chromedriver"), options=options)
+    return webdriver.Chrome(service=Service("/usr/bin/chromedriver"), options=options)
+
+
+def open_page(file, width, height):
+    browser = new_browser(width, height)
     browser.get(pathlib.Path(file).resolve().as_uri())
     return browser
 

@@ -1,0 +1,71 @@
+#pragma once
+// What the screen shows of a results tree, and what people do there. The engine, isoshift watch, is another process.
+
+#include <memory>
+#include <mutex>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <set>
+#include <string>
+
+#include "base/error.h"
+#include "base/system_user.h"
+#include "io/config/watch_file.h"
+#include "workflow/room/clock.h"
+#include "workflow/room/engine_state.h"
+#include "workflow/room/results_tree.h"
+#include "workflow/room/session_list.h"
+
+namespace isoshift {
+
+// What was asked for is not there.
+class NotThere : public Error {
+ public:
+  using Error::Error;
+};
+
+// May be called from several threads.
+class Room {
+ public:
+  // Throws Error if the results tree cannot be made or read.
+  Room(const WatchFile& watch, const Clock& clock);
+
+  // The sessions with their states, what waits, troubles, and whether the engine runs, as JSON; at most half a second
+  // old. `version` changes whenever the list does.
+  struct Seen {
+    std::string version;
+    nlohmann::ordered_json list;
+    bool does_engine_run = false;
+  };
+  std::shared_ptr<const Seen> seen();
+
+  // A session for the screen, as JSON: also what speaks against its release, and `record`, the SHA-256 of the record of
+  // its registration. Throws NotThere.
+  nlohmann::ordered_json session(const std::string& name);
+
+  // A file of the session, as it was registered. Throws NotThere, and Error if it was changed.
+  std::string file(const std::string& session, const std::string& name);
+
+  // Releases a session whose record is the one that the person has seen. Throws Error and releases nothing if it is
+  // not, and where ResultsTree::release() does.
+  void release(const std::string& session, const std::string& record, const std::string& user, bool despite_objection);
+
+  // A line in the audit log: that a user has signed in or looked at a session.
+  void audit(const std::string& event, const std::string& user, const std::string& session = "");
+
+ private:
+  void look();
+  const ListedSession& listed(const std::string& session) const;
+
+  const WatchFile& watch_;
+  const Clock& clock_;
+  const SystemUser user_ = system_user();
+  std::mutex mutex_;
+  ResultsTree tree_;
+  SessionList list_;
+  std::set<std::string> known_;  // sessions in the list
+  std::shared_ptr<const Seen> seen_;
+  Clock::Time seen_at_;
+};
+
+}  // namespace isoshift

@@ -1,0 +1,32 @@
+#pragma once
+// The room's screen: answers what browsers ask for. Pages are static files; what they show comes as JSON.
+
+#include "io/config/serve_file.h"
+#include "serve/http_message.h"
+#include "serve/room.h"
+#include "serve/sign_ins.h"
+
+namespace isoshift {
+
+class Screen {
+ public:
+  Screen(Room& room, SignIns& sign_ins, bool by_proxy) : room_(room), sign_ins_(sign_ins), by_proxy_(by_proxy) {}
+
+  // May be called from several threads.
+  HttpResponse answer(const HttpRequest& request);
+
+ private:
+  HttpResponse sign_in(const HttpRequest& request);
+  HttpResponse sign_out(const HttpRequest& request);
+  HttpResponse api(const HttpRequest& request, const SignedIn& who);
+  HttpResponse session(const HttpRequest& request, const SignedIn& who, const std::string& name,
+                       const std::string& what);
+  HttpResponse release(const HttpRequest& request, const SignedIn& who, const std::string& name);
+  HttpResponse events(const HttpRequest& request);
+
+  Room& room_;
+  SignIns& sign_ins_;
+  bool by_proxy_;
+};
+
+}  // namespace isoshift

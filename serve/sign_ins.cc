@@ -1,0 +1,107 @@
+#include "serve/sign_ins.h"
+
+#include <fmt/format.h>
+#include <openssl/crypto.h>
+#include <sys/random.h>
+
+#include <array>
+#include <cerrno>
+
+#include "base/error.h"
+#include "base/sha256.h"
+
+namespace isoshift {
+namespace {
+
+constexpr std::chrono::minutes kIdle(30);
+constexpr std::chrono::hours kLongest(12);
+constexpr int kWrongPasswords = 5;  // in a row; then the user waits
+constexpr std::chrono::minutes kWait(1);
+constexpr std::size_t kMostOpen = 1000, kMostFailures = 10000;
+
+bool is_same(const std::string& a, const std::string& b) {  // takes as long for any two words of one length
+  return a.size() == b.size() && CRYPTO_memcmp(a.data(), b.data(), a.size()) == 0;
+}
+
+}  // namespace
+
+std::string random_word() {
+  std::array<unsigned char, 32> bytes{};
+  if (::getrandom(bytes.data(), bytes.size(), 0) != static_cast<ssize_t>(bytes.size()))
+    throw Error("the system gives no random numbers");
+  std::string word;
+  for (const unsigned char byte : bytes) word += fmt::format("{:02x}", byte);
+  return word;
+}
+
+SignIns::SignIns(const ServeFile& serve, const Clock& clock, IsPassword is_password)
+    : serve_(serve), clock_(clock), is_password_(std::move(is_password)) {}
+
+bool SignIns::is_over(const Open& open) const {
+  const Clock::Time now = clock_.now();
+  return now - open.last > kIdle || now - open.since > kLongest;
+}
+
+std::optional<SignedIn> SignIns::by_proxy(const HttpRequest& request) {
+  if (!is_same(request.header("x-isoshift-proxy"), serve_.proxy->secret)) return std::nullopt;
+  const std::string user = request.header(serve_.proxy->header);
+  const auto roles = serve_.roles.find(user);
+  if (roles == serve_.roles.end()) return std::nullopt;
+  const std::lock_guard lock(mutex_);
+  std::string& token = tokens_[user];
+  if (token.empty()) token = random_word();
+  return SignedIn{.user = user, .roles = roles->second, .token = token};
+}
+
+std::optional<SignedIn> SignIns::of(const HttpRequest& request, Use use) {
+  if (serve_.proxy) return by_proxy(request);
+  const std::string cookie = request.cookie(kSignInCookie);
+  if (cookie.empty()) return std::nullopt;
+  const std::lock_guard lock(mutex_);
+  const auto found = open_.find(sha256_of(cookie));
+  if (found == open_.end()) return std::nullopt;
+  if (is_over(found->second)) {
+    open_.erase(found);
+    return std::nullopt;
+  }
+  if (use == Use::kActs) found->second.last = clock_.now();
+  return found->second.who;
+}
+
+SignIns::Attempt SignIns::sign_in(const std::string& user, const std::string& password) {
+  if (serve_.proxy) return {};
+  const std::unique_lock one_at_a_time(checking_, std::try_to_lock);  // PAM may take seconds
+  if (!one_at_a_time) return {.must_wait = true};
+  const Clock::Time now = clock_.now();
+  {
+    const std::lock_guard lock(mutex_);
+    std::erase_if(failures_, [&](const auto& one) { return now - one.second.last > kWait; });
+    const auto failed = failures_.find(user);
+    if (failures_.size() >= kMostFailures || (failed != failures_.end() && failed->second.count >= kWrongPasswords))
+      return {.must_wait = true};
+  }
+  // Whoever has no role is asked for a password all the same: nobody learns who has one.
+  const bool is_right = is_password_(user, password);
+  const auto roles = serve_.roles.find(user);
+  const std::lock_guard lock(mutex_);
+  if (!is_right || roles == serve_.roles.end()) {
+    Failures& failures = failures_[user];
+    ++failures.count;
+    failures.last = now;
+    return {};
+  }
+  failures_.erase(user);
+  std::erase_if(open_, [&](const auto& one) { return is_over(one.second); });
+  if (open_.size() >= kMostOpen) return {.must_wait = true};
+  const std::string cookie = random_word();
+  open_[sha256_of(cookie)] = {
+      .who = {.user = user, .roles = roles->second, .token = random_word()}, .since = now, .last = now};
+  return {.cookie = cookie};
+}
+
+void SignIns::sign_out(const HttpRequest& request) {
+  const std::lock_guard lock(mutex_);
+  open_.erase(sha256_of(request.cookie(kSignInCookie)));
+}
+
+}  // namespace isoshift

@@ -1,0 +1,74 @@
+#pragma once
+// Who is signed in: by a cookie that this program gave for a password, or by the header of a proxy that signs users in.
+
+#include <chrono>
+#include <functional>
+#include <map>
+#include <mutex>
+#include <optional>
+#include <set>
+#include <string>
+
+#include "io/config/serve_file.h"
+#include "serve/http_message.h"
+#include "workflow/room/clock.h"
+
+namespace isoshift {
+
+struct SignedIn {
+  std::string user;
+  std::set<Role> roles;
+  // Every request that changes something must carry it in the header X-Isoshift-Token: pages of other sites can send
+  // the cookie, and cannot know this.
+  std::string token;
+};
+
+inline constexpr const char* kSignInCookie = "isoshift";
+inline constexpr const char* kTokenHeader = "x-isoshift-token";
+
+// May be called from several threads.
+class SignIns {
+ public:
+  using IsPassword = std::function<bool(const std::string& user, const std::string& password)>;
+
+  // `is_password` asks PAM.
+  SignIns(const ServeFile& serve, const Clock& clock, IsPassword is_password);
+
+  // Nobody for a request of somebody who is not signed in, or has no role. kStays: an open page asks by itself, and its
+  // user may have left: that does not put off the end.
+  enum class Use { kActs, kStays };
+  std::optional<SignedIn> of(const HttpRequest& request, Use use = Use::kActs);
+
+  struct Attempt {
+    std::optional<std::string> cookie;  // the value; unset: not signed in
+    bool must_wait = false;             // too many wrong passwords, or another one is being checked
+  };
+  // A user who signs in anew has a new cookie, so that one that somebody else has planted is worth nothing.
+  Attempt sign_in(const std::string& user, const std::string& password);
+  void sign_out(const HttpRequest& request);
+
+ private:
+  struct Open {
+    SignedIn who;
+    Clock::Time since, last;
+  };
+  struct Failures {
+    int count = 0;
+    Clock::Time last;
+  };
+  bool is_over(const Open& open) const;
+  std::optional<SignedIn> by_proxy(const HttpRequest& request);
+
+  const ServeFile& serve_;
+  const Clock& clock_;
+  IsPassword is_password_;
+  std::mutex mutex_, checking_;
+  std::map<std::string, Open> open_;           // by the SHA-256 of the cookie: what is kept here opens nothing
+  std::map<std::string, std::string> tokens_;  // by user, of those whom the proxy names
+  std::map<std::string, Failures> failures_;   // by user
+};
+
+// 32 bytes that nobody can guess, hexadecimal.
+std::string random_word();
+
+}  // namespace isoshift

@@ -1,0 +1,161 @@
+#include "serve/screen.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <fstream>
+
+#include "base/output_folder.h"
+#include "base/sha256.h"
+#include "tests/support/results_tree.h"
+
+namespace isoshift {
+namespace {
+
+using testing::HasSubstr;
+using testing::Not;
+using Json = nlohmann::json;
+
+// A results tree with a session that was accepted, and three users: one may look, one may also release, one may
+// nothing.
+class ScreenTest : public ResultsTreeTest {
+ protected:
+  HttpRequest request(const std::string& user, const std::string& method, const std::string& path,
+                      const std::string& body = "") {
+    HttpRequest request{.method = method,
+                        .path = path,
+                        .headers = {{"x-remote-user", user}, {"x-isoshift-proxy", "word"}},
+                        .body = body};
+    if (method == "POST") request.headers["content-type"] = "application/json";
+    return request;
+  }
+  HttpResponse get(const std::string& path, const std::string& user = "viewer") {
+    return screen_.answer(request(user, "GET", path));
+  }
+  HttpResponse post(const std::string& user, const std::string& path, const Json& body) {
+    HttpRequest post = request(user, "POST", path, body.dump());
+    post.headers["x-isoshift-token"] = Json::parse(get("/api/me", user).body).at("token");
+    return screen_.answer(post);
+  }
+  Json session() { return Json::parse(get("/api/sessions/" + a_).body); }
+  Json word() { return {{"record", session().at("record")}, {"despite", false}}; }
+
+  ServeFile serve_{.watch = {.results = tree_.path(), .site = {.name = "Linac 3"}, .peers = {{.name = "record"}}},
+                   .proxy = ServeFile::Proxy{.header = "x-remote-user", .secret = "word"},
+                   .roles = {{"viewer", {Role::kView}}, {"releaser", {Role::kView, Role::kRelease}}}};
+  SystemClock clock_;
+  Room room_{serve_.watch, clock_};
+  SignIns sign_ins_{serve_, clock_, [](const std::string&, const std::string&) { return false; }};
+  Screen screen_{room_, sign_ins_, true};
+};
+
+TEST_F(ScreenTest, NothingIsShownToStrangers) {
+  for (const std::string path : {"/", "/room.js", "/session/" + a_, "/session.js", "/api/me", "/api/room",
+                                 "/api/events", "/api/sessions/" + a_, "/api/sessions/" + a_ + "/report.html"}) {
+    const HttpResponse response = get(path, "stranger");
+    EXPECT_GE(response.status, 401) << path;
+    EXPECT_FALSE(response.events) << path;
+    EXPECT_THAT(response.body, Not(HasSubstr(a_))) << path;
+  }
+  HttpRequest forged = request("releaser", "GET", "/api/room");
+  forged.headers["x-isoshift-proxy"] = "guess";
+  EXPECT_EQ(screen_.answer(forged).status, 401);
+  EXPECT_EQ(get("/sign-in", "stranger").status, 200);
+}
+
+TEST_F(ScreenTest, TheListSaysWhatThereIs) {
+  const Json list = Json::parse(get("/api/room").body);
+  EXPECT_EQ(list.at("site"), "Linac 3");
+  EXPECT_EQ(list.at("engine"), "stopped");
+  ASSERT_EQ(list.at("sessions").size(), 1U);
+  EXPECT_EQ(list.at("sessions")[0].at("session"), a_);
+  EXPECT_EQ(list.at("sessions")[0].at("verdict"), "accepted");
+  EXPECT_EQ(list.at("sessions")[0].at("state"), "held");
+  EngineFile(tree_.path(), clock_)
+      .update({.waiting = {{.name = "b", .patient_id = "8", .why = "1 of 2 X-rays"}},
+               .troubles = {"receiving: no answer"}});
+  const std::string other = register_session(tree_, {"1.2.3", "1.2.4"}, "review");
+  (void)session();  // looks at once
+  const Json now = Json::parse(get("/api/room").body);
+  EXPECT_EQ(now.at("engine"), "runs");
+  EXPECT_EQ(now.at("waiting")[0].at("state"), "1 of 2 X-rays");
+  EXPECT_EQ(now.at("troubles")[0], "receiving: no answer");
+  EXPECT_EQ(now.at("sessions").size(), 2U);
+  EXPECT_NE(now.at("version"), list.at("version"));
+}
+
+TEST_F(ScreenTest, WhatIsOnTheScreenIsReleasedByWhoMay) {
+  const Json word = this->word();
+  EXPECT_EQ(post("viewer", "/api/sessions/" + a_ + "/release", word).status, 403);
+  EXPECT_FALSE(tree_.is_released(a_));
+  const HttpResponse response = post("releaser", "/api/sessions/" + a_ + "/release", word);
+  ASSERT_EQ(response.status, 200) << response.body;
+  EXPECT_THAT(Json::parse(response.body).at("state"), HasSubstr("released by releaser (user "));
+  EXPECT_EQ(tree_.release_of(a_)->releaser.by, "releaser");
+  EXPECT_EQ(tree_.release_of(a_)->peers, std::vector<std::string>{"record"});
+  EXPECT_EQ(post("releaser", "/api/sessions/" + a_ + "/release", word).status, 409) << "twice";
+}
+
+TEST_F(ScreenTest, AnotherRecordThanTheOneOnTheScreenIsNotReleased) {
+  EXPECT_EQ(post("releaser", "/api/sessions/" + a_ + "/release", {{"record", std::string(64, '0')}, {"despite", false}})
+                .status,
+            409);
+  const Json word = this->word();
+  std::ofstream(tree_.session(a_) / "result.json", std::ios::app) << " ";
+  EXPECT_EQ(post("releaser", "/api/sessions/" + a_ + "/release", word).status, 409);
+  EXPECT_FALSE(tree_.is_released(a_));
+}
+
+TEST_F(ScreenTest, AReleaseDespiteOtherXraysNeedsAWord) {
+  tree_.keep_objections({{a_, {.words = "there are newer X-rays"}}});
+  EXPECT_EQ(session().at("objection"), "there are newer X-rays");
+  Json word = this->word();
+  EXPECT_EQ(post("releaser", "/api/sessions/" + a_ + "/release", word).status, 409);
+  word["despite"] = true;
+  EXPECT_EQ(post("releaser", "/api/sessions/" + a_ + "/release", word).status, 200);
+  EXPECT_EQ(tree_.release_of(a_)->despite, "there are newer X-rays");
+}
+
+// A page of another site can send a form, with the user's cookie or by the user's proxy; it cannot know the token.
+TEST_F(ScreenTest, RequestsOfOtherSitesChangeNothing) {
+  const std::string body = word().dump();
+  HttpRequest forged = request("releaser", "POST", "/api/sessions/" + a_ + "/release", body);
+  EXPECT_EQ(screen_.answer(forged).status, 403);
+  forged.headers["x-isoshift-token"] = Json::parse(get("/api/me", "viewer").body).at("token");
+  EXPECT_EQ(screen_.answer(forged).status, 403) << "the token of another user";
+  forged.headers["x-isoshift-token"] = Json::parse(get("/api/me", "releaser").body).at("token");
+  forged.headers["content-type"] = "text/plain";
+  EXPECT_EQ(screen_.answer(forged).status, 415);
+  EXPECT_FALSE(tree_.is_released(a_));
+}
+
+TEST_F(ScreenTest, OnlyFilesOfTheRecordAreShown) {
+  for (const std::string path :
+       {"../audit.jsonl", "../../registered/" + a_ + ".json", "result.json", "report.html/", "nothing"})
+    EXPECT_EQ(get("/api/sessions/" + a_ + "/" + path).status, 404) << path;
+  EXPECT_EQ(get("/api/sessions/..").status, 404);
+  EXPECT_EQ(get("/api/sessions/").status, 404);
+}
+
+TEST_F(ScreenTest, TheReportComesAsRegisteredAndIsNotedAsViewed) {
+  const std::string session = write_registering(tree_, {"1.2.5", "1.2.6"}, "accepted");
+  std::ofstream(tree_.registering(session) / "report.html") << "<p>report</p>";
+  tree_.publish(session);
+  const HttpResponse report = get("/api/sessions/" + session + "/report.html");
+  ASSERT_EQ(report.status, 200);
+  EXPECT_EQ(report.body, "<p>report</p>");
+  EXPECT_THAT(report.headers.front().second, HasSubstr("sandbox allow-scripts"));
+  EXPECT_THAT(audit(), HasSubstr("\"event\":\"viewed\""));
+  EXPECT_THAT(audit(), HasSubstr("\"by\":\"viewer\""));
+  std::ofstream(tree_.session(session) / "report.html") << "<p>another</p>";
+  EXPECT_EQ(get("/api/sessions/" + session + "/report.html").status, 409);
+}
+
+TEST_F(ScreenTest, OtherMethodsAndAddressesAreRefused) {
+  EXPECT_EQ(screen_.answer(request("viewer", "DELETE", "/api/sessions/" + a_)).status, 405);
+  EXPECT_EQ(get("/elsewhere").status, 404);
+  EXPECT_EQ(post("releaser", "/api/sessions/" + a_ + "/explode", {}).status, 404);
+}
+
+}  // namespace
+}  // namespace isoshift

@@ -1,0 +1,108 @@
+#include "serve/sign_ins.h"
+
+#include <gtest/gtest.h>
+
+namespace isoshift {
+namespace {
+
+using namespace std::chrono_literals;
+
+class StillClock : public Clock {
+ public:
+  Time now() const override { return now_; }
+  std::filesystem::file_time_type file_time() const override { return {}; }
+  void wait(std::chrono::milliseconds length) override { now_ += length; }
+
+ private:
+  Time now_{1000h};
+};
+
+HttpRequest with_cookie(const std::string& cookie) {
+  return {.method = "GET", .headers = {{"cookie", "other=1; isoshift=" + cookie}}};
+}
+
+class SignInsTest : public testing::Test {
+ protected:
+  std::string signed_in() { return sign_ins_.sign_in("doe", "right").cookie.value_or(""); }
+
+  ServeFile serve_{.pam_service = "isoshift", .roles = {{"doe", {Role::kView, Role::kRelease}}}};
+  StillClock clock_;
+  int asked_ = 0;
+  SignIns sign_ins_{serve_, clock_, [this](const std::string&, const std::string& password) {
+                      ++asked_;
+                      return password == "right";
+                    }};
+};
+
+TEST_F(SignInsTest, ThePasswordGivesACookieAndTheCookieOpens) {
+  EXPECT_FALSE(sign_ins_.of({}));
+  const std::string cookie = signed_in();
+  ASSERT_EQ(cookie.size(), 64U);
+  const auto who = sign_ins_.of(with_cookie(cookie));
+  ASSERT_TRUE(who);
+  EXPECT_EQ(who->user, "doe");
+  EXPECT_TRUE(who->roles.contains(Role::kRelease));
+  EXPECT_FALSE(sign_ins_.of(with_cookie(cookie.substr(1) + "0")));
+  EXPECT_NE(who->token, cookie);
+}
+
+TEST_F(SignInsTest, ACookieThatSomebodyElseHasPlantedOpensNothing) {
+  const std::string planted = signed_in();
+  const std::string own = signed_in();
+  EXPECT_NE(own, planted);
+  sign_ins_.sign_out(with_cookie(planted));
+  EXPECT_FALSE(sign_ins_.of(with_cookie(planted)));
+  EXPECT_TRUE(sign_ins_.of(with_cookie(own)));
+}
+
+TEST_F(SignInsTest, WhoHasNoRoleMayNotComeIn) {
+  EXPECT_FALSE(sign_ins_.sign_in("roe", "right").cookie);
+  EXPECT_EQ(asked_, 1) << "nobody learns from the time who has a role";
+}
+
+TEST_F(SignInsTest, GuessersWait) {
+  for (int n = 0; n < 5; ++n) EXPECT_FALSE(sign_ins_.sign_in("doe", "wrong").must_wait);
+  EXPECT_TRUE(sign_ins_.sign_in("doe", "right").must_wait);
+  EXPECT_EQ(asked_, 5);
+  clock_.wait(61s);
+  EXPECT_TRUE(sign_ins_.sign_in("doe", "right").cookie);
+}
+
+TEST_F(SignInsTest, TimeIsOverForThoseWhoLeft) {
+  const std::string cookie = signed_in();
+  clock_.wait(29min);
+  EXPECT_TRUE(sign_ins_.of(with_cookie(cookie)));
+  clock_.wait(29min);
+  EXPECT_TRUE(sign_ins_.of(with_cookie(cookie), SignIns::Use::kStays));
+  clock_.wait(2min);
+  EXPECT_FALSE(sign_ins_.of(with_cookie(cookie))) << "an open page alone does not put off the end";
+}
+
+TEST_F(SignInsTest, NobodyStaysLongerThanADay) {
+  const std::string cookie = signed_in();
+  for (int n = 0; n < 24; ++n) {
+    EXPECT_TRUE(sign_ins_.of(with_cookie(cookie)));
+    clock_.wait(30min);
+  }
+  clock_.wait(1min);
+  EXPECT_FALSE(sign_ins_.of(with_cookie(cookie)));
+}
+
+TEST(SignInsByProxy, OnlyTheProxyNamesUsers) {
+  const ServeFile serve{.proxy = ServeFile::Proxy{.header = "x-remote-user", .secret = "word"},
+                        .roles = {{"doe", {Role::kView}}}};
+  const StillClock clock;
+  SignIns sign_ins(serve, clock, [](const std::string&, const std::string&) { return true; });
+  const auto of = [&](const std::string& user, const std::string& secret) {
+    return sign_ins.of({.headers = {{"x-remote-user", user}, {"x-isoshift-proxy", secret}}});
+  };
+  ASSERT_TRUE(of("doe", "word"));
+  EXPECT_EQ(of("doe", "word")->token, of("doe", "word")->token);
+  EXPECT_FALSE(of("doe", "wore"));
+  EXPECT_FALSE(of("doe", ""));
+  EXPECT_FALSE(of("roe", "word"));
+  EXPECT_FALSE(sign_ins.sign_in("doe", "x").cookie);
+}
+
+}  // namespace
+}  // namespace isoshift

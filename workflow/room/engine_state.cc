@@ -1,0 +1,60 @@
+#include "workflow/room/engine_state.h"
+
+#include <fmt/format.h>
+
+#include <nlohmann/json.hpp>
+
+#include "base/error.h"
+#include "base/json_file.h"
+#include "base/output_folder.h"
+
+namespace isoshift {
+namespace {
+
+constexpr const char* kFile = "engine.json";
+
+}  // namespace
+
+EngineFile::EngineFile(const std::filesystem::path& results, const Clock& clock)
+    : path_(results / kFile), clock_(clock) {}
+
+void EngineFile::update(const EngineState& state) {
+  const Clock::Time now = clock_.now();
+  if (written_ == state && now - signed_at_ < kEngineSigns) return;
+  if (written_ != state || !std::filesystem::exists(path_)) {
+    nlohmann::ordered_json json = {{"schema", 1}, {"waiting", nlohmann::json::array()}, {"troubles", state.troubles}};
+    for (const WaitingSession& one : state.waiting)
+      json["waiting"].push_back({{"session", one.name},
+                                 {"patient_id", one.patient_id},
+                                 {"acquired", one.acquired},
+                                 {"why", one.why},
+                                 {"has_failed", one.has_failed}});
+    replace_text(path_, json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
+    written_ = state;
+  }
+  std::filesystem::last_write_time(path_, clock_.file_time());
+  signed_at_ = now;
+}
+
+std::optional<EngineSeen> read_engine_state(const std::filesystem::path& results, std::filesystem::file_time_type now) {
+  const std::filesystem::path file = results / kFile;
+  std::error_code missing;
+  const auto written = std::filesystem::last_write_time(file, missing);
+  if (missing) return std::nullopt;
+  const nlohmann::json json = read_json_file(file).json;
+  EngineSeen seen{.age = std::chrono::duration_cast<std::chrono::seconds>(now - written)};
+  try {
+    seen.state.troubles = json.at("troubles");
+    for (const nlohmann::json& one : json.at("waiting"))
+      seen.state.waiting.push_back({.name = one.at("session"),
+                                    .patient_id = one.at("patient_id"),
+                                    .acquired = one.at("acquired"),
+                                    .why = one.at("why"),
+                                    .has_failed = one.at("has_failed")});
+  } catch (const nlohmann::json::exception& error) {
+    throw Error(fmt::format("{}: is not what isoshift watch writes: {}", file.string(), error.what()));
+  }
+  return seen;
+}
+
+}  // namespace isoshift
