@@ -78,6 +78,16 @@ HttpRequest request_of(const http::request<http::string_body>& message, const st
   return request;
 }
 
+// Whether what arrived is no request that can be answered, and the other end is still there.
+bool is_of_request(const boost::system::error_code& failed) {
+  return failed.category() == make_error_code(http::error::bad_method).category() &&
+         failed != http::error::end_of_stream && failed != http::error::partial_message;
+}
+
+int status_of(const boost::system::error_code& failed) {
+  return failed == http::error::body_limit ? 413 : failed == http::error::header_limit ? 431 : 400;
+}
+
 }  // namespace
 
 class HttpServer::Implementation {
@@ -185,18 +195,10 @@ class HttpServer::Implementation {
       }
       co_await http::async_read(stream, buffer, parser, net::redirect_error(net::use_awaitable, failed));
       socket.expires_after(options_.patience);
-      if (failed == http::error::body_limit || failed == http::error::header_limit) {
-        co_await write(stream, {.status = failed == http::error::body_limit ? 413 : 431}, false);
-        break;
-      }
-      if (failed && failed.category() == make_error_code(http::error::bad_method).category() &&
-          failed != http::error::end_of_stream) {
-        co_await write(stream, {.status = 400}, false);
-        break;
-      }
-      if (failed) break;
-      const bool keep = parser.get().keep_alive();
-      const HttpResponse response = handled(parser.get(), from);
+      if (failed && !is_of_request(failed)) break;
+      const bool keep = !failed && parser.get().keep_alive();
+      // A name of its own: GCC 12 destroys a temporary twice in an expression with co_await.
+      const HttpResponse response = failed ? HttpResponse{.status = status_of(failed)} : handled(parser.get(), from);
       socket.expires_after(options_.patience);
       if (response.events) {
         co_await write_events(stream, socket, response);

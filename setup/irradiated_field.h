@@ -19,7 +19,8 @@ struct IrradiatedField {
   Origin origin = Origin::kWholeReceptor;
   std::vector<Eigen::Vector2d> corners_px;  // of the field, in the X-ray as acquired: where half the beam arrives
   double sigma_mm = 0.0;                    // of its least certain side, at the isocenter
-  std::string doubt;                        // why it is not sure; empty: it is
+  double keep_off_mm = 0.0;  // its sides may lie this much farther in: what is compared keeps off them by as much more
+  std::string doubt;         // why it is not sure; empty: it is
 
   bool is_sure() const { return doubt.empty(); }
 };

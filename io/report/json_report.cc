@@ -236,6 +236,7 @@ Json irradiated_field_json(const IrradiatedField& field) {
   return {{"origin", to_string(field.origin)},
           {"corners_px", polygons_json({field.corners_px}).front()},
           {"sigma_mm", field.sigma_mm},
+          {"keep_off_mm", field.keep_off_mm},
           {"doubt", or_null(field.doubt)}};
 }
 

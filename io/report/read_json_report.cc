@@ -52,7 +52,9 @@ ViewPicture picture_from(const Json& json) {
 }
 
 IrradiatedField irradiated_field_from(const Json& json) {
-  IrradiatedField field{.sigma_mm = json.at("sigma_mm"), .doubt = text_from(json.at("doubt"))};
+  IrradiatedField field{.sigma_mm = json.at("sigma_mm"),
+                        .keep_off_mm = json.value("keep_off_mm", 0.0),
+                        .doubt = text_from(json.at("doubt"))};
   for (const IrradiatedField::Origin origin : kFieldOrigins)
     if (json.at("origin") == to_string(origin)) field.origin = origin;
   for (const Json& corner : json.at("corners_px")) field.corners_px.push_back(vector_from<2>(corner));

@@ -95,6 +95,8 @@ std::string field_words(const SetupResult::View& view) {
                          view.pixel_mm * (field.corners_px[1] - field.corners_px[0]).norm(),
                          view.pixel_mm * (field.corners_px[2] - field.corners_px[1]).norm());
   if (field.sigma_mm > 0.0 && field.sigma_mm < 100.0) words += fmt::format(", +/- {:.1f} mm", 2.0 * field.sigma_mm);
+  if (field.keep_off_mm > 0.0)
+    words += fmt::format("; a side may lie {:.1f} mm farther in, which is not compared", field.keep_off_mm);
   return field.is_sure() ? words : words + "; not sure: " + printable(field.doubt);
 }
 

@@ -31,6 +31,8 @@ constexpr double kPoorMisfit = 0.12;      // that is explained no better than th
 // The same of one side that crosses dense bone, of a field that only a collimator makes. Skulls: 1.15 to 1.3 mm and 1.4
 // to 1.6 times as wide, found within 0.8 mm.
 constexpr double kLeastSeenOverBone = 0.4, kMaxScatterOverBoneMm = 1.5, kWideOfScatter = 1.7;
+// Of a field that only a collimator makes: wider places than usual are kept off instead of doubted.
+constexpr double kMaxWideKeptOffMm = 2.5;
 constexpr double kCollimatorScatterMm = 0.45;  // of a collimator's edge; the outlines of air and patient have more
 constexpr double kRodBrightness = -0.5;        // beyond a rod; beyond a field's side the image has less than half
 constexpr double kJawToleranceMm = 3.0;        // a side and a declared jaw
@@ -146,8 +148,12 @@ bool is_unmistakable(const Side& side) {
   return side.edge.evidence >= kEvidence && side.edge.at_ends >= kEnds && side.brightness_beyond < kBeyond;
 }
 
-// Why a side that was found may be wrong; empty: it is sure. `may_scatter`: as edges over dense bone do.
-std::string doubt_about(const Side& side, const char* name, bool may_scatter) {
+// How wide the places of a sure side are.
+double usual_width_mm(const Side& side) { return side.line.misfit > kPoorMisfit ? kMaxWideOfPoorMm : kMaxWideMm; }
+
+// Why a side that was found may be wrong; empty: it is sure. `may_scatter`: as edges over dense bone do. `kept_off_mm`:
+// how wide its places may be, because what is compared keeps off them.
+std::string doubt_about(const Side& side, const char* name, bool may_scatter, double kept_off_mm) {
   const bool is_straight = side.is_straight() || (may_scatter && side.line.seen > kLeastSeenOverBone &&
                                                   side.line.scatter_mm <= kMaxScatterOverBoneMm);
   if (!is_straight) return fmt::format("its {} edge is not straight", name);
@@ -158,7 +164,7 @@ std::string doubt_about(const Side& side, const char* name, bool may_scatter) {
   // Where the blocks of a side scatter, many lines fit nearly as well, and their middle is right; where the blocks
   // agree and many lines fit nevertheless, two places are as likely.
   const double by_scatter_mm = may_scatter ? kWideOfScatter * side.line.scatter_mm : 0.0;
-  if (side.line.wide_mm > std::max(by_scatter_mm, side.line.misfit > kPoorMisfit ? kMaxWideOfPoorMm : kMaxWideMm))
+  if (side.line.wide_mm > std::max({by_scatter_mm, usual_width_mm(side), kept_off_mm}))
     return fmt::format("its {} edge may lie {:.1f} mm farther in or out", name, side.line.wide_mm);
   if (std::abs(side.line.slope) > kMaxTurn)
     return fmt::format("its edges are turned by {:.1f} degrees against the collimator angle",
@@ -170,10 +176,22 @@ std::string doubt_about(const Side& side, const char* name, bool may_scatter) {
 std::string doubt_about(const Sides& sides) {
   std::vector<std::size_t> doubtful;
   for (std::size_t n = 0; n < sides.size(); ++n)
-    if (!sides[n].is_open() && !doubt_about(sides[n], kNames[n], false).empty()) doubtful.push_back(n);
-  if (doubtful.empty()) return {};
-  const bool may_scatter = doubtful.size() == 1 && std::ranges::all_of(sides, is_unmistakable);
-  return doubt_about(sides[doubtful.front()], kNames[doubtful.front()], may_scatter);
+    if (!sides[n].is_open() && !doubt_about(sides[n], kNames[n], false, 0.0).empty()) doubtful.push_back(n);
+  const bool is_field = std::ranges::all_of(sides, is_unmistakable);
+  for (const std::size_t n : doubtful) {
+    const bool may_scatter = is_field && doubtful.size() == 1;
+    std::string doubt = doubt_about(sides[n], kNames[n], may_scatter, is_field ? kMaxWideKeptOffMm : 0.0);
+    if (!doubt.empty()) return doubt;
+  }
+  return {};
+}
+
+// How far the field may end inside of its sides, beyond what is usual for sure ones.
+double to_keep_off_mm(const Sides& sides) {
+  double most_mm = 0.0;
+  for (const Side& side : sides)
+    if (!side.is_open() && side.line.wide_mm > usual_width_mm(side)) most_mm = std::max(most_mm, side.line.wide_mm);
+  return most_mm;
 }
 
 // Rods, couches and patients are bright again beyond; a field is dark there.
@@ -406,6 +424,7 @@ IrradiatedField find_irradiated_field(const XrayImage& xray, double pixels_per_m
     finding = reconciled(std::move(finding), *xray.declared_aperture, upright, edges, field.origin);
   field.doubt = finding.doubt;
   if (field.is_sure() && has_leaves(xray)) field.doubt = "the file declares leaves that the image does not show";
+  if (field.is_sure()) field.keep_off_mm = to_keep_off_mm(finding.sides);
   for (Side& side : finding.sides) {
     if (!side.is_open()) field.sigma_mm = std::max(field.sigma_mm, side.line.sigma_mm);
     // Blocks of pixels may not reach the rim.

@@ -89,7 +89,7 @@ void exclude_clipped(FixedImage& image) {
 
 // What can be compared of an image at full resolution, by its irradiated field.
 void put_field(FixedImage& image) {
-  const double rim_px = std::max(1.0, kRimMm * pixels_per_mm(image.view));
+  const double rim_px = std::max(1.0, (kRimMm + image.irradiated.keep_off_mm) * pixels_per_mm(image.view));
   image.field = mask_of(image.irradiated, image.view.columns, image.view.rows, rim_px);
   exclude_clipped(image);
 }

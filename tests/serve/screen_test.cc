@@ -7,6 +7,9 @@
 
 #include "base/output_folder.h"
 #include "base/sha256.h"
+#include "io/report/result_folder.h"
+#include "io/study/session_files.h"
+#include "tests/support/oblique_report.h"
 #include "tests/support/results_tree.h"
 
 namespace isoshift {
@@ -16,9 +19,9 @@ using testing::HasSubstr;
 using testing::Not;
 using Json = nlohmann::json;
 
-// A results tree with a session that was accepted, and three users: one may look, one may also release, one may
+// A results tree with a session that was accepted, and two users: one may look, one may also release, one may
 // nothing.
-class ScreenTest : public ResultsTreeTest {
+class ScreenTest : public testing::Test {
  protected:
   HttpRequest request(const std::string& user, const std::string& method, const std::string& path,
                       const std::string& body = "") {
@@ -37,12 +40,26 @@ class ScreenTest : public ResultsTreeTest {
     post.headers["x-isoshift-token"] = Json::parse(get("/api/me", user).body).at("token");
     return screen_.answer(post);
   }
+  // A result of X-rays with these UIDs, as isoshift register would leave it.
+  std::string register_result(const std::vector<std::string>& xrays, Verdict verdict = Verdict::kAccepted) {
+    SetupResult result = oblique_report(verdict);
+    result.views.resize(xrays.size(), result.views.front());
+    for (std::size_t n = 0; n < xrays.size(); ++n) result.views[n].sop_instance_uid = xrays[n];
+    std::string name = session_name(std::set(xrays.begin(), xrays.end()));
+    std::filesystem::create_directories(tree_.registering(name));
+    write_result(result, tree_.registering(name));
+    tree_.publish(name);
+    return name;
+  }
   Json session() { return Json::parse(get("/api/sessions/" + a_).body); }
   Json word() { return {{"record", session().at("record")}, {"despite", false}}; }
 
+  TemporaryFolder folder_;
+  ResultsTree tree_{folder_ / "results"};
   ServeFile serve_{.watch = {.results = tree_.path(), .site = {.name = "Linac 3"}, .peers = {{.name = "record"}}},
                    .proxy = ServeFile::Proxy{.header = "x-remote-user", .secret = "word"},
                    .roles = {{"viewer", {Role::kView}}, {"releaser", {Role::kView, Role::kRelease}}}};
+  const std::string a_ = register_result({"1.2.1", "1.2.2"});
   SystemClock clock_;
   Room room_{serve_.watch, clock_};
   SignIns sign_ins_{serve_, clock_, [](const std::string&, const std::string&) { return false; }};
@@ -50,8 +67,9 @@ class ScreenTest : public ResultsTreeTest {
 };
 
 TEST_F(ScreenTest, NothingIsShownToStrangers) {
-  for (const std::string path : {"/", "/room.js", "/session/" + a_, "/session.js", "/api/me", "/api/room",
-                                 "/api/events", "/api/sessions/" + a_, "/api/sessions/" + a_ + "/report.html"}) {
+  for (const std::string& path :
+       std::vector<std::string>{"/", "/room.js", "/session/" + a_, "/session.js", "/api/me", "/api/room", "/api/events",
+                                "/api/sessions/" + a_, "/api/sessions/" + a_ + "/report.html"}) {
     const HttpResponse response = get(path, "stranger");
     EXPECT_GE(response.status, 401) << path;
     EXPECT_FALSE(response.events) << path;
@@ -74,7 +92,7 @@ TEST_F(ScreenTest, TheListSaysWhatThereIs) {
   EngineFile(tree_.path(), clock_)
       .update({.waiting = {{.name = "b", .patient_id = "8", .why = "1 of 2 X-rays"}},
                .troubles = {"receiving: no answer"}});
-  const std::string other = register_session(tree_, {"1.2.3", "1.2.4"}, "review");
+  const std::string other = register_result({"1.2.3", "1.2.4"}, Verdict::kReview);
   (void)session();  // looks at once
   const Json now = Json::parse(get("/api/room").body);
   EXPECT_EQ(now.at("engine"), "runs");
@@ -130,25 +148,22 @@ TEST_F(ScreenTest, RequestsOfOtherSitesChangeNothing) {
 }
 
 TEST_F(ScreenTest, OnlyFilesOfTheRecordAreShown) {
-  for (const std::string path :
-       {"../audit.jsonl", "../../registered/" + a_ + ".json", "result.json", "report.html/", "nothing"})
+  for (const std::string& path : std::vector<std::string>{"../audit.jsonl", "../../registered/" + a_ + ".json",
+                                                          "result.json", "report.html/", "nothing"})
     EXPECT_EQ(get("/api/sessions/" + a_ + "/" + path).status, 404) << path;
   EXPECT_EQ(get("/api/sessions/..").status, 404);
   EXPECT_EQ(get("/api/sessions/").status, 404);
 }
 
 TEST_F(ScreenTest, TheReportComesAsRegisteredAndIsNotedAsViewed) {
-  const std::string session = write_registering(tree_, {"1.2.5", "1.2.6"}, "accepted");
-  std::ofstream(tree_.registering(session) / "report.html") << "<p>report</p>";
-  tree_.publish(session);
-  const HttpResponse report = get("/api/sessions/" + session + "/report.html");
+  const HttpResponse report = get("/api/sessions/" + a_ + "/report.html");
   ASSERT_EQ(report.status, 200);
-  EXPECT_EQ(report.body, "<p>report</p>");
+  EXPECT_EQ(report.body, text_of(tree_.session(a_) / "report.html"));
   EXPECT_THAT(report.headers.front().second, HasSubstr("sandbox allow-scripts"));
-  EXPECT_THAT(audit(), HasSubstr("\"event\":\"viewed\""));
-  EXPECT_THAT(audit(), HasSubstr("\"by\":\"viewer\""));
-  std::ofstream(tree_.session(session) / "report.html") << "<p>another</p>";
-  EXPECT_EQ(get("/api/sessions/" + session + "/report.html").status, 409);
+  EXPECT_THAT(text_of(tree_.path() / "audit.jsonl"), HasSubstr("\"event\":\"viewed\""));
+  EXPECT_THAT(text_of(tree_.path() / "audit.jsonl"), HasSubstr("\"by\":\"viewer\""));
+  std::ofstream(tree_.session(a_) / "report.html") << "<p>another</p>";
+  EXPECT_EQ(get("/api/sessions/" + a_ + "/report.html").status, 409);
 }
 
 TEST_F(ScreenTest, OtherMethodsAndAddressesAreRefused) {

@@ -75,10 +75,28 @@ TEST_F(WatchFileTest, ACertificateIsPinnedByItsFingerprintAsOpensslPrintsIt) {
     EXPECT_THAT(error_of(with_fingerprint(wrong)), HasSubstr("tls: fingerprint is \"" + wrong + "\", expected 64"));
 }
 
+// Of patients nothing travels without encryption unless the file says so, and no log ever shows a password.
+TEST_F(WatchFileTest, ServersAreAskedWithEncryptionAndWithoutPasswordsInTheirUrl) {
+  const auto with_server = [&](const std::string& server) {
+    return R"({"watch_file": 1, "results": "out", "site": "site.json", "orthanc": {)" + server + "}}";
+  };
+  for (const std::string here : {"http://localhost:8042", "http://127.0.0.1", "http://[::1]:8042/", "https://h:8042"})
+    EXPECT_EQ(error_of(with_server("\"url\": \"" + here + "\"")), "");
+  EXPECT_THAT(error_of(with_server(R"("url": "http://h:8042")")), HasSubstr("\"tls\": false"));
+  EXPECT_EQ(error_of(with_server(R"("url": "http://h:8042", "tls": false)")), "");
+  EXPECT_THAT(error_of(with_server(R"("url": "http://localhost.example.org")")), HasSubstr("\"tls\": false"));
+  EXPECT_THAT(error_of(with_server(R"("url": "https://me:word@h")")), HasSubstr("password_file"));
+  std::ofstream(folder_ / "password") << "word\n";
+  const std::string by_file = with_server(R"("url": "https://h", "user": "me", "password_file": "password")");
+  EXPECT_THAT(error_of(by_file), HasSubstr("other users can read or write this secret: chmod 600"));
+  std::filesystem::permissions(folder_ / "password", std::filesystem::perms::owner_read);
+  EXPECT_EQ(read(by_file).orthanc->password, "word");
+}
+
 TEST_F(WatchFileTest, MistakesAreNamed) {
   EXPECT_THAT(error_of(R"({"watch_file": 2})"), HasSubstr("watch_file"));
   EXPECT_THAT(error_of(with(", \"foo\": 1")), HasSubstr("foo"));
-  EXPECT_THAT(error_of(with(R"(, "orthanc": {"url": "http://h"})")), HasSubstr("expected one of them"));
+  EXPECT_THAT(error_of(with(R"(, "orthanc": {"url": "https://h"})")), HasSubstr("expected one of them"));
   EXPECT_THAT(
       error_of(with(R"(, "peers": [{"name": "r", "host": "h", "port": 1, "called_aet": "A", "calling_aet": "B"}])")),
       HasSubstr("peer 1: tls"));  // none must be said
