@@ -1,0 +1,120 @@
+"""The room's screen in Chromium: sessions appear, are looked at and released; two browsers see each other's changes; the
+heartbeat tells when the engine is killed.
+
+  screen_in_browser.py ISOSHIFT WORK
+
+WORK is an empty folder. Prints what went wrong and exits with 1, or ends with 0.
+"""
+
+import json
+import pathlib
+import re
+import subprocess
+import sys
+import time
+
+from selenium.webdriver.common.by import By
+
+ROOT = pathlib.Path(__file__).resolve().parents[1]
+sys.path += [str(ROOT / "io/report"), str(ROOT / "workflow/room")]
+
+from browser import new_browser, problems  # noqa: E402
+from room import expect, wait_for  # noqa: E402
+
+
+def browser_of(user, address):
+    """A browser behind a proxy that names this user."""
+    browser = new_browser(1280, 1024)
+    browser.execute_cdp_cmd("Network.enable", {})
+    browser.execute_cdp_cmd("Network.setExtraHTTPHeaders", {"headers": {"X-Remote-User": user, "X-Isoshift-Proxy": "word"}})
+    browser.get(address)
+    return browser
+
+
+def text(browser, selector):
+    return "\n".join(one.text for one in browser.find_elements(By.CSS_SELECTOR, selector))
+
+
+def main(program, work):
+    (work / "in").mkdir()
+    secret = work / "secret"
+    secret.write_text("word\n")
+    secret.chmod(0o600)
+    (work / "site.json").write_text(json.dumps({"site_file": 1, "name": "Linac 3", "sessions": {"views": 2, "quiet_s": 1}}))
+    (work / "watch.json").write_text(json.dumps({
+        "watch_file": 1, "folder": "in", "results": "results", "site": "site.json", "register": ["--preset=fast"]}))
+    (work / "serve.json").write_text(json.dumps({
+        "serve_file": 1, "watch": "watch.json", "port": 0, "proxy": {"header": "X-Remote-User", "secret_file": "secret"},
+        "roles": {"doe": ["view", "release"], "roe": ["view"]}}))
+    results, log = work / "results", work / "serve.log"
+
+    def bring_study(seed):
+        subprocess.run([program, "phantom", "-o", work / "in" / str(seed), "--seed", str(seed), "--voxel-mm", "4",
+                        "--image-pixels", "96", "--photons", "0"], check=True, capture_output=True)
+
+    def result_of(count):
+        wait_for(lambda: len(list((results / "sessions").glob("[!.]*/result.json"))) == count, 120, "a result")
+        return time.time()
+
+    watch = subprocess.Popen([program, "watch", work / "watch.json"], stderr=(work / "watch.log").open("w"))
+    wait_for(lambda: (results / "engine.json").exists(), 30, "the engine")
+    serve = subprocess.Popen([program, "serve", work / "serve.json"], stderr=log.open("w"))
+    wait_for(lambda: "serving" in log.read_text(), 30, "the server")
+    address = re.search(r"http://\S+", log.read_text())[0]
+    doe = roe = None
+    try:
+        doe, roe = browser_of("doe", address), browser_of("roe", address)
+        wait_for(lambda: "engine runs" in text(doe, "#heartbeat"), 10, "the heartbeat")
+        bring_study(1)
+        wait_for(lambda: text(doe, "#sessions"), 60, "a session that waits")
+        began = result_of(1)
+        wait_for(lambda: "held" in text(doe, "#sessions"), 10, "the session on the screen")
+        print(f"a session appeared {time.time() - began:.1f} s after its result")
+
+        # What a person has set stays while sessions come.
+        doe.find_element(By.ID, "filter").send_keys("phantom1")
+        bring_study(2)
+        result_of(2)
+        wait_for(lambda: "2 with a result" in text(doe, "#count"), 10, "the second session")
+        expect(len(doe.find_elements(By.CSS_SELECTOR, "#sessions tr")) == 1, "the filter was lost: " + text(doe, "#sessions"))
+        expect(doe.find_element(By.ID, "filter").get_attribute("value") == "phantom1", "the filter's text was lost")
+        expect("Phantom Digital (PHANTOM1)" in text(doe, "#sessions"), "names: " + text(doe, "#sessions"))
+
+        link = doe.find_element(By.CSS_SELECTOR, "#sessions a")
+        page = link.get_attribute("href")
+        link.click()
+        wait_for(lambda: "held" in text(doe, "#state"), 10, "the session's page")
+        roe.get(page)
+        wait_for(lambda: "may look" in text(roe, "#goes-to"), 10, "the words for who may only look")
+        expect(not roe.find_element(By.ID, "release").is_enabled(), "who may only look could release")
+        doe.switch_to.frame("report")
+        wait_for(lambda: "Move the couch by" in text(doe, "body"), 10, "the report")
+        doe.switch_to.default_content()
+        doe.find_element(By.ID, "release").click()
+        wait_for(lambda: "released by doe" in text(doe, "#state"), 10, "the release")
+        wait_for(lambda: "released by doe" in text(roe, "#state"), 10, "the release in the other browser")
+        expect(not doe.find_element(By.ID, "release").is_enabled(), "a released session could be released again")
+        audit = (results / "audit.jsonl").read_text()
+        for event in ("viewed", "released"):
+            expect(f'"event":"{event}"' in audit and '"by":"doe"' in audit, f"the audit log does not tell of {event}")
+
+        watch.kill()
+        watch.wait()
+        wait_for(lambda: "engine stopped" in text(roe, "#heartbeat"), 20, "the red heartbeat")
+        serve.kill()
+        serve.wait()
+        wait_for(lambda: "no connection" in text(roe, "#heartbeat"), 20, "the heartbeat of a lost server")
+        for browser in (doe, roe):
+            seen = [one for one in problems(browser) if "ERR_CONNECTION_REFUSED" not in one and "api/events" not in one]
+            expect(not seen, f"the browser complains: {seen}")
+    finally:
+        for process in (watch, serve):
+            process.kill()
+            process.wait()
+        for browser in (doe, roe):
+            if browser:
+                browser.quit()
+
+
+if __name__ == "__main__":
+    main(sys.argv[1], pathlib.Path(sys.argv[2]))
