@@ -17,8 +17,8 @@ std::unique_ptr<std::FILE, FileCloser> open_secret(const std::filesystem::path& 
   if (!file || ::fstat(::fileno(file.get()), &status) != 0)
     throw Error(fmt::format("{}: cannot be read: {}", path.string(), std::strerror(errno)));
   if ((status.st_mode & (S_IRWXG | S_IRWXO)) != 0)
-    throw Error(
-        fmt::format("{}: other users can read or write this secret: chmod 600 {}", path.string(), path.string()));
+    throw Error(fmt::format("{}: other users can read or write this file, which must be secret: chmod 600 {}",
+                            path.string(), path.string()));
   return file;
 }
 

@@ -35,7 +35,6 @@ namespace http = beast::http;
 using tcp = net::ip::tcp;
 
 constexpr std::chrono::milliseconds kLookForEvents(200);
-constexpr std::chrono::seconds kSignOfLife(5);  // a comment, so that the browser notices if this end is gone
 
 // Everything comes from here, nothing is kept, and no other site may show or use it.
 constexpr std::pair<const char*, const char*> kHeaders[] = {
@@ -186,7 +185,7 @@ class HttpServer::Implementation {
       http::request_parser<http::string_body> parser;
       parser.header_limit(static_cast<std::uint32_t>(options_.most_header));
       parser.body_limit(options_.most_body);
-      socket.expires_after(is_first ? options_.patience : options_.idle);
+      socket.expires_after(is_first || buffer.size() > 0 ? options_.patience : options_.idle);
       boost::system::error_code failed;
       if (!is_first && buffer.size() == 0) {
         const std::size_t read = co_await stream.async_read_some(buffer.prepare(4096), net::use_awaitable);
@@ -198,13 +197,13 @@ class HttpServer::Implementation {
       if (failed && !is_of_request(failed)) break;
       const bool keep = !failed && parser.get().keep_alive();
       // A name of its own: GCC 12 destroys a temporary twice in an expression with co_await.
-      const HttpResponse response = failed ? HttpResponse{.status = status_of(failed)} : handled(parser.get(), from);
+      HttpResponse response = failed ? HttpResponse{.status = status_of(failed)} : handled(parser.get(), from);
       socket.expires_after(options_.patience);
       if (response.events) {
         co_await write_events(stream, socket, response);
         break;
       }
-      co_await write(stream, response, keep);
+      co_await write(stream, std::move(response), keep);
       if (!keep) break;
     }
     boost::system::error_code ignored;
@@ -227,13 +226,22 @@ class HttpServer::Implementation {
   }
 
   template <class S>
-  net::awaitable<void> write(S& stream, const HttpResponse& response, bool keep) {
+  net::awaitable<void> write(S& stream, HttpResponse response, bool keep) {
     http::response<http::string_body> message(static_cast<http::status>(response.status), 11);
     set_headers(response, options_.tls.has_value(), message);
     message.keep_alive(keep);
-    message.body() = response.body;
+    message.body() = std::move(response.body);
     message.prepare_payload();
     co_await http::async_write(stream, message, net::use_awaitable);
+  }
+
+  std::optional<std::string> event_of(const HttpResponse& response) {
+    try {
+      return response.events();
+    } catch (const std::exception& error) {
+      complain_(fmt::format("a stream of events: {}", error.what()));
+      return std::nullopt;
+    }
   }
 
   template <class S>
@@ -246,19 +254,13 @@ class HttpServer::Implementation {
     co_await http::async_write_header(stream, serializer, net::use_awaitable);
     net::steady_timer timer(co_await net::this_coro::executor);
     std::optional<std::string> sent;
-    auto last = std::chrono::steady_clock::now();
     for (;;) {
-      const std::optional<std::string> now = response.events();
+      const std::optional<std::string> now = event_of(response);
       if (!now) break;
-      std::string text;
-      if (now != sent)
-        text = fmt::format("data: {}\n\n", *now);
-      else if (std::chrono::steady_clock::now() - last > kSignOfLife)
-        text = ": here\n\n";
-      if (!text.empty()) {
+      if (now != sent) {
+        const std::string text = fmt::format("data: {}\n\n", *now);
         socket.expires_after(options_.patience);
         co_await net::async_write(stream, net::buffer(text), net::use_awaitable);
-        last = std::chrono::steady_clock::now();
         sent = now;
       }
       timer.expires_after(kLookForEvents);

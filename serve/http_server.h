@@ -7,23 +7,20 @@
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
-#include <filesystem>
 #include <functional>
 #include <memory>
 #include <optional>
 #include <string>
 
+#include "io/config/serve_file.h"
 #include "serve/http_message.h"
 
 namespace isoshift {
 
 struct HttpServerOptions {
-  struct Tls {
-    std::filesystem::path certificate, key;  // PEM
-  };
   std::string address = "127.0.0.1";
   std::uint16_t port = 0;  // 0: any that is free
-  std::optional<Tls> tls;
+  std::optional<ServeFile::Tls> tls;
   std::size_t most_connections = 256;                  // any more are closed at once
   std::size_t most_header = 16384, most_body = 65536;  // bytes of a request
   std::chrono::milliseconds patience{10000};           // for a whole request, from its first byte or the last answer

@@ -8,7 +8,6 @@
 #include <utility>
 
 #include "base/sha256.h"
-#include "io/report/report_page.h"
 #include "io/report/result_folder.h"
 
 namespace isoshift {
@@ -18,16 +17,18 @@ using Json = nlohmann::ordered_json;
 
 constexpr std::chrono::milliseconds kFresh(500);
 constexpr std::size_t kNewest = 500;
+constexpr const char* kReport = "report.html";
 
 Json json_of(const ListedSession& session) {
   return {{"session", session.name},    {"patient", session.patient}, {"acquired", session.times},
           {"verdict", session.verdict}, {"action", session.action},   {"state", session.state}};
 }
 
-Json json_of(const std::optional<EngineSeen>& engine) {
+// Without those that have a result since.
+Json waiting_json(const EngineState& engine, const std::vector<ListedSession>& sessions) {
   Json waiting = Json::array();
-  if (engine)
-    for (const WaitingSession& one : engine->state.waiting)
+  for (const WaitingSession& one : engine.waiting)
+    if (std::ranges::find(sessions, one.name, &ListedSession::name) == sessions.end())
       waiting.push_back({{"session", one.name},
                          {"patient", one.patient_id},
                          {"acquired", one.acquired},
@@ -45,34 +46,47 @@ std::string content_of(const std::filesystem::path& path) {
 
 }  // namespace
 
-Room::Room(const WatchFile& watch, const Clock& clock) : watch_(watch), clock_(clock), tree_(watch), list_(tree_) {}
+Room::Room(const WatchFile& watch, const Clock& clock) : watch_(watch), clock_(clock), tree_(watch), list_(tree_) {
+  check_is_owner(watch.results);
+}
 
-// A result that cannot be read hides no other.
-void Room::look() {
-  const std::vector<std::string> there = tree_.sessions();
-  const bool is_any_gone =
-      std::ranges::any_of(known_, [&](const std::string& one) { return !std::ranges::binary_search(there, one); });
-  if (is_any_gone) {
+// A result that cannot be read hides no other. A session that was registered again is read again.
+void Room::look_for_sessions(std::vector<std::string>& troubles) {
+  std::map<std::string, RegisteredAt> there;
+  for (const std::string& session : tree_.sessions()) there[session] = tree_.registered_at(session);
+  const auto is_as_listed = [&](const auto& one) {
+    const auto found = there.find(one.first);
+    return found != there.end() && found->second == one.second;
+  };
+  if (!std::ranges::all_of(known_, is_as_listed)) {
     list_ = SessionList(tree_);
     known_.clear();
   }
-  std::vector<std::string> troubles;
-  for (const std::string& session : there) {
+  for (const auto& [session, registered_at] : there) {
     if (known_.contains(session)) continue;
     try {
       const SetupResult report = read_report(tree_.session(session));
       if (report.views.empty()) throw Error(fmt::format("session {}: its result names no views", session));
       list_.add(session, report, obstacle_to_release(tree_, session, report.verdict));
-      known_.insert(session);
-    } catch (const Error& error) {
-      troubles.emplace_back(error.what());
+      known_[session] = registered_at;
+    } catch (const std::exception& error) {
+      troubles.push_back(fmt::format("session {}: {}", session, error.what()));
     }
   }
-  list_.update(tree_.objections());
+}
+
+void Room::look() {
+  std::vector<std::string> troubles;
+  look_for_sessions(troubles);
+  try {
+    list_.update(tree_.objections());
+  } catch (const std::exception& error) {
+    troubles.emplace_back(error.what());
+  }
   std::optional<EngineSeen> engine;
   try {
     engine = read_engine_state(tree_.path(), clock_.file_time());
-  } catch (const Error& error) {
+  } catch (const std::exception& error) {
     troubles.emplace_back(error.what());
   }
   if (engine) std::ranges::copy(engine->state.troubles, std::back_inserter(troubles));
@@ -86,7 +100,7 @@ void Room::look() {
   seen->list = {{"site", watch_.site.name},
                 {"engine", seen->does_engine_run ? "runs" : "stopped"},
                 {"troubles", troubles},
-                {"waiting", json_of(engine)},
+                {"waiting", waiting_json(engine ? engine->state : EngineState(), list_.sessions())},
                 {"count", list_.sessions().size()},
                 {"sessions", std::move(sessions)}};
   seen->version = sha256_of(seen->list.dump(-1, ' ', false, Json::error_handler_t::replace));
@@ -112,27 +126,24 @@ Json Room::session(const std::string& name) {
   const ListedSession& session = listed(name);
   Json json = json_of(session);
   const Objection objection = tree_.objection(name);
-  const std::string obstacle = session.verdict == to_string(Verdict::kRejected)
-                                   ? "The result was rejected: there is nothing to release."
-                               : tree_.is_released(name) ? "The session has been released."
-                                                         : "";
-  json["obstacle"] = obstacle;
   json["objection"] = objection.words;
   json["newer_have_results"] = objection.newer_have_results;
   json["peers"] = watch_.names_of_peers();
+  json["record"] = "";
+  json["obstacle"] = "";
+  if (session.verdict == to_string(Verdict::kRejected))
+    json["obstacle"] = "The result was rejected: there is nothing to release.";
+  if (tree_.is_released(name)) json["obstacle"] = "The session has been released.";
   try {
     json["record"] = tree_.registered(name).sha256;
+    (void)registered_content(name, kReport);
   } catch (const Error& error) {
-    json["record"] = "";
     json["obstacle"] = error.what();
   }
   return json;
 }
 
-std::string Room::file(const std::string& session, const std::string& name) {
-  const std::lock_guard lock(mutex_);
-  look();
-  (void)listed(session);
+std::string Room::registered_content(const std::string& session, const std::string& name) const {
   const SessionRecord record = tree_.registered(session);
   const auto file = record.files.find(name);
   if (file == record.files.end()) throw NotThere(fmt::format("session {}: has no file {}", session, name));
@@ -142,14 +153,19 @@ std::string Room::file(const std::string& session, const std::string& name) {
   return content;
 }
 
-void Room::release(const std::string& session, const std::string& record, const std::string& user,
+std::string Room::file(const std::string& session, const std::string& name) {
+  const std::lock_guard lock(mutex_);
+  look();
+  (void)listed(session);
+  return registered_content(session, name);
+}
+
+void Room::release(const std::string& session, const ResultsTree::Seen& seen, const std::string& user,
                    bool despite_objection) {
   const std::lock_guard lock(mutex_);
-  if (tree_.registered(session).sha256 != record)
-    throw Error(fmt::format("session {}: is not what was on the screen any more. Look at it again", session));
   tree_.release(session,
                 {.by = user, .user = user_.name, .sudo_user = user_.sudo_user, .despite_objection = despite_objection},
-                watch_.names_of_peers());
+                watch_.names_of_peers(), seen);
   seen_.reset();
 }
 
@@ -158,7 +174,6 @@ void Room::audit(const std::string& event, const std::string& user, const std::s
   Json details = {{"by", user}};
   if (!session.empty()) details["session"] = session;
   tree_.audit(event, details);
-  tree_.write_kept_audit();
 }
 
 }  // namespace isoshift

@@ -1,12 +1,13 @@
 #pragma once
 // What the screen shows of a results tree, and what people do there. The engine, isoshift watch, is another process.
 
+#include <map>
 #include <memory>
 #include <mutex>
 #include <nlohmann/json.hpp>
 #include <optional>
-#include <set>
 #include <string>
+#include <vector>
 
 #include "base/error.h"
 #include "base/system_user.h"
@@ -46,15 +47,18 @@ class Room {
   // A file of the session, as it was registered. Throws NotThere, and Error if it was changed.
   std::string file(const std::string& session, const std::string& name);
 
-  // Releases a session whose record is the one that the person has seen. Throws Error and releases nothing if it is
-  // not, and where ResultsTree::release() does.
-  void release(const std::string& session, const std::string& record, const std::string& user, bool despite_objection);
+  // Throws Error, and releases nothing, where ResultsTree::release() does.
+  void release(const std::string& session, const ResultsTree::Seen& seen, const std::string& user,
+               bool despite_objection);
 
-  // A line in the audit log: that a user has signed in or looked at a session.
+  // A line in the audit log: that a user has signed in or looked at a session. If it cannot be written now, it is kept:
+  // on a full disk people must see reports all the same.
   void audit(const std::string& event, const std::string& user, const std::string& session = "");
 
  private:
   void look();
+  void look_for_sessions(std::vector<std::string>& troubles);
+  std::string registered_content(const std::string& session, const std::string& name) const;
   const ListedSession& listed(const std::string& session) const;
 
   const WatchFile& watch_;
@@ -63,7 +67,8 @@ class Room {
   std::mutex mutex_;
   ResultsTree tree_;
   SessionList list_;
-  std::set<std::string> known_;  // sessions in the list
+  using RegisteredAt = std::optional<std::filesystem::file_time_type>;
+  std::map<std::string, RegisteredAt> known_;  // sessions in the list
   std::shared_ptr<const Seen> seen_;
   Clock::Time seen_at_;
 };

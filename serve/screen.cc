@@ -6,7 +6,6 @@
 #include <array>
 #include <string_view>
 
-#include "io/report/report_page.h"
 #include "serve/pages/icon.svg.h"
 #include "serve/pages/room.css.h"
 #include "serve/pages/room.html.h"
@@ -36,7 +35,9 @@ constexpr std::array kPages = {Page{"/", kHtml, kRoomHtml},
                                Page{"/sign_in.js", kScript, kSignInJs, true},
                                Page{"/icon.svg", "image/svg+xml", kIconSvg, true},
                                Page{"/room.css", "text/css; charset=utf-8", kRoomCss, true}};
-constexpr std::string_view kSessionPage = "/session/", kApi = "/api/", kSessionApi = "/api/sessions/";
+constexpr std::chrono::seconds kBeat(4);
+constexpr std::string_view kSessionPage = "/session/", kApi = "/api/", kSessionApi = "/api/sessions/",
+                           kEvents = "/api/events";
 
 HttpResponse json(const Json& json, int status = 200) {
   return {.status = status, .body = json.dump(-1, ' ', false, Json::error_handler_t::replace)};
@@ -44,6 +45,13 @@ HttpResponse json(const Json& json, int status = 200) {
 HttpResponse refusal(int status, const std::string& why) { return json({{"error", why}}, status); }
 
 HttpResponse see_other(const std::string& place) { return {.status = 303, .headers = {{"Location", place}}}; }
+
+// Of a user of the system or of the proxy: whatever else arrives is not looked up, counted or logged.
+bool is_name(const std::string& user) {
+  constexpr std::size_t kLongest = 64;
+  return !user.empty() && user.size() <= kLongest &&
+         std::ranges::all_of(user, [](unsigned char c) { return c > ' ' && c < 127; });
+}
 
 bool has_type_json(const HttpRequest& request) {
   return request.header("content-type").starts_with("application/json");
@@ -65,16 +73,20 @@ HttpResponse report(std::string html) {
 HttpResponse Screen::answer(const HttpRequest& request) {
   const bool is_read = request.method == "GET";
   if (!is_read && request.method != "POST") return refusal(405, "GET or POST is expected");
-  const auto who = sign_ins_.of(request);
+  // What a page asks for by itself does not tell that its user is still there.
+  const bool is_automatic = request.path == kEvents || !request.header("x-isoshift-automatic").empty();
+  auto who = sign_ins_.of(request, is_automatic ? SignIns::Use::kStays : SignIns::Use::kActs);
+  if (who && !who->roles.contains(Role::kView)) who.reset();
   if (is_read) {
     const auto* page = std::ranges::find(kPages, request.path, &Page::path);
-    if (page != kPages.end() && (who || page->is_for_all)) return {.type = std::string(page->type), .body = page->text};
+    if (page != kPages.end() && (who || (page->is_for_all && !by_proxy_)))
+      return {.type = std::string(page->type), .body = page->text};
     if (who && request.path.starts_with(kSessionPage)) return {.type = std::string(kHtml), .body = kSessionHtml};
   }
-  if (!is_read && request.path == "/api/sign-in") return sign_in(request);
+  if (!is_read && request.path == "/api/sign-in" && !by_proxy_) return sign_in(request);
   if (!who) {
-    if (!is_read || request.path.starts_with(kApi)) return refusal(401, "Nobody is signed in.");
-    return by_proxy_ ? refusal(403, "The proxy names no user who may see this.") : see_other("/sign-in");
+    if (by_proxy_) return refusal(403, "The proxy names no user who may see this.");
+    return !is_read || request.path.starts_with(kApi) ? refusal(401, "Nobody is signed in.") : see_other("/sign-in");
   }
   if (!is_read && request.header(kTokenHeader) != who->token)
     return refusal(403, "The request does not come from a page of this program.");
@@ -100,23 +112,27 @@ HttpResponse Screen::sign_in(const HttpRequest& request) {
   } catch (const Json::exception&) {
     return refusal(400, "user and password are expected.");
   }
-  const SignIns::Attempt attempt = sign_ins_.sign_in(user, password);
-  if (attempt.must_wait) return refusal(429, "Too many attempts. Wait a minute.");
+  if (!is_name(user)) return refusal(400, "This is no name of a user.");
+  const SignIns::Attempt attempt = sign_ins_.sign_in(user, password, request.from);
+  if (attempt.must_wait)
+    return refusal(429, "There were too many wrong passwords, or others are signing in. Try again in a minute.");
   if (!attempt.cookie) {
-    room_.audit("sign-in refused", user.substr(0, 64));
+    room_.audit("sign-in refused", user);
     return refusal(403, "Name or password is wrong, or this user has no role here.");
   }
   room_.audit("signed in", user);
   HttpResponse response = json({{"user", user}});
-  response.headers.emplace_back("Set-Cookie", fmt::format("{}={}; Path=/; HttpOnly; SameSite=Strict{}", kSignInCookie,
-                                                          *attempt.cookie, request.is_encrypted ? "; Secure" : ""));
+  response.headers.emplace_back(
+      "Set-Cookie", fmt::format("{}={}; Path=/; HttpOnly; SameSite=Strict{}", sign_in_cookie(request), *attempt.cookie,
+                                request.is_encrypted ? "; Secure" : ""));
   return response;
 }
 
 HttpResponse Screen::sign_out(const HttpRequest& request) {
   sign_ins_.sign_out(request);
   HttpResponse response = json(Json::object());
-  response.headers.emplace_back("Set-Cookie", fmt::format("{}=; Path=/; HttpOnly; Max-Age=0", kSignInCookie));
+  response.headers.emplace_back("Set-Cookie", fmt::format("{}=; Path=/; HttpOnly; Max-Age=0{}", sign_in_cookie(request),
+                                                          request.is_encrypted ? "; Secure" : ""));
   return response;
 }
 
@@ -132,7 +148,7 @@ HttpResponse Screen::api(const HttpRequest& request, const SignedIn& who) {
     list["version"] = seen->version;
     return json(list);
   }
-  if (request.method == "GET" && request.path == "/api/events") return events(request);
+  if (request.method == "GET" && request.path == kEvents) return events(request);
   if (request.path.starts_with(kSessionApi)) {
     const std::string rest = request.path.substr(kSessionApi.size());
     const std::size_t end = std::min(rest.find('/'), rest.size());
@@ -148,37 +164,41 @@ HttpResponse Screen::session(const HttpRequest& request, const SignedIn& who, co
     return refusal(404, "There is nothing at this address.");
   }
   if (what.empty()) return json(room_.session(name));
-  if (what == "report.html") {
-    HttpResponse response = report(room_.file(name, "report.html"));
-    room_.audit("viewed", who.user, name);
-    return response;
-  }
-  if (what == "report.pdf") return {.type = "application/pdf", .body = room_.file(name, "report.pdf")};
-  return refusal(404, "There is nothing at this address.");
+  if (what != "report.html" && what != "report.pdf") return refusal(404, "There is nothing at this address.");
+  std::string content = room_.file(name, what);
+  room_.audit("viewed", who.user, name);
+  if (what == "report.html") return report(std::move(content));
+  return {.type = "application/pdf", .body = std::move(content)};
 }
 
 HttpResponse Screen::release(const HttpRequest& request, const SignedIn& who, const std::string& name) {
   if (!who.roles.contains(Role::kRelease)) return refusal(403, fmt::format("{} may not release.", who.user));
   if (!has_type_json(request)) return refusal(415, "JSON is expected.");
-  std::string record;
+  ResultsTree::Seen seen;
   bool despite = false;
   try {
     const Json body = Json::parse(request.body);
-    record = body.at("record");
+    seen = {.record = body.at("record"), .objection = body.at("objection")};
     despite = body.at("despite");
   } catch (const Json::exception&) {
-    return refusal(400, "record and despite are expected.");
+    return refusal(400, "record, objection and despite are expected.");
   }
-  room_.release(name, record, who.user, despite);
-  return json(room_.session(name));
+  room_.release(name, seen, who.user, despite);
+  return json({{"released", name}});
 }
 
-// A sign of life every few seconds, and the version of the list. The stream ends when the user's time is over.
+// The version of the list, and a beat that changes every few seconds: a browser that hears nothing has lost the server.
+// The stream ends when the user's time is over.
 HttpResponse Screen::events(const HttpRequest& request) {
-  return {.body = "", .events = [this, request]() -> std::optional<std::string> {
+  return {.body = "",
+          .headers = {{"X-Accel-Buffering", "no"}},  // of nginx as a proxy
+          .events = [this, request]() -> std::optional<std::string> {
             if (!sign_ins_.of(request, SignIns::Use::kStays)) return std::nullopt;
             const auto seen = room_.seen();
-            return Json{{"version", seen->version}, {"engine", seen->does_engine_run ? "runs" : "stopped"}}.dump();
+            return Json{{"version", seen->version},
+                        {"engine", seen->does_engine_run ? "runs" : "stopped"},
+                        {"beat", clock_.now().time_since_epoch() / kBeat}}
+                .dump();
           }};
 }
 

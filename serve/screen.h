@@ -10,7 +10,8 @@ namespace isoshift {
 
 class Screen {
  public:
-  Screen(Room& room, SignIns& sign_ins, bool by_proxy) : room_(room), sign_ins_(sign_ins), by_proxy_(by_proxy) {}
+  Screen(Room& room, SignIns& sign_ins, const Clock& clock, bool by_proxy)
+      : room_(room), sign_ins_(sign_ins), clock_(clock), by_proxy_(by_proxy) {}
 
   // May be called from several threads.
   HttpResponse answer(const HttpRequest& request);
@@ -26,6 +27,7 @@ class Screen {
 
   Room& room_;
   SignIns& sign_ins_;
+  const Clock& clock_;
   bool by_proxy_;
 };
 

@@ -17,6 +17,7 @@ constexpr std::chrono::minutes kIdle(30);
 constexpr std::chrono::hours kLongest(12);
 constexpr int kWrongPasswords = 5;  // in a row; then the user waits
 constexpr std::chrono::minutes kWait(1);
+constexpr std::chrono::seconds kPatience(5);
 constexpr std::size_t kMostOpen = 1000, kMostFailures = 10000;
 
 bool is_same(const std::string& a, const std::string& b) {  // takes as long for any two words of one length
@@ -55,7 +56,7 @@ std::optional<SignedIn> SignIns::by_proxy(const HttpRequest& request) {
 
 std::optional<SignedIn> SignIns::of(const HttpRequest& request, Use use) {
   if (serve_.proxy) return by_proxy(request);
-  const std::string cookie = request.cookie(kSignInCookie);
+  const std::string cookie = request.cookie(sign_in_cookie(request));
   if (cookie.empty()) return std::nullopt;
   const std::lock_guard lock(mutex_);
   const auto found = open_.find(sha256_of(cookie));
@@ -68,29 +69,30 @@ std::optional<SignedIn> SignIns::of(const HttpRequest& request, Use use) {
   return found->second.who;
 }
 
-SignIns::Attempt SignIns::sign_in(const std::string& user, const std::string& password) {
-  if (serve_.proxy) return {};
-  const std::unique_lock one_at_a_time(checking_, std::try_to_lock);  // PAM may take seconds
+// Users without a role are not looked up: nobody can try passwords of other accounts of this computer here.
+SignIns::Attempt SignIns::sign_in(const std::string& user, const std::string& password, const std::string& from) {
+  const auto roles = serve_.roles.find(user);
+  if (serve_.proxy || roles == serve_.roles.end()) return {};
+  const std::unique_lock one_at_a_time(checking_, kPatience);  // PAM may take seconds
   if (!one_at_a_time) return {.must_wait = true};
   const Clock::Time now = clock_.now();
+  const std::string guesser = user + " " + from;
   {
     const std::lock_guard lock(mutex_);
     std::erase_if(failures_, [&](const auto& one) { return now - one.second.last > kWait; });
-    const auto failed = failures_.find(user);
+    const auto failed = failures_.find(guesser);
     if (failures_.size() >= kMostFailures || (failed != failures_.end() && failed->second.count >= kWrongPasswords))
       return {.must_wait = true};
   }
-  // Whoever has no role is asked for a password all the same: nobody learns who has one.
   const bool is_right = is_password_(user, password);
-  const auto roles = serve_.roles.find(user);
   const std::lock_guard lock(mutex_);
-  if (!is_right || roles == serve_.roles.end()) {
-    Failures& failures = failures_[user];
+  if (!is_right) {
+    Failures& failures = failures_[guesser];
     ++failures.count;
     failures.last = now;
     return {};
   }
-  failures_.erase(user);
+  failures_.erase(guesser);
   std::erase_if(open_, [&](const auto& one) { return is_over(one.second); });
   if (open_.size() >= kMostOpen) return {.must_wait = true};
   const std::string cookie = random_word();
@@ -101,7 +103,7 @@ SignIns::Attempt SignIns::sign_in(const std::string& user, const std::string& pa
 
 void SignIns::sign_out(const HttpRequest& request) {
   const std::lock_guard lock(mutex_);
-  open_.erase(sha256_of(request.cookie(kSignInCookie)));
+  open_.erase(sha256_of(request.cookie(sign_in_cookie(request))));
 }
 
 }  // namespace isoshift

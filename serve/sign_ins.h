@@ -23,7 +23,10 @@ struct SignedIn {
   std::string token;
 };
 
-inline constexpr const char* kSignInCookie = "isoshift";
+// The cookie's name. With TLS one that no other host can plant.
+inline const char* sign_in_cookie(const HttpRequest& request) {
+  return request.is_encrypted ? "__Host-isoshift" : "isoshift";
+}
 inline constexpr const char* kTokenHeader = "x-isoshift-token";
 
 // May be called from several threads.
@@ -41,10 +44,11 @@ class SignIns {
 
   struct Attempt {
     std::optional<std::string> cookie;  // the value; unset: not signed in
-    bool must_wait = false;             // too many wrong passwords, or another one is being checked
+    bool must_wait = false;             // too many wrong passwords, or others are being checked
   };
   // A user who signs in anew has a new cookie, so that one that somebody else has planted is worth nothing.
-  Attempt sign_in(const std::string& user, const std::string& password);
+  // `from`: an address. Wrong passwords from elsewhere keep nobody out.
+  Attempt sign_in(const std::string& user, const std::string& password, const std::string& from);
   void sign_out(const HttpRequest& request);
 
  private:
@@ -62,10 +66,11 @@ class SignIns {
   const ServeFile& serve_;
   const Clock& clock_;
   IsPassword is_password_;
-  std::mutex mutex_, checking_;
+  std::mutex mutex_;
+  std::timed_mutex checking_;
   std::map<std::string, Open> open_;           // by the SHA-256 of the cookie: what is kept here opens nothing
   std::map<std::string, std::string> tokens_;  // by user, of those whom the proxy names
-  std::map<std::string, Failures> failures_;   // by user
+  std::map<std::string, Failures> failures_;   // by user and address
 };
 
 // 32 bytes that nobody can guess, hexadecimal.

@@ -2,8 +2,6 @@
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
-#include <sys/stat.h>
-#include <unistd.h>
 
 #include <memory>
 
@@ -24,12 +22,7 @@ void run_release(const std::filesystem::path& file, const std::string& session, 
                  bool despite_other_xrays, Console& console) {
   check_text_on_one_line("--by", by, "the name of the person who releases the session");
   const WatchFile watch = read_watch_file(file);
-  // The user who runs watch could not read files that another user writes.
-  struct stat of_results{};
-  if (::stat(watch.results.c_str(), &of_results) == 0 && of_results.st_uid != ::geteuid())
-    throw Error(fmt::format(
-        "{}: belongs to another user, who runs isoshift watch: release the session as that user (sudo -u USER)",
-        watch.results.string()));
+  check_is_owner(watch.results);
   ResultsTree tree(watch);
   const SystemUser user = system_user();
   const Release release = tree.release(

@@ -4,10 +4,12 @@
 
 #include <csignal>
 #include <memory>
+#include <mutex>
 
 #include "base/graceful_end.h"
 #include "cli/commands/commands.h"
 #include "io/config/serve_file.h"
+#include "io/report/canvas.h"
 #include "serve/http_server.h"
 #include "serve/pam.h"
 #include "serve/room.h"
@@ -26,15 +28,19 @@ void run_serve(const std::filesystem::path& file, Console& console) {
   SignIns sign_ins(serve, clock, [&](const std::string& user, const std::string& password) {
     return is_password_of(serve.pam_service, user, password);
   });
-  Screen screen(room, sign_ins, serve.proxy.has_value());
-  HttpServerOptions options{.address = serve.address, .port = serve.port};
-  if (serve.tls) options.tls = {.certificate = serve.tls->certificate, .key = serve.tls->key};
-  HttpServer server(options, [&](const HttpRequest& request) { return screen.answer(request); });
+  Screen screen(room, sign_ins, clock, serve.proxy.has_value());
+  HttpServer server({.address = serve.address, .port = serve.port, .tls = serve.tls},
+                    [&](const HttpRequest& request) { return screen.answer(request); });
   ConsoleObserver observer(console);
+  std::mutex saying;
   observer.say(fmt::format("serving {} at {}://{}:{}", serve.watch.results.string(), serve.tls ? "https" : "http",
                            serve.address.find(':') == std::string::npos ? serve.address : "[" + serve.address + "]",
                            server.port()));
-  server.run([&] { return end.is_asked_for(); }, [&](const std::string& trouble) { observer.say(trouble); });
+  server.run([&] { return end.is_asked_for(); },
+             [&](const std::string& trouble) {
+               const std::lock_guard lock(saying);  // the server has several threads
+               observer.say(printable(trouble));
+             });
 }
 
 }  // namespace

@@ -33,6 +33,7 @@ std::set<Role> roles_from(const nlohmann::json& json, JsonSection& section, cons
     if (role == kRoles.end()) section.refuse(user.c_str(), kExpected);
     roles.insert(*role);
   }
+  if (!roles.contains(Role::kView)) section.refuse(user.c_str(), "\"view\" among its roles");
   return roles;
 }
 

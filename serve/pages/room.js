@@ -44,6 +44,7 @@ function show() {
   const wanted = all.map(rowOf);
   const stays = new Set(wanted);
   for (const row of [...body.children]) if (!stays.has(row)) row.remove();
+  for (const [session, row] of rows) if (!stays.has(row) && !all.some(one => one.session === session)) rows.delete(session);
   wanted.forEach((row, n) => {
     if (body.children[n] !== row) body.insertBefore(row, body.children[n] || null);
   });
@@ -51,12 +52,14 @@ function show() {
   element("count").textContent = all.length + " shown; " + list.count + " with a result, " + list.waiting.length + " waiting";
 }
 
-function showTroubles() {
-  element("troubles").replaceChildren(...list.troubles.map(trouble => make("li", trouble)));
+// Written only where it changes: it is read aloud then.
+function showTroubles(troubles) {
+  const text = troubles.join("\n");
+  if (element("troubles").innerText !== text) element("troubles").replaceChildren(...troubles.map(one => make("p", one)));
 }
 
 for (const [column, name] of kColumns) {
-  const head = make("th"), button = make("button", name);
+  const head = make("th", undefined, {scope: "col"}), button = make("button", name);
   button.addEventListener("click", () => {
     descending = sortBy === column && !descending;
     sortBy = column;
@@ -70,10 +73,17 @@ for (const [column, name] of kColumns) {
 element("filter").addEventListener("input", show);
 
 await signedIn();
-follow(async version => {
-  if (version === list.version) return;
-  list = await get("/api/room");
-  element("title").textContent = "Sessions of " + list.site;
-  showTroubles();
-  show();
+let isAsking = false;
+follow(async now => {
+  if (now.version === list.version || isAsking) return;
+  isAsking = true;
+  try {
+    list = await get("/api/room", true);
+    element("title").textContent = "Sessions of " + list.site;
+    showTroubles(list.troubles);
+    show();
+  } catch (error) {
+    showTroubles(["The list is out of date: " + error.message]);  // asked again with the next sign of life
+  }
+  isAsking = false;
 });

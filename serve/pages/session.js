@@ -1,52 +1,66 @@
 // A session: its report, what speaks against it, and the release of what is on the screen.
-import {element, follow, get, make, nameForPeople, post, signedIn, verdictCell} from "/shared.js";
+import {element, follow, get, nameForPeople, post, signedIn, verdictCell} from "/shared.js";
 
 const session = decodeURIComponent(location.pathname.split("/").pop());
 const address = "/api/sessions/" + encodeURIComponent(session);
-let shown = null, me = null;
+let shown = null, me = null, hasReport = false, engine = "runs";
+
+// Written only where it changes: it is read aloud then.
+function write(id, text) {
+  if (element(id).textContent !== text) element(id).textContent = text;
+}
 
 // The report on the screen is that of the first record. If another one takes its place, a person must look again.
 function show(now) {
   if (shown && now.record !== shown.record) {
-    element("problem").textContent = "The session has another result now. Load this page again to see it.";
+    write("problem", "The session has another result now. Load this page again to see it.");
     element("release").disabled = true;
+    shown = {...shown, obstacle: "The session has another result now."};
     return;
   }
+  if (shown && now.objection !== shown.objection) element("despite").checked = false;
   shown = now;
   document.title = "isoshift: " + nameForPeople(now.patient);
-  element("patient").textContent = nameForPeople(now.patient);
+  write("patient", nameForPeople(now.patient));
   element("verdict").replaceChildren(verdictCell(now.verdict));
-  element("acquired").textContent = now.acquired;
-  element("state").textContent = now.state;
-  element("objection").textContent = now.objection;
-  const needsWord = now.objection !== "" && !now.newer_have_results;
+  write("acquired", now.acquired);
+  write("state", now.state);
+  write("objection", [now.objection, engine === "runs" ? "" :
+    "The engine gives no sign of life: whether newer X-rays speak against this result is not known."].filter(one => one).join(" "));
+  const needsWord = now.objection !== "";
   element("despite-label").hidden = !needsWord || now.obstacle !== "";
   const may = me.roles.includes("release");
-  element("release").disabled = now.obstacle !== "" || !may || (needsWord && !element("despite").checked);
-  element("goes-to").textContent = now.obstacle !== "" ? now.obstacle
+  element("release").disabled = now.obstacle !== "" || !may || !hasReport || (needsWord && !element("despite").checked);
+  write("goes-to", now.obstacle !== "" ? now.obstacle
     : !may ? "You may look at sessions, and not release them."
-    : now.peers.length ? "goes to " + now.peers.join(", ") : "The watch file names no peers: nothing is sent.";
+    : now.peers.length ? "goes to " + now.peers.join(", ") : "The watch file names no peers: nothing is sent.");
 }
 
-async function update() {
+async function update(isAutomatic = false) {
   try {
-    show(await get(address));
+    show(await get(address, isAutomatic));
+    return true;
   } catch (error) {
-    element("problem").textContent = error.message;
+    write("problem", error.message);
     element("release").disabled = true;
+    return false;
   }
 }
 
 element("despite").addEventListener("change", () => show(shown));
+element("report").addEventListener("load", () => {
+  hasReport = element("report").hasAttribute("src");
+  if (shown) show(shown);
+});
 element("release").addEventListener("click", async () => {
   element("release").disabled = true;
-  element("problem").textContent = "";
+  write("problem", "");
   try {
-    show(await post(address + "/release", {record: shown.record, despite: element("despite").checked}));
+    await post(address + "/release", {record: shown.record, objection: shown.objection, despite: element("despite").checked});
   } catch (error) {
-    element("problem").textContent = error.message;
-    await update();
+    write("problem", error.message);
   }
+  await update();
 });
 
 element("name").textContent = session;
@@ -54,9 +68,14 @@ element("pdf").href = address + "/report.pdf";
 me = await signedIn();
 await update();
 element("report").src = address + "/report.html";
-let version = null;
+let version = null, isAsking = false;
 follow(async now => {
-  if (now === version) return;
-  version = now;
-  await update();
+  if (engine !== now.engine && shown) {
+    engine = now.engine;
+    show(shown);
+  }
+  if (now.version === version || isAsking) return;
+  isAsking = true;
+  if (await update(true)) version = now.version;
+  isAsking = false;
 });

@@ -22,7 +22,9 @@ async function answered(response) {
   return body;
 }
 
-export const get = async path => answered(await fetch(path));
+// `isAutomatic`: the page asks by itself, which does not tell that its user is still there.
+export const get = async (path, isAutomatic = false) =>
+  answered(await fetch(path, {headers: isAutomatic ? {"X-Isoshift-Automatic": "1"} : {}}));
 
 export const post = async (path, body) => answered(await fetch(path, {
   method: "POST",
@@ -44,26 +46,42 @@ export async function signedIn() {
   return me;
 }
 
-// Calls `changed` with the version of the list whenever the server tells of another one. The heartbeat is red when the
-// engine has stopped, or when the server has not been heard for some seconds.
+const kSilenceMs = 12000;  // the server speaks every 4 s
+
+// Calls `changed` with what the server tells: the version of the list, and whether the engine runs. The heartbeat is red
+// when the engine gives no sign of life, or when the server has not been heard for some seconds. A page that nobody sees
+// does not follow: browsers allow few connections.
 export function follow(changed) {
   const heart = element("heartbeat");
+  let events = null, silence = null;
   const show = (state, words) => {
     heart.className = state;
-    heart.textContent = words;
+    if (heart.textContent !== words) heart.textContent = words;
   };
-  const events = new EventSource("/api/events");
-  events.onmessage = event => {
+  const lost = () => show("stopped", "✖ no connection to the server");
+  const hear = event => {
+    clearTimeout(silence);
+    silence = setTimeout(lost, kSilenceMs);
     const now = JSON.parse(event.data);
     if (now.engine === "runs") show("runs", "♥ engine runs");
-    else show("stopped", "✖ engine stopped: nothing new is registered or sent");
-    changed(now.version);
+    else show("stopped", "✖ no sign of life from the engine: nothing new is registered or sent");
+    changed(now);
   };
-  events.onerror = () => {
-    show("stopped", "✖ no connection to the server");
-    // The stream also ends when the user's time is over: then the next request leads to the sign-in.
-    get("/api/me").catch(() => {});
+  const listen = () => {
+    events?.close();
+    clearTimeout(silence);
+    if (document.hidden) return;
+    silence = setTimeout(lost, kSilenceMs);
+    events = new EventSource("/api/events");
+    events.onmessage = hear;
+    events.onerror = () => {
+      lost();
+      // The stream also ends when the user's time is over: then the next request leads to the sign-in.
+      get("/api/me", true).catch(() => {});
+    };
   };
+  document.addEventListener("visibilitychange", listen);
+  listen();
 }
 
 // "Doe^Jane (7)" as people write it: "Doe Jane (7)".

@@ -11,12 +11,18 @@
 #include <atomic>
 #include <thread>
 
+#include "base/error.h"
+#include "tests/support/certificates.h"
+#include "tests/support/command.h"
+#include "tests/support/temporary_folder.h"
+
 namespace isoshift {
 namespace {
 
 using namespace std::chrono_literals;
 using testing::EndsWith;
 using testing::HasSubstr;
+using testing::Not;
 using testing::StartsWith;
 
 // What any program may send to the port.
@@ -146,6 +152,49 @@ TEST_F(HttpServerTest, EventsComeAsTheyHappenAndEnd) {
   EXPECT_EQ(connection.read("\n\n"), "data: 1\n\n");
   events_ = 3;
   EXPECT_EQ(connection.read(), "");
+}
+
+// A client nobody of this project wrote.
+TEST(HttpServerWithTls, SpeaksToWhoKnowsItsAuthority) {
+  if (!Certificates::can_be_made()) GTEST_SKIP() << "openssl is not installed";
+  const TemporaryFolder folder;
+  const Certificates certificates(folder.path());
+  certificates.make_authority("ca");
+  certificates.make_authority("other");
+  certificates.make("server", "/CN=localhost", "DNS:localhost,IP:127.0.0.1");
+  HttpServer server(
+      {.tls = ServeFile::Tls{folder / "server.pem", folder / "server.key"}, .patience = 2s},
+      [](const HttpRequest& request) { return HttpResponse{.body = request.is_encrypted ? "encrypted" : "plain"}; });
+  std::atomic<bool> is_over = false;
+  const std::jthread running([&] { server.run([&] { return is_over.load(); }); });
+  const auto answer = [&](const std::string& authority, const std::string& more = "") {
+    return run_shell(fmt::format("printf 'GET / HTTP/1.1\\r\\nHost: localhost\\r\\nConnection: close\\r\\n\\r\\n' | "
+                                 "timeout 10 openssl s_client -quiet -verify_return_error -verify_hostname localhost "
+                                 "-CAfile {} {} -connect 127.0.0.1:{} 2>&1",
+                                 (folder / authority).string(), more, server.port()))
+        .out;
+  };
+  EXPECT_THAT(answer("ca.pem"), HasSubstr("encrypted"));
+  EXPECT_THAT(answer("ca.pem"), HasSubstr("Strict-Transport-Security: max-age="));
+  EXPECT_THAT(answer("other.pem"), Not(HasSubstr("encrypted")));
+  EXPECT_THAT(answer("ca.pem", "-tls1_1"), Not(HasSubstr("encrypted")));
+  // Who speaks without encryption learns nothing.
+  const Connection plain(server.port());
+  plain.send("GET / HTTP/1.1\r\nHost: x\r\n\r\n");
+  EXPECT_THAT(plain.read(), Not(HasSubstr("plain")));
+  is_over = true;
+}
+
+TEST(HttpServerWithTls, SaysWhatIsWrongWithItsFiles) {
+  const TemporaryFolder folder;
+  try {
+    const HttpServer server({.tls = ServeFile::Tls{folder / "no.pem", folder / "no.key"}}, {});
+    FAIL() << "it began";
+  } catch (const Error& error) {
+    EXPECT_THAT(error.what(), HasSubstr("no.pem"));
+  }
+  const HttpServer first({}, {});
+  EXPECT_THROW(HttpServer({.port = first.port()}, {}), Error);
 }
 
 }  // namespace

@@ -9,6 +9,7 @@ WORK is an empty folder. Prints what went wrong and exits with 1, or ends with 0
 import json
 import pathlib
 import re
+import signal
 import subprocess
 import sys
 import time
@@ -100,12 +101,14 @@ def main(program, work):
 
         watch.kill()
         watch.wait()
-        wait_for(lambda: "engine stopped" in text(roe, "#heartbeat"), 20, "the red heartbeat")
+        wait_for(lambda: "no sign of life" in text(roe, "#heartbeat"), 30, "the red heartbeat")
+        serve.send_signal(signal.SIGSTOP)  # its connections stay open, and nothing comes any more
+        wait_for(lambda: "no connection" in text(roe, "#heartbeat"), 30, "the heartbeat of a server that stands still")
         serve.kill()
         serve.wait()
         wait_for(lambda: "no connection" in text(roe, "#heartbeat"), 20, "the heartbeat of a lost server")
         for browser in (doe, roe):
-            seen = [one for one in problems(browser) if "ERR_CONNECTION_REFUSED" not in one and "api/events" not in one]
+            seen = [one for one in problems(browser) if "ERR_CONNECTION_REFUSED" not in one and "api/" not in one]
             expect(not seen, f"the browser complains: {seen}")
     finally:
         for process in (watch, serve):

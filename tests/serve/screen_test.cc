@@ -52,7 +52,11 @@ class ScreenTest : public testing::Test {
     return name;
   }
   Json session() { return Json::parse(get("/api/sessions/" + a_).body); }
-  Json word() { return {{"record", session().at("record")}, {"despite", false}}; }
+  // What a person says who has looked at the session now.
+  Json word() {
+    const Json seen = session();
+    return {{"record", seen.at("record")}, {"objection", seen.at("objection")}, {"despite", false}};
+  }
 
   TemporaryFolder folder_;
   ResultsTree tree_{folder_ / "results"};
@@ -63,7 +67,7 @@ class ScreenTest : public testing::Test {
   SystemClock clock_;
   Room room_{serve_.watch, clock_};
   SignIns sign_ins_{serve_, clock_, [](const std::string&, const std::string&) { return false; }};
-  Screen screen_{room_, sign_ins_, true};
+  Screen screen_{room_, sign_ins_, clock_, true};
 };
 
 TEST_F(ScreenTest, NothingIsShownToStrangers) {
@@ -77,8 +81,11 @@ TEST_F(ScreenTest, NothingIsShownToStrangers) {
   }
   HttpRequest forged = request("releaser", "GET", "/api/room");
   forged.headers["x-isoshift-proxy"] = "guess";
-  EXPECT_EQ(screen_.answer(forged).status, 401);
-  EXPECT_EQ(get("/sign-in", "stranger").status, 200);
+  EXPECT_EQ(screen_.answer(forged).status, 403);
+  EXPECT_EQ(get("/sign-in", "stranger").status, 403) << "the proxy signs in";
+  EXPECT_EQ(screen_.answer(request("stranger", "POST", "/api/sign-in", R"({"user": "a", "password": "b"})")).status,
+            403);
+  EXPECT_EQ(text_of(tree_.path() / "audit.jsonl").find("sign-in"), std::string::npos);
 }
 
 TEST_F(ScreenTest, TheListSaysWhatThereIs) {
@@ -108,14 +115,15 @@ TEST_F(ScreenTest, WhatIsOnTheScreenIsReleasedByWhoMay) {
   EXPECT_FALSE(tree_.is_released(a_));
   const HttpResponse response = post("releaser", "/api/sessions/" + a_ + "/release", word);
   ASSERT_EQ(response.status, 200) << response.body;
-  EXPECT_THAT(Json::parse(response.body).at("state"), HasSubstr("released by releaser (user "));
+  EXPECT_THAT(session().at("state").get<std::string>(), HasSubstr("released by releaser (user "));
   EXPECT_EQ(tree_.release_of(a_)->releaser.by, "releaser");
   EXPECT_EQ(tree_.release_of(a_)->peers, std::vector<std::string>{"record"});
   EXPECT_EQ(post("releaser", "/api/sessions/" + a_ + "/release", word).status, 409) << "twice";
 }
 
 TEST_F(ScreenTest, AnotherRecordThanTheOneOnTheScreenIsNotReleased) {
-  EXPECT_EQ(post("releaser", "/api/sessions/" + a_ + "/release", {{"record", std::string(64, '0')}, {"despite", false}})
+  EXPECT_EQ(post("releaser", "/api/sessions/" + a_ + "/release",
+                 {{"record", std::string(64, '0')}, {"objection", ""}, {"despite", false}})
                 .status,
             409);
   const Json word = this->word();
@@ -132,6 +140,32 @@ TEST_F(ScreenTest, AReleaseDespiteOtherXraysNeedsAWord) {
   word["despite"] = true;
   EXPECT_EQ(post("releaser", "/api/sessions/" + a_ + "/release", word).status, 200);
   EXPECT_EQ(tree_.release_of(a_)->despite, "there are newer X-rays");
+}
+
+TEST_F(ScreenTest, WhatOtherXraysSayMustHaveBeenOnTheScreen) {
+  Json word = this->word();
+  word["despite"] = true;
+  tree_.keep_objections({{a_, {.words = "there are newer X-rays", .newer_have_results = true}}});
+  EXPECT_EQ(post("releaser", "/api/sessions/" + a_ + "/release", word).status, 409) << "they came after the look";
+  EXPECT_FALSE(tree_.is_released(a_));
+  EXPECT_EQ(post("releaser", "/api/sessions/" + a_ + "/release", this->word()).status, 200);
+}
+
+// Moved away and registered again, with nobody looking in between.
+TEST_F(ScreenTest, ASessionThatWasRegisteredAgainIsShownAsItIsNow) {
+  const std::string record = session().at("record");
+  std::filesystem::remove_all(tree_.session(a_));
+  EXPECT_EQ(register_result({"1.2.1", "1.2.2"}, Verdict::kReview), a_);
+  EXPECT_EQ(session().at("verdict"), "review");
+  EXPECT_NE(session().at("record"), record);
+}
+
+TEST_F(ScreenTest, ABadFileHidesNoOther) {
+  std::filesystem::create_directories(tree_.path() / "sessions" / "bad" / "result.json");
+  std::ofstream(tree_.path() / "objections.json") << "what";
+  const Json list = Json::parse(get("/api/room").body);
+  EXPECT_EQ(list.at("sessions").size(), 1U);
+  EXPECT_EQ(list.at("troubles").size(), 2U);
 }
 
 // A page of another site can send a form, with the user's cookie or by the user's proxy; it cannot know the token.
@@ -170,6 +204,56 @@ TEST_F(ScreenTest, OtherMethodsAndAddressesAreRefused) {
   EXPECT_EQ(screen_.answer(request("viewer", "DELETE", "/api/sessions/" + a_)).status, 405);
   EXPECT_EQ(get("/elsewhere").status, 404);
   EXPECT_EQ(post("releaser", "/api/sessions/" + a_ + "/explode", {}).status, 404);
+}
+
+// With passwords instead of a proxy.
+class ScreenWithPasswords : public testing::Test {
+ protected:
+  HttpResponse sign_in(const std::string& user, const std::string& password) {
+    return screen_.answer({.method = "POST",
+                           .path = "/api/sign-in",
+                           .headers = {{"content-type", "application/json"}},
+                           .body = Json{{"user", user}, {"password", password}}.dump(),
+                           .from = "127.0.0.1",
+                           .is_encrypted = true});
+  }
+
+  TemporaryFolder folder_;
+  ServeFile serve_{.watch = {.results = folder_ / "results", .site = {.name = "Linac 3"}},
+                   .pam_service = "isoshift",
+                   .roles = {{"doe", {Role::kView}}}};
+  SystemClock clock_;
+  Room room_{serve_.watch, clock_};
+  SignIns sign_ins_{serve_, clock_,
+                    [](const std::string&, const std::string& password) { return password == "right"; }};
+  Screen screen_{room_, sign_ins_, clock_, false};
+};
+
+TEST_F(ScreenWithPasswords, OpenWithACookieThatNoOtherHostCanPlant) {
+  EXPECT_EQ(screen_.answer({.method = "GET", .path = "/"}).status, 303);
+  EXPECT_EQ(screen_.answer({.method = "GET", .path = "/sign-in"}).status, 200);
+  EXPECT_EQ(sign_in("doe", "wrong").status, 403);
+  const HttpResponse in = sign_in("doe", "right");
+  ASSERT_EQ(in.status, 200);
+  const std::string cookie = in.headers.front().second;
+  EXPECT_THAT(cookie, testing::StartsWith("__Host-isoshift="));
+  EXPECT_THAT(cookie, HasSubstr("; Path=/; HttpOnly; SameSite=Strict; Secure"));
+  const HttpRequest list{.method = "GET",
+                         .path = "/api/room",
+                         .headers = {{"cookie", cookie.substr(0, cookie.find(';'))}},
+                         .is_encrypted = true};
+  EXPECT_EQ(screen_.answer(list).status, 200);
+  const std::string audit = text_of(folder_ / "results" / "audit.jsonl");
+  EXPECT_THAT(audit, HasSubstr("\"event\":\"sign-in refused\""));
+  EXPECT_THAT(audit, HasSubstr("\"event\":\"signed in\""));
+}
+
+// Bytes that are no UTF-8 had kept the audit log locked.
+TEST_F(ScreenWithPasswords, NamesThatNobodyHasAreNotEvenLogged) {
+  for (const std::string& name : {std::string(), std::string(65, 'a'), std::string(63, 'a') + "\xc3\xa9",
+                                  std::string("root\0x", 6), std::string("a b"), std::string("a\nb")})
+    EXPECT_EQ(sign_in(name, "x").status, 400) << name;
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "results" / "audit.jsonl"));
 }
 
 }  // namespace

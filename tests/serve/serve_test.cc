@@ -15,9 +15,8 @@ namespace {
 TEST(Serve, IsUsedInTwoBrowsersWhileSessionsCome) {
   if (!std::filesystem::exists("/usr/bin/chromedriver")) GTEST_SKIP() << "chromium-driver is not installed";
   const TemporaryFolder work;
-  const CommandOutcome used =
-      run_shell(fmt::format("/usr/bin/python3 {}/tests/serve/screen_in_browser.py {} {}", ISOSHIFT_SOURCE_DIR,
-                            ISOSHIFT_PROGRAM, (work / "").string()));
+  const CommandOutcome used = run_shell(fmt::format("/usr/bin/python3 {}/tests/serve/screen_in_browser.py {} {}",
+                                                    ISOSHIFT_SOURCE_DIR, ISOSHIFT_PROGRAM, (work / "").string()));
   EXPECT_EQ(used.exit_status, 0) << used.out;
 }
 

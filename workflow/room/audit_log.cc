@@ -74,10 +74,8 @@ void AuditLog::lock(int descriptor) const {
   constexpr std::chrono::seconds kPatience(5);
   const auto end = std::chrono::steady_clock::now() + kPatience;
   while (::flock(descriptor, LOCK_EX | LOCK_NB) != 0) {
-    if (std::chrono::steady_clock::now() > end) {
-      ::close(descriptor);
+    if (std::chrono::steady_clock::now() > end)
       throw Error(fmt::format("{}: another program has locked it", path_.string()));
-    }
     std::this_thread::sleep_for(std::chrono::milliseconds(5));
   }
 }
@@ -107,6 +105,8 @@ void AuditLog::write_kept() {
 void AuditLog::write(const std::vector<Json>& lines) const {
   const int descriptor = ::open(path_.c_str(), O_RDWR | O_APPEND | O_CREAT | O_CLOEXEC, 0640);
   if (descriptor < 0) throw Error(fmt::format("{}: cannot be written: {}", path_.string(), std::strerror(errno)));
+  const std::unique_ptr<const int, void (*)(const int*)> closed_at_the_end(&descriptor,
+                                                                           [](const int* file) { ::close(*file); });
   lock(descriptor);
   const off_t before = ::lseek(descriptor, 0, SEEK_END);
   char last = '\n';  // a line that was cut off gets an end
@@ -114,13 +114,12 @@ void AuditLog::write(const std::vector<Json>& lines) const {
   std::string covered = end_of_log(descriptor, before) + (is_cut ? "\n" : ""), text = is_cut ? "\n" : "";
   for (Json line : lines) {
     link(line, covered);
-    covered = line.dump() + "\n";
+    covered = line.dump(-1, ' ', false, Json::error_handler_t::replace) + "\n";
     text += covered;
   }
   const int failure = append_and_flush(descriptor, text);
   // What was written of a line is taken back. In a log that can only grow it stays, and the next line begins after it.
   [[maybe_unused]] const int undone = failure != 0 ? ::ftruncate(descriptor, before) : 0;
-  ::close(descriptor);
   if (failure != 0) throw Error(fmt::format("{}: cannot be written: {}", path_.string(), std::strerror(failure)));
   if (before == 0) flush(path_.parent_path());
 }

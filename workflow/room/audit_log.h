@@ -68,7 +68,7 @@ class AuditLog {
     void add(const nlohmann::ordered_json& line);
   };
   void write(const std::vector<nlohmann::ordered_json>& lines) const;
-  // Waits a few seconds for other writers. Closes the file and throws Error if one of them does not end.
+  // Waits a few seconds for other writers. Throws Error if one of them does not end.
   void lock(int descriptor) const;
   const Proofs& proofs() const;  // reads the log again if it has changed
   [[noreturn]] void refuse_another_log() const;

@@ -21,7 +21,9 @@ EngineFile::EngineFile(const std::filesystem::path& results, const Clock& clock)
 void EngineFile::update(const EngineState& state) {
   const Clock::Time now = clock_.now();
   if (written_ == state && now - signed_at_ < kEngineSigns) return;
-  if (written_ != state || !std::filesystem::exists(path_)) {
+  std::error_code missing;  // on a full disk the state cannot be written, and the engine runs all the same
+  std::filesystem::last_write_time(path_, clock_.file_time(), missing);
+  if (written_ != state || missing) {
     nlohmann::ordered_json json = {{"schema", 1}, {"waiting", nlohmann::json::array()}, {"troubles", state.troubles}};
     for (const WaitingSession& one : state.waiting)
       json["waiting"].push_back({{"session", one.name},
@@ -30,9 +32,9 @@ void EngineFile::update(const EngineState& state) {
                                  {"why", one.why},
                                  {"has_failed", one.has_failed}});
     replace_text(path_, json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
+    std::filesystem::last_write_time(path_, clock_.file_time());
     written_ = state;
   }
-  std::filesystem::last_write_time(path_, clock_.file_time());
   signed_at_ = now;
 }
 

@@ -20,7 +20,8 @@ struct EngineState {
   bool operator==(const EngineState&) const = default;
 };
 
-// A running engine gives a sign of life at least this often, and counts as stopped after the second time.
+// A running engine gives a sign of life as often as the first; it counts as stopped if the last sign is older than the
+// second.
 inline constexpr std::chrono::seconds kEngineSigns(2), kEngineIsStopped(10);
 
 // The engine's side.
@@ -40,8 +41,8 @@ class EngineFile {
 
 struct EngineSeen {
   EngineState state;
-  std::chrono::seconds age{0};  // since it was written
-  bool runs() const { return age < kEngineIsStopped; }
+  std::chrono::seconds age{0};                                                     // since it was written
+  bool runs() const { return age < kEngineIsStopped && age > -kEngineIsStopped; }  // clocks may be set back
 };
 // Nothing if no engine has ever run there. Throws Error for a file that an engine has not written.
 std::optional<EngineSeen> read_engine_state(const std::filesystem::path& results, std::filesystem::file_time_type now);

@@ -1,6 +1,7 @@
 #include "workflow/room/results_tree.h"
 
 #include <fmt/format.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -88,6 +89,15 @@ constexpr const char* kRegistering = ".registering-";
 std::string to_string(const Releaser& releaser) {
   return fmt::format("{} (user {}{})", releaser.by, releaser.user,
                      releaser.sudo_user.empty() ? "" : ", sudo of " + releaser.sudo_user);
+}
+
+void check_is_owner(const fs::path& results) {
+  struct stat of_results{};
+  if (::stat(results.c_str(), &of_results) == 0 && of_results.st_uid != ::geteuid())
+    throw Error(
+        fmt::format("{}: belongs to another user, who runs isoshift watch: run this command as that user "
+                    "(sudo -u USER)",
+                    results.string()));
 }
 
 ResultsTree::ResultsTree(fs::path path) : path_(std::move(path)), audit_(path_ / "audit.jsonl") {
@@ -198,6 +208,12 @@ SessionRecord ResultsTree::registered(const std::string& session) const {
   return record;
 }
 
+std::optional<fs::file_time_type> ResultsTree::registered_at(const std::string& session) const {
+  std::error_code missing;
+  const fs::file_time_type at = fs::last_write_time(record_file(session), missing);
+  return missing ? std::nullopt : std::optional(at);
+}
+
 SessionRecord ResultsTree::checked(const std::string& session) const {
   SessionRecord record = registered(session);
   try {
@@ -264,7 +280,7 @@ void ResultsTree::check_objects_are_new(const Release& release) const {
 }
 
 Release ResultsTree::release(const std::string& session, const Releaser& releaser,
-                             const std::vector<std::string>& peers) {
+                             const std::vector<std::string>& peers, const std::optional<Seen>& seen) {
   if (!std::ranges::binary_search(sessions(), session))
     throw Error(fmt::format("{}: holds no session {}", path_.string(), session));
   const FileLock lock = lock_releases();
@@ -283,6 +299,8 @@ Release ResultsTree::release(const std::string& session, const Releaser& release
                     "it again",
                     session, release_file(session).string()));
   const Objection other_xrays = objection(session);
+  if (seen && (seen->record != record.sha256 || seen->objection != other_xrays.words))
+    throw Error(fmt::format("session {}: is not what was on the screen any more. Look at it again", session));
   const bool is_allowed =
       other_xrays.words.empty() || releaser.despite_objection || (releaser.is_person && other_xrays.newer_have_results);
   if (!is_allowed)

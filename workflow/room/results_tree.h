@@ -71,6 +71,9 @@ struct Delivery {
   Release::Object object;
 };
 
+// Throws Error if another user owns the results tree: isoshift watch could not read files that this user writes there.
+void check_is_owner(const std::filesystem::path& results);
+
 class ResultsTree {
  public:
   // Makes the folders that do not exist. Throws Error if that fails.
@@ -99,6 +102,9 @@ class ResultsTree {
   // The record of a session. Throws Error if there is no record, or if the audit log has no line for it.
   SessionRecord registered(const std::string& session) const;
 
+  // When the record of a session was written; nothing without a record. Another time: the session was registered again.
+  std::optional<std::filesystem::file_time_type> registered_at(const std::string& session) const;
+
   // What other X-rays say against results, by session.
   std::map<std::string, Objection> objections() const;
   // That against one result; without words: none. If the audit log says that there is another one than objections.json
@@ -114,7 +120,13 @@ class ResultsTree {
   // Releases a session with its objects. Throws Error, and releases nothing, if the session does not exist, was
   // rejected, has been released before, or has changed since its registration, if other X-rays speak against it and the
   // releaser does not say so, or if the audit log cannot be written.
-  Release release(const std::string& session, const Releaser& releaser, const std::vector<std::string>& peers);
+  // `seen`: what the person has seen; if anything of that is another one now, nothing is released.
+  struct Seen {
+    std::string record;     // SHA-256 of the record
+    std::string objection;  // in words
+  };
+  Release release(const std::string& session, const Releaser& releaser, const std::vector<std::string>& peers,
+                  const std::optional<Seen>& seen = std::nullopt);
 
   struct Pending {
     std::vector<Delivery> deliveries;

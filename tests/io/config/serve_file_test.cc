@@ -59,13 +59,14 @@ TEST_F(ServeFileTest, OtherComputersAreListenedToWithTlsOnly) {
   const std::string tls = R"(, "tls": {"certificate": "c.pem", "key": "k.pem"})";
   EXPECT_EQ(read(roles_ + pam_ + R"(, "address": "0.0.0.0")" + tls).tls->key, folder_ / "k.pem");
   fs::permissions(folder_ / "k.pem", fs::perms::group_read, fs::perm_options::add);
-  EXPECT_THAT(error_of(roles_ + pam_ + tls), HasSubstr("k.pem: other users can read or write this secret"));
+  EXPECT_THAT(error_of(roles_ + pam_ + tls), HasSubstr("k.pem: other users can read or write this file"));
 }
 
 TEST_F(ServeFileTest, ErrorsNameTheMistake) {
   EXPECT_THAT(error_of(pam_), HasSubstr("roles is missing"));
   EXPECT_THAT(error_of(roles_), HasSubstr("pam_service and proxy: expected one of them"));
   EXPECT_THAT(error_of(pam_ + R"(, "roles": {"doe": ["admin"]})"), HasSubstr("doe"));
+  EXPECT_THAT(error_of(pam_ + R"(, "roles": {"doe": ["release"]})"), HasSubstr("\"view\" among its roles"));
   EXPECT_THAT(error_of(roles_ + pam_ + R"(, "port": 70000)"), HasSubstr("port"));
   EXPECT_THAT(error_of(roles_ + pam_ + R"(, "colour": "red")"), HasSubstr("colour"));
   std::ofstream(folder_ / "secret") << "\n";

@@ -88,7 +88,7 @@ TEST_F(WatchFileTest, ServersAreAskedWithEncryptionAndWithoutPasswordsInTheirUrl
   EXPECT_THAT(error_of(with_server(R"("url": "https://me:word@h")")), HasSubstr("password_file"));
   std::ofstream(folder_ / "password") << "word\n";
   const std::string by_file = with_server(R"("url": "https://h", "user": "me", "password_file": "password")");
-  EXPECT_THAT(error_of(by_file), HasSubstr("other users can read or write this secret: chmod 600"));
+  EXPECT_THAT(error_of(by_file), HasSubstr("other users can read or write this file, which must be secret: chmod 600"));
   std::filesystem::permissions(folder_ / "password", std::filesystem::perms::owner_read);
   EXPECT_EQ(read(by_file).orthanc->password, "word");
 }

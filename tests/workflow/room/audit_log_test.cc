@@ -154,5 +154,12 @@ TEST_F(AuditLogTest, LinesOfManyProcessesDoNotMix) {
   EXPECT_THAT(chain_of(text()).broken, IsEmpty());
 }
 
+// The half of a letter in UTF-8 had kept the log locked.
+TEST_F(AuditLogTest, ATextThatIsNoTextLocksNobodyOut) {
+  log_.append("viewed", {{"by", std::string("a\xc3")}});
+  AuditLog(path_).append("registered", registration("r1"));
+  EXPECT_TRUE(log_.has_registration("a", "r1"));
+}
+
 }  // namespace
 }  // namespace isoshift

@@ -100,7 +100,8 @@ TEST_F(SignedReleasesTest, AKeyThatOthersCanReadOrOfAnotherKindIsRefused) {
   };
   EXPECT_EQ(error_of_key(), "");
   fs::permissions(key_, fs::perms::group_read, fs::perm_options::add);
-  EXPECT_THAT(error_of_key(), HasSubstr("release.key: other users can read or write this key: chmod 600"));
+  EXPECT_THAT(error_of_key(),
+              HasSubstr("release.key: other users can read or write this file, which must be secret: chmod 600"));
   make_key("rsa");
   EXPECT_THAT(error_of_key(), HasSubstr("holds no private Ed25519 key without passphrase"));
   std::ofstream(key_, std::ios::trunc) << "x";
