@@ -132,7 +132,8 @@ int check(int patient_count, std::optional<int> only) {
   std::map<std::string, Count> counts;
   bool wrong_accepted = false;
   fmt::print(
-      "ct,xrays,case,verdict,answer_of,match_within_40_mm,match_within_20_mm,mtre_mm,least_gradient_correlation,as_is,"
+      "ct,xrays,case,verdict,answer_of,match_within_40_mm,match_within_20_mm,match,match_of_parts,mtre_mm,least_"
+      "gradient_correlation,as_is,"
       "best_"
       "alternative,disagreeing,seconds,"
       "err_sigma,reasons\n");
@@ -176,10 +177,11 @@ int check(int patient_count, std::optional<int> only) {
       errors += fmt::format("{:.3f}/{:.3f} ", deg_from_rad(turn.angle() * turn.axis()[axis]),
                             deg_from_rad(result.uncertainty->sigma_rotation_rad()[axis]));
     for (const std::string& reason : result.reasons) reasons += reason + "; ";
-    fmt::print("{},{},{},{},{},{:.3f},{:.3f},{:.2f},{:.3f},{:.3f},{:.3f},{:.3f},{:.2f},{},\"{}\"\n", ct, of, what,
-               to_string(result.verdict), result.bodies.empty() ? "whole" : "bodies",
-               result.target_match.of_surroundings, result.target_match.of_target, mtre_mm, least, as_is, best,
-               disagreeing, result.seconds, errors, reasons);
+    fmt::print("{},{},{},{},{},{:.3f},{:.3f},{:.3f},{:.3f},{:.2f},{:.3f},{:.3f},{:.3f},{:.3f},{:.2f},{},\"{}\"\n", ct,
+               of, what, to_string(result.verdict), result.bodies.empty() ? "whole" : "bodies",
+               result.target_match.of_most_within_40_mm, result.target_match.of_most_within_20_mm,
+               result.target_match.of_all, result.target_match.of_parts, mtre_mm, least, as_is, best, disagreeing,
+               result.seconds, errors, reasons);
     std::fflush(stdout);
     count.accepted += result.verdict == Verdict::kAccepted ? 1 : 0;
     wrong_accepted = wrong_accepted || (result.verdict == Verdict::kAccepted && (what != "right" || mtre_mm > 2.0));

@@ -123,11 +123,15 @@ struct StructureMotion {
   bool is_determined = true;                                  // the bones near it are, and do not breathe
 };
 
-// How well X-rays and DRRs match where the target was found: gradient correlations of the pixels that agree best, mean
-// over the views (registration/bodies/target_match.h).
+// How well X-rays and DRRs match where the target was found: correlations of their gradients, mean over the views.
 struct TargetMatch {
-  double of_surroundings = 0.0;  // within 40 mm of the target; in small fields that show too little, of all they show
-  double of_target = 0.0;        // within 20 mm: a small target that moved by itself could be trimmed away in 40 mm
+  // On pixels of 2 mm, of the 70 % of the pixels that agree best: what has changed in some places (metal, fluid) is
+  // trimmed away, while another patient or another vertebra disagrees in most. Within 20 mm, because a small target
+  // that moved by itself could be trimmed away in 40 mm.
+  double of_most_within_40_mm = 0.0, of_most_within_20_mm = 0.0;
+  // On pixels of 4 mm, where noise and coarse images hardly count, within 40 mm: of all pixels; and of small parts each
+  // for itself, their median, weighted by the gradients of the DRR.
+  double of_all = 0.0, of_parts = 0.0;
 };
 
 struct Registration {

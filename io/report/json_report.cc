@@ -159,8 +159,10 @@ Json target_json(const SetupResult& report, const ShownShift& shown) {
           {"displacement_mm", displacement},
           {"sigma_mm", sigma_json(report.uncertainty.has_value(), shown.target_sigma_mm)},
           {"image_share", of_bodies(report.target_image_share)},
-          {"match_within_40_mm", of_bodies(report.target_match.of_surroundings)},
-          {"match_within_20_mm", of_bodies(report.target_match.of_target)},
+          {"match_within_40_mm", of_bodies(report.target_match.of_most_within_40_mm)},
+          {"match_within_20_mm", of_bodies(report.target_match.of_most_within_20_mm)},
+          {"match", of_bodies(report.target_match.of_all)},
+          {"match_of_parts", of_bodies(report.target_match.of_parts)},
           {"deformation_mm", of_bodies(report.target_deformation_mm)}};
 }
 

@@ -253,9 +253,11 @@ SetupResult report_from(const Json& json) {
                                  .is_determined = structure.at("is_determined")});
   if (!report.bodies.empty() && report.target) {
     report.target_image_share = json.at("target").at("image_share");
-    // Results of before 2026-11-25 have other measures instead.
-    report.target_match = {.of_surroundings = or_nan(json.at("target").value("match_within_40_mm", Json())),
-                           .of_target = or_nan(json.at("target").value("match_within_20_mm", Json()))};
+    const auto match = [&](const char* name) { return or_nan(json.at("target").value(name, Json())); };
+    report.target_match = {.of_most_within_40_mm = match("match_within_40_mm"),
+                           .of_most_within_20_mm = match("match_within_20_mm"),
+                           .of_all = match("match"),
+                           .of_parts = match("match_of_parts")};
     report.target_deformation_mm = json.at("target").at("deformation_mm");
   }
   const Json& error = json.at("setup_error");

@@ -9,13 +9,15 @@
 #include <vector>
 
 #include "base/median.h"
+#include "registration/similarity/tiles.h"
 
 namespace isoshift {
 namespace {
 
 using Eigen::Vector3d;
 
-constexpr double kPixelMm = 2.0, kSurroundingsMm = 40.0, kTargetMm = 20.0;
+constexpr double kPixelMm = 2.0, kCoarsePixelMm = 4.0, kSurroundingsMm = 40.0, kTargetMm = 20.0, kPartMm = 12.0;
+constexpr std::size_t kLeastPixelsOfAPart = 6;
 constexpr double kLeastShown = 0.6;  // share of the circle about the target; with less, all that is shown counts
 constexpr double kKept = 0.7;
 constexpr int kMostSteps = 20;
@@ -47,20 +49,69 @@ PlaneGradients centered(const Gradients& gradients) {
   return all;
 }
 
+// Centered.
+Eigen::VectorXd values_of(const std::vector<float>& all, const std::vector<std::uint32_t>& numbers) {
+  Eigen::VectorXd values(static_cast<Eigen::Index>(numbers.size()));
+  for (std::size_t n = 0; n < numbers.size(); ++n) values[static_cast<Eigen::Index>(n)] = all[numbers[n]];
+  return values.array() - values.mean();
+}
+
+// Of pairs of value and weight.
+double weighted_median(std::vector<std::pair<double, double>> values) {
+  std::ranges::sort(values);
+  double all = 0.0, below = 0.0;
+  for (const auto& [value, weight] : values) all += weight;
+  for (const auto& [value, weight] : values) {
+    below += weight;
+    if (below > 0.5 * all) return value;
+  }
+  return 0.0;
+}
+
+double match_of_parts(const XrayView& view, std::span<const std::uint32_t> compared, const Gradients& xray,
+                      const Gradients& drr) {
+  std::vector<std::pair<double, double>> correlations;
+  for (const Tile& part : tiles_of(view, compared, kPartMm)) {
+    if (part.compared.size() < kLeastPixelsOfAPart) continue;
+    for (const auto direction : {&Gradients::along_row, &Gradients::along_column}) {
+      const Eigen::VectorXd there = values_of(xray.*direction, part.compared),
+                            here = values_of(drr.*direction, part.compared);
+      const double norms = there.norm() * here.norm();
+      correlations.emplace_back(norms > 0.0 ? there.dot(here) / norms : 0.0, here.norm());
+    }
+  }
+  return weighted_median(std::move(correlations));
+}
+
 // Line integrals, by view, of the pixels that an objective renders.
 using Rendering = std::function<std::vector<std::vector<float>>(Objective&)>;
 
-double match_of(const std::vector<FixedImage>& level, Renderer& renderer, const Eigen::Isometry3d& about,
-                const Rendering& rendering) {
+// One number of a view: its DRR has these gradients.
+using Measure = std::function<double(const Objective&, std::size_t view, const Gradients& drr)>;
+
+double of_most(const Objective& pixels, std::size_t view, const Gradients& drr) {
+  return trimmed_correlation(pixels.comparison(view).xray_gradients(), drr);
+}
+double of_all(const Objective& pixels, std::size_t view, const Gradients& drr) {
+  return gradient_correlation(pixels.comparison(view).xray_gradients(), drr);
+}
+double of_parts(const Objective& pixels, std::size_t view, const Gradients& drr) {
+  return match_of_parts(pixels.views()[view], pixels.compared_pixels(view), pixels.comparison(view).xray_gradients(),
+                        drr);
+}
+
+// The mean of each measure over the views.
+std::vector<double> means(const std::vector<FixedImage>& level, Renderer& renderer, const Eigen::Isometry3d& about,
+                          const Rendering& rendering, const std::vector<Measure>& measures) {
   Objective pixels(renderer, level, about, {.similarity = SimilarityKind::kGradientCorrelation});
   const std::vector<std::vector<float>> drrs = rendering(pixels);
-  double match = 0.0;
+  std::vector<double> all(measures.size());
   for (std::size_t view = 0; view < drrs.size(); ++view) {
-    const Comparison& comparison = pixels.comparison(view);
-    match += trimmed_correlation(comparison.xray_gradients(), gradients(drrs[view], comparison.neighbors())) /
-             static_cast<double>(drrs.size());
+    const Gradients drr = gradients(drrs[view], pixels.comparison(view).neighbors());
+    for (std::size_t n = 0; n < measures.size(); ++n)
+      all[n] += measures[n](pixels, view, drr) / static_cast<double>(drrs.size());
   }
-  return match;
+  return all;
 }
 
 Rendering of_whole(const Eigen::Isometry3d& room_from_patient) {
@@ -77,9 +128,16 @@ Rendering of_whole(const Eigen::Isometry3d& room_from_patient) {
 
 TargetMatch near_target(const FixedViews& views, Renderer& renderer, const Eigen::Isometry3d& about,
                         const Vector3d& target_room_mm, const Rendering& rendering) {
-  const std::vector<FixedImage> level = views.reduced_to(kPixelMm, about, 0.0);
-  return {.of_surroundings = match_of(within(kSurroundingsMm, level, target_room_mm), renderer, about, rendering),
-          .of_target = match_of(within(kTargetMm, level, target_room_mm), renderer, about, rendering)};
+  const std::vector<FixedImage> fine = views.reduced_to(kPixelMm, about, 0.0),
+                                coarse = views.reduced_to(kCoarsePixelMm, about, 0.0);
+  const auto of = [&](const std::vector<FixedImage>& level, double reach_mm, const std::vector<Measure>& measures) {
+    return means(within(reach_mm, level, target_room_mm), renderer, about, rendering, measures);
+  };
+  const std::vector<double> on_coarse = of(coarse, kSurroundingsMm, {of_all, of_parts});
+  return {.of_most_within_40_mm = of(fine, kSurroundingsMm, {of_most}).front(),
+          .of_most_within_20_mm = of(fine, kTargetMm, {of_most}).front(),
+          .of_all = on_coarse[0],
+          .of_parts = on_coarse[1]};
 }
 
 }  // namespace
@@ -130,9 +188,11 @@ TargetMatch match_near_target(const FixedViews& views, Renderer& renderer, const
   return near_target(views, renderer, room_from_patient, target_room_mm, of_whole(room_from_patient));
 }
 
-double match_everywhere(const FixedViews& views, Renderer& renderer, const Eigen::Isometry3d& room_from_patient) {
-  return match_of(views.reduced_to(kPixelMm, room_from_patient, 0.0), renderer, room_from_patient,
-                  of_whole(room_from_patient));
+double match_of_parts_everywhere(const FixedViews& views, Renderer& renderer,
+                                 const Eigen::Isometry3d& room_from_patient) {
+  return means(views.reduced_to(kCoarsePixelMm, room_from_patient, 0.0), renderer, room_from_patient,
+               of_whole(room_from_patient), {of_parts})
+      .front();
 }
 
 }  // namespace isoshift

@@ -1,7 +1,5 @@
 #pragma once
-// Whether X-rays show the target and its surroundings where a search has put them. What is compared are the gradients
-// of X-rays and DRRs, of the 70 % of the pixels that agree best: what has changed in some places (metal, fluid, noise)
-// is trimmed away, while another patient or another vertebra disagrees in most.
+// Whether X-rays show the target and its surroundings where a search has put them (setup/registration.h, TargetMatch).
 
 #include "registration/bodies/body_search.h"
 #include "setup/registration.h"
@@ -10,12 +8,14 @@ namespace isoshift {
 
 TargetMatch match_near_target(const BodyScene& scene, const Eigen::Vector3d& target_room_mm, const BodyPoses& poses);
 
-// The same of a patient as a whole, and the trimmed correlation of all that the X-rays show of it.
+// The same of a patient as a whole, and the median part of all that the X-rays show of it.
 TargetMatch match_near_target(const FixedViews& views, Renderer& renderer, const Eigen::Isometry3d& room_from_patient,
                               const Eigen::Vector3d& target_room_mm);
-double match_everywhere(const FixedViews& views, Renderer& renderer, const Eigen::Isometry3d& room_from_patient);
+double match_of_parts_everywhere(const FixedViews& views, Renderer& renderer,
+                                 const Eigen::Isometry3d& room_from_patient);
 
-// Of two equally long lists of gradients, which have one scale between them; 0 where either is flat.
+// Of two equally long lists of gradients, which have one scale between them: the correlation of the 70 % of the pixels
+// that agree best; 0 where either is flat.
 double trimmed_correlation(const Gradients& xray, const Gradients& drr);
 
 }  // namespace isoshift

@@ -63,7 +63,8 @@ TEST(IrradiatedField, FieldsThatWereOnceWrongAndSureAreFoundOrNotSure) {
     const XrayImage xray = xray_of(scene);
     const IrradiatedField field = field_of(xray);
     const double error_mm = field_error_mm(scene, xray.view, field.corners_px);
-    EXPECT_TRUE(error_mm <= surely_within_mm(field) || !field.is_sure()) << "seed " << seed << ": " << error_mm << " mm, sure";
+    EXPECT_TRUE(error_mm <= surely_within_mm(field) || !field.is_sure())
+        << "seed " << seed << ": " << error_mm << " mm, sure";
   }
 }
 

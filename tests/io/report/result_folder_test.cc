@@ -55,15 +55,17 @@ TEST_F(ResultFolderTest, IsReadBackWhole) {
 
 TEST_F(ResultFolderTest, WhatBodiesDidIsReadBack) {
   SetupResult bent = bent_report(Verdict::kAccepted);
-  bent.target_match = {0.91, 0.87};
+  bent.target_match = {0.91, 0.87, 0.85, 0.97};
   const SetupResult read = report_from_json(json_report(bent), "result.json");
   EXPECT_EQ(json_report(read), json_report(bent));
   ASSERT_EQ(read.bodies.size(), bent.bodies.size());
   EXPECT_EQ(read.target_deformation_mm, bent.target_deformation_mm);
   EXPECT_EQ(read.target_image_share, bent.target_image_share);
   ASSERT_EQ(read.structures.size(), 1U);
-  EXPECT_EQ(read.target_match.of_surroundings, 0.91);
-  EXPECT_EQ(read.target_match.of_target, 0.87);
+  EXPECT_EQ(read.target_match.of_most_within_40_mm, 0.91);
+  EXPECT_EQ(read.target_match.of_most_within_20_mm, 0.87);
+  EXPECT_EQ(read.target_match.of_all, 0.85);
+  EXPECT_EQ(read.target_match.of_parts, 0.97);
   EXPECT_EQ(read.structures[0].name, bent.structures[0].name);
   EXPECT_EQ(read.structures[0].most_mm, bent.structures[0].most_mm);
   EXPECT_EQ(read.structures[0].displacement_mm, bent.structures[0].displacement_mm);

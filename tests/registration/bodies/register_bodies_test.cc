@@ -69,8 +69,8 @@ TEST(RegisterBodies, TheTargetIsRightAndTheRestIsSaid) {
   EXPECT_LT((result.structures[0].displacement_mm - of_structure).norm(), 1.5);
   EXPECT_GT(result.structures[0].most_mm, of_structure.norm() - 1.5);
   EXPECT_GT(result.target_image_share, 0.5);
-  EXPECT_GT(result.target_match.of_surroundings, 0.9);
-  EXPECT_GT(result.target_match.of_target, 0.9);
+  EXPECT_GT(result.target_match.of_most_within_40_mm, 0.9);
+  EXPECT_GT(result.target_match.of_all, 0.8);
   for (const ViewMatch& view : result.views) EXPECT_GT(view.similarity_final, 0.8);
 }
 

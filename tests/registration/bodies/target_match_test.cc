@@ -4,7 +4,6 @@
 
 #include <random>
 
-#include "registration/quality/judge.h"
 #include "tests/support/bent_scene.h"
 
 namespace isoshift {
@@ -36,9 +35,14 @@ TargetMatch match_at(const BentScene& scene, const Vector3d& off_room_mm) {
 TEST(TargetMatch, TellsTheRightPlaceFromOthers) {
   const BentScene scene = column();
   const TargetMatch right = match_at(scene, Vector3d::Zero()), wrong = match_at(scene, {0.0, 12.0, 0.0});
-  EXPECT_TRUE(is_enough(right)) << right.of_surroundings << ", " << right.of_target;
-  EXPECT_LT(wrong.of_surroundings, 0.8);
-  EXPECT_LT(wrong.of_target, 0.7);
+  EXPECT_GT(right.of_most_within_40_mm, 0.9);
+  EXPECT_GT(right.of_most_within_20_mm, 0.9);
+  EXPECT_GT(right.of_all, 0.9);
+  EXPECT_GT(right.of_parts, 0.95);
+  EXPECT_LT(wrong.of_most_within_40_mm, 0.8);
+  EXPECT_LT(wrong.of_most_within_20_mm, 0.7);
+  EXPECT_LT(wrong.of_all, 0.7);
+  EXPECT_LT(wrong.of_parts, 0.7);
 }
 
 // Fluid whose level runs through the surroundings: one strong edge that the CT does not have.
@@ -49,8 +53,13 @@ TEST(TargetMatch, IsHardlySpoiledByContrastThatHasChanged) {
       for (int column = 0; column < image.line_integral.columns; ++column)
         if (column > image.line_integral.columns / 2 + row / 8) image.line_integral.at(row, column) += 4.0F;
   const TargetMatch match = match_at(scene, Vector3d::Zero());
-  EXPECT_TRUE(is_enough(match)) << match.of_surroundings << ", " << match.of_target;
-  EXPECT_FALSE(is_enough(match_at(scene, {0.0, 12.0, 0.0})));
+  EXPECT_LT(match.of_all, 0.7);
+  EXPECT_GT(match.of_parts, 0.8);
+  EXPECT_GT(match.of_most_within_40_mm, 0.9);
+  EXPECT_GT(match.of_most_within_20_mm, 0.7);
+  const TargetMatch wrong = match_at(scene, {0.0, 12.0, 0.0});
+  EXPECT_LT(wrong.of_parts, 0.7);
+  EXPECT_LT(wrong.of_most_within_40_mm, 0.8);
 }
 
 // Gradients that a DRR has, and an X-ray that has them, too, with other contrast and some noise, but for the first
@@ -93,9 +102,11 @@ TEST(TargetMatch, OfAWholeIsThatOfBodiesThatDidNotMoveApart) {
   const TargetMatch bodies = match_at(scene, Vector3d::Zero()),
                     whole =
                         match_near_target(views, *rendered.as_one, scene.truth[1] * scene.planned, Vector3d::Zero());
-  EXPECT_NEAR(whole.of_surroundings, bodies.of_surroundings, 0.02);
-  EXPECT_NEAR(whole.of_target, bodies.of_target, 0.02);
-  EXPECT_TRUE(is_enough(whole));
+  EXPECT_NEAR(whole.of_most_within_40_mm, bodies.of_most_within_40_mm, 0.02);
+  EXPECT_NEAR(whole.of_most_within_20_mm, bodies.of_most_within_20_mm, 0.02);
+  EXPECT_NEAR(whole.of_all, bodies.of_all, 0.02);
+  EXPECT_NEAR(whole.of_parts, bodies.of_parts, 0.02);
+  EXPECT_GT(whole.of_all, 0.9);
 }
 
 }  // namespace
