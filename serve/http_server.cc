@@ -32,7 +32,6 @@ namespace {
 namespace net = boost::asio;
 namespace beast = boost::beast;
 namespace http = beast::http;
-using tcp = net::ip::tcp;
 
 constexpr std::chrono::milliseconds kLookForEvents(200);
 
@@ -105,7 +104,7 @@ class HttpServer::Implementation {
                               options.tls->key.string(), error.what()));
     }
     try {
-      const tcp::endpoint endpoint(net::ip::make_address(options.address), options.port);
+      const net::ip::tcp::endpoint endpoint(net::ip::make_address(options.address), options.port);
       acceptor_.open(endpoint.protocol());
       acceptor_.set_option(net::socket_base::reuse_address(true));
       acceptor_.bind(endpoint);
@@ -121,6 +120,7 @@ class HttpServer::Implementation {
     complain_ = complain;
     net::co_spawn(io_, accept(), net::detached);
     std::vector<std::jthread> threads;
+    threads.reserve(static_cast<std::size_t>(options_.threads));
     for (int n = 0; n < options_.threads; ++n) threads.emplace_back([this] { io_.run(); });
     constexpr std::chrono::milliseconds kRound(50);
     while (!is_end_asked_for()) std::this_thread::sleep_for(kRound);
@@ -146,7 +146,7 @@ class HttpServer::Implementation {
   net::awaitable<void> accept() {
     for (;;) {
       boost::system::error_code failed;
-      tcp::socket socket =
+      net::ip::tcp::socket socket =
           co_await acceptor_.async_accept(net::make_strand(io_), net::redirect_error(net::use_awaitable, failed));
       if (failed) {  // too many open files, for one: try again a little later
         net::steady_timer pause(io_, kLookForEvents);
@@ -155,25 +155,22 @@ class HttpServer::Implementation {
       }
       if (open_ >= options_.most_connections) continue;  // closes it
       const auto executor = socket.get_executor();
-      net::co_spawn(executor, speak(std::move(socket)), net::detached);
+      // If the other end has gone, is too slow or does not speak HTTP, there is nobody to tell.
+      net::co_spawn(executor, speak(std::move(socket)), [](const std::exception_ptr&) {});
     }
   }
 
-  net::awaitable<void> speak(tcp::socket socket) {
+  net::awaitable<void> speak(net::ip::tcp::socket socket) {
     const Place place(open_);
-    try {
-      const std::string from = socket.remote_endpoint().address().to_string();
-      if (!options_.tls) {
-        Stream stream(std::move(socket));
-        co_await answer(stream, stream, from);
-      } else {
-        TlsStream stream(std::move(socket), tls_);
-        stream.next_layer().expires_after(options_.patience);
-        co_await stream.async_handshake(net::ssl::stream_base::server, net::use_awaitable);
-        co_await answer(stream, stream.next_layer(), from);
-      }
-    } catch (const std::exception&) {
-      // The other end has gone, was too slow, or does not speak HTTP: there is nobody to tell.
+    const std::string from = socket.remote_endpoint().address().to_string();
+    if (!options_.tls) {
+      Stream stream(std::move(socket));
+      co_await answer(stream, stream, from);
+    } else {
+      TlsStream stream(std::move(socket), tls_);
+      stream.next_layer().expires_after(options_.patience);
+      co_await stream.async_handshake(net::ssl::stream_base::server, net::use_awaitable);
+      co_await answer(stream, stream.next_layer(), from);
     }
   }
 
@@ -206,8 +203,7 @@ class HttpServer::Implementation {
       co_await write(stream, std::move(response), keep);
       if (!keep) break;
     }
-    boost::system::error_code ignored;
-    socket.socket().shutdown(tcp::socket::shutdown_send, ignored);
+    socket.socket().shutdown(net::ip::tcp::socket::shutdown_send);
   }
 
   HttpResponse handled(const http::request<http::string_body>& message, const std::string& from) {
@@ -274,7 +270,7 @@ class HttpServer::Implementation {
   std::atomic<std::size_t> open_ = 0;
   net::ssl::context tls_{net::ssl::context::tls_server};
   net::io_context io_;
-  tcp::acceptor acceptor_;
+  net::ip::tcp::acceptor acceptor_;
 };
 
 HttpServer::HttpServer(const HttpServerOptions& options, HttpHandler handler)
