@@ -125,9 +125,7 @@ Json Room::session(const std::string& name) {
   look();
   const ListedSession& session = listed(name);
   Json json = json_of(session);
-  const Objection objection = tree_.objection(name);
-  json["objection"] = objection.words;
-  json["newer_have_results"] = objection.newer_have_results;
+  json["objection"] = tree_.objection(name).words;
   json["peers"] = watch_.names_of_peers();
   json["record"] = "";
   json["obstacle"] = "";

@@ -8,15 +8,10 @@
 
 #include "base/error.h"
 #include "base/json_file.h"
+#include "io/config/config_folder.h"
 
 namespace isoshift {
 namespace {
-
-std::string required_text(JsonSection& section, const char* key, const char* expected) {
-  std::string text = section.required<std::string>(key, expected);
-  if (text.find_first_not_of(' ') == std::string::npos) section.refuse(key, expected);
-  return text;
-}
 
 std::string required_day(JsonSection& section, const char* key) {
   constexpr const char* kExpected = "a day as YYYY-MM-DD";
@@ -42,7 +37,7 @@ ValidatedScale scale_from(JsonSection section) {
   const auto scale = couch_scale_from(section.required<std::string>("name", kExpected));
   if (!scale) section.refuse("name", kExpected);
   ValidatedScale result{.scale = *scale,
-                        .validated_by = required_text(section, "validated_by", "who compared it with the couch"),
+                        .validated_by = ConfigFolder::text(section, "validated_by", "who compared it with the couch"),
                         .validated_on = required_day(section, "validated_on")};
   section.end();
   return result;
@@ -66,7 +61,7 @@ std::optional<AutomaticRelease> release_from(JsonSection section) {
   if (rule != "manual" && rule != "automatic") section.refuse("rule", kExpected);
   std::optional<AutomaticRelease> release;
   if (rule == "automatic")
-    release = {.by = required_text(section, "by", "who allowed it"), .on = required_day(section, "on")};
+    release = {.by = ConfigFolder::text(section, "by", "who allowed it"), .on = required_day(section, "on")};
   section.end();
   return release;
 }
@@ -112,7 +107,7 @@ SiteFile read_site_file(const std::filesystem::path& path) {
   JsonSection section(file.json, path.string());
   constexpr const char* kVersion = "1, the version of its format";
   if (section.required<int>("site_file", kVersion) != 1) section.refuse("site_file", kVersion);
-  SiteFile site{.path = path, .name = required_text(section, "name", "a text"), .sha256 = file.sha256};
+  SiteFile site{.path = path, .name = ConfigFolder::text(section, "name", "a text"), .sha256 = file.sha256};
   if (const auto levels = section.section("action_levels")) {
     using Levels = std::map<std::string, nlohmann::json>;
     for (const auto& [anatomy, json] : section.required<Levels>("action_levels", "an object of levels by anatomy"))
