@@ -16,7 +16,9 @@ namespace {
 using Eigen::Vector3d;
 
 constexpr double kBoneSlabMm = 60.0, kSoftSlabMm = 80.0;
-constexpr double kFrontMm = 60.0;                        // before the nearest vertebra
+constexpr double kFrontMm = 60.0;  // before the nearest vertebra
+// Behind the nearest vertebra and at its height, in the middle: its spinous process.
+constexpr double kBehindMm = 70.0, kMiddleMm = 20.0, kSameHeightMm = 20.0;
 constexpr double kBoneHoldsMm = 15.0, kSoftIsMm = 30.0;  // soft tissue this near moves with the bone, this far does not
 constexpr double kNeighborsMm = 100.0;                   // between centers of groups that springs join
 
@@ -80,6 +82,12 @@ std::vector<Group> vertebrae_of(const BodyMap& map, const Vector3d& target) {
   return groups;
 }
 
+// By where it lies from the nearest vertebra. Where its arch is thin, a CT shows no bone between the two.
+bool is_spinous_process(const Body& body, const Vector3d& from_vertebra) {
+  return body.kind == Body::Kind::kBone && from_vertebra.y() > 0.0 && from_vertebra.y() < kBehindMm &&
+         std::abs(from_vertebra.x()) < kMiddleMm && std::abs(from_vertebra.z()) < kSameHeightMm;
+}
+
 std::vector<Group> bones_of(const BodyMap& map, const Vector3d& target) {
   std::vector<Group> groups = vertebrae_of(map, target);
   const std::size_t vertebrae = groups.size();
@@ -94,8 +102,12 @@ std::vector<Group> bones_of(const BodyMap& map, const Vector3d& target) {
       group.add(body.center_patient_mm, body.volume_mm3);
       continue;
     }
-    const Vector3d& spine = nearest(groups, body.center_patient_mm, is_vertebra)->center_patient_mm;
-    const Vector3d beside = body.center_patient_mm - spine;
+    const Group& spine = *nearest(groups, body.center_patient_mm, is_vertebra);
+    const Vector3d beside = body.center_patient_mm - spine.center_patient_mm;
+    if (is_spinous_process(body, beside)) {
+      groups[static_cast<std::size_t>(&spine - groups.data())].members.push_back(n);
+      continue;
+    }
     const std::string side = beside.y() < -kFrontMm ? "front" : beside.x() > 0.0 ? "left" : "right";
     const int slab = slab_of(body.center_patient_mm.z() - target.z(), kBoneSlabMm);
     const auto [at, is_new] = group_of.try_emplace({side, slab}, groups.size());

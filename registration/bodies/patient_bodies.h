@@ -19,11 +19,12 @@ struct PatientBodies {
   std::vector<double> named_carriers;
 };
 
-// Every vertebra is a body. Other bones are taken together: in a CT with vertebrae by side of the spine (left, right,
-// front) and in slabs of 60 mm along it, counted from the target, since single ribs lose their way; without vertebrae
-// they stay as they are. Groups in front that hold ribs breathe. Soft tissue farther than 15 to 30 mm from bone (heart,
-// diaphragm, bowel, brain) is divided in slabs of 80 mm, left and right, and breathes. The shares of all bodies add up
-// to 255 as `masks` do. Empty if the CT shows no body.
+// Every vertebra is a body, with its spinous process where that is a bone by itself. Other bones are taken together: in
+// a CT with vertebrae by side of the spine (left, right, front) and in slabs of 60 mm along it, counted from the
+// target, since single ribs lose their way; without vertebrae they stay as they are. Groups in front that hold ribs
+// breathe. Soft tissue farther than 15 to 30 mm from bone (heart, diaphragm, bowel, brain) is divided in slabs of 80
+// mm, left and right, and breathes. The shares of all bodies add up to 255 as `masks` do. Empty if the CT shows no
+// body.
 PatientBodies patient_bodies(const BodyMap& map, SoftMasks masks, const Eigen::Vector3d& target_patient_mm);
 
 // How the bone within a structure (1 inside) is divided among the bodies: parts of 1. Empty if there is none.

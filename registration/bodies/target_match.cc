@@ -126,19 +126,23 @@ Rendering of_whole(const Eigen::Isometry3d& room_from_patient) {
   };
 }
 
-TargetMatch near_target(const FixedViews& views, Renderer& renderer, const Eigen::Isometry3d& about,
-                        const Vector3d& target_room_mm, const Rendering& rendering) {
-  const std::vector<FixedImage> fine = views.reduced_to(kPixelMm, about, 0.0),
-                                coarse = views.reduced_to(kCoarsePixelMm, about, 0.0);
-  const auto of = [&](const std::vector<FixedImage>& level, double reach_mm, const std::vector<Measure>& measures) {
-    return means(within(reach_mm, level, target_room_mm), renderer, about, rendering, measures);
-  };
-  const std::vector<double> on_coarse = of(coarse, kSurroundingsMm, {of_all, of_parts});
-  return {.of_most_within_40_mm = of(fine, kSurroundingsMm, {of_most}).front(),
-          .of_most_within_20_mm = of(fine, kTargetMm, {of_most}).front(),
-          .of_all = on_coarse[0],
-          .of_parts = on_coarse[1]};
-}
+// The measures of what lies within some distance of the target, on pixels of some size.
+struct Surroundings {
+  const FixedViews& views;
+  Renderer& renderer;
+  const Eigen::Isometry3d& about;
+  const Vector3d& target_room_mm;
+  const Rendering& rendering;
+
+  std::vector<double> measured(double pixel_mm, double reach_mm, const std::vector<Measure>& measures) const {
+    return means(within(reach_mm, views.reduced_to(pixel_mm, about, 0.0), target_room_mm), renderer, about, rendering,
+                 measures);
+  }
+  CoarseMatch coarse_match() const {
+    const std::vector<double> both = measured(kCoarsePixelMm, kSurroundingsMm, {of_all, of_parts});
+    return {.of_all = both[0], .of_parts = both[1]};
+  }
+};
 
 }  // namespace
 
@@ -174,18 +178,23 @@ double trimmed_correlation(const Gradients& xray, const Gradients& drr) {
 }
 
 TargetMatch match_near_target(const BodyScene& scene, const Vector3d& target_room_mm, const BodyPoses& poses) {
-  const auto rendering = [&](Objective& pixels) {
+  const Rendering rendering = [&](Objective& pixels) {
     std::vector<std::vector<float>> drrs;
     for (std::size_t view = 0; view < pixels.views().size(); ++view)
       drrs.push_back(scene.fine.line_integrals(pixels, poses, view));
     return drrs;
   };
-  return near_target(scene.views, *scene.fine.as_one, poses.front().front(), target_room_mm, rendering);
+  const Surroundings near{scene.views, *scene.fine.as_one, poses.front().front(), target_room_mm, rendering};
+  const CoarseMatch coarse = near.coarse_match();
+  return {.of_most_within_40_mm = near.measured(kPixelMm, kSurroundingsMm, {of_most}).front(),
+          .of_most_within_20_mm = near.measured(kPixelMm, kTargetMm, {of_most}).front(),
+          .of_all = coarse.of_all,
+          .of_parts = coarse.of_parts};
 }
 
-TargetMatch match_near_target(const FixedViews& views, Renderer& renderer, const Eigen::Isometry3d& room_from_patient,
+CoarseMatch match_near_target(const FixedViews& views, Renderer& renderer, const Eigen::Isometry3d& room_from_patient,
                               const Vector3d& target_room_mm) {
-  return near_target(views, renderer, room_from_patient, target_room_mm, of_whole(room_from_patient));
+  return Surroundings{views, renderer, room_from_patient, target_room_mm, of_whole(room_from_patient)}.coarse_match();
 }
 
 double match_of_parts_everywhere(const FixedViews& views, Renderer& renderer,

@@ -8,8 +8,11 @@ namespace isoshift {
 
 TargetMatch match_near_target(const BodyScene& scene, const Eigen::Vector3d& target_room_mm, const BodyPoses& poses);
 
-// The same of a patient as a whole, and the median part of all that the X-rays show of it.
-TargetMatch match_near_target(const FixedViews& views, Renderer& renderer, const Eigen::Isometry3d& room_from_patient,
+// The coarse ones of a patient as a whole, and the median part of all that the X-rays show of it.
+struct CoarseMatch {
+  double of_all = 0.0, of_parts = 0.0;
+};
+CoarseMatch match_near_target(const FixedViews& views, Renderer& renderer, const Eigen::Isometry3d& room_from_patient,
                               const Eigen::Vector3d& target_room_mm);
 double match_of_parts_everywhere(const FixedViews& views, Renderer& renderer,
                                  const Eigen::Isometry3d& room_from_patient);

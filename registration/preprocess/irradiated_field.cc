@@ -213,11 +213,16 @@ bool is_beside(const Sides& sides, const Eigen::Vector2d& isocenter_upright_px, 
          std::max(beyond_mm(0, isocenter_upright_px.x()), beyond_mm(2, isocenter_upright_px.y())) > kToleranceMm;
 }
 
-// Whether an edge is as clear, as straight and as dark beyond as only a collimator's is.
-bool is_collimator(const Side& side) {
-  constexpr double kBeyond = -1.5, kEnds = 0.9, kSeen = 0.9;
+// Whether an edge is as clear, as straight and as dark beyond as only a collimator's is. Of two that make a corner, as
+// patients and couches do not, less darkness will do.
+bool is_collimator(const Side& side, bool makes_corner) {
+  constexpr double kBeyond = -1.5, kBeyondOfCorner = -0.8, kEnds = 0.9, kSeen = 0.9;
   return !side.is_open() && side.edge.evidence >= kClear && side.edge.at_ends >= kEnds && side.line.seen >= kSeen &&
-         side.line.scatter_mm <= kCollimatorScatterMm && side.brightness_beyond < kBeyond;
+         side.line.scatter_mm <= kCollimatorScatterMm &&
+         side.brightness_beyond < (makes_corner ? kBeyondOfCorner : kBeyond);
+}
+bool make_corner(const Sides& sides) {
+  return (!sides[0].is_open() || !sides[1].is_open()) && (!sides[2].is_open() || !sides[3].is_open());
 }
 
 // The field as the image alone shows it.
@@ -249,9 +254,12 @@ Finding find_in(const Upright& upright, const FieldEdges& edges, const Eigen::Ve
     finding.doubt = doubt_about(sides);
     return finding;
   }
-  if (is_anatomy && std::ranges::any_of(sides, is_collimator)) {
+  const auto is_edge_of_collimator = [corner = make_corner(sides)](const Side& side) {
+    return is_collimator(side, corner);
+  };
+  if (is_anatomy && std::ranges::any_of(sides, is_edge_of_collimator)) {
     finding.doubt = "a collimator's edge leaves the isocenter out";
-    if (std::ranges::all_of(sides, [](const Side& side) { return side.is_open() || is_collimator(side); }))
+    if (std::ranges::all_of(sides, [&](const Side& side) { return side.is_open() || is_edge_of_collimator(side); }))
       return finding;
     finding.sides = measured(upright, edges.whole());
     return finding;

@@ -222,9 +222,9 @@ EvaluationFolder evaluate_study(EvaluateOptions options, Notes& notes, Observer&
   if (!options.target.empty())
     options.truth = truth_at(study.planned_room_from_patient.inverse() * choice.target.center_room_mm, options.truth,
                              study.isocenter_patient_mm, options.body_truths);
-  const Surrogate surrogate = surrogate_of(study, choice.target, "");
-  RendererStore renderers;
   BodyStore bodies;
+  const Surrogate surrogate = surrogate_of(study, choice.target, "", bodies);
+  RendererStore renderers;
   const RegistrationSetup setup(options.registration, study, beams_of(study), renderers);
   const TargetRegistration registration(study, options.registration, setup, choice, surrogate, bodies);
   EvaluationFolder folder(options.output, configuration_of(options, study, setup.renderers().finest(), choice.target));

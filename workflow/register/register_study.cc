@@ -56,7 +56,7 @@ SetupResult register_study(const RegisterOptions& options, SharedWork& shared, O
   if (site_file && site_file->sessions) named.max_span_s = site_file->sessions->max_span_s;
   const Study study = load(named, notes, observer, shared.cts);
   TargetChoice choice = target_of(study, {options.target, site ? site->target : ""});
-  const Surrogate surrogate = surrogate_of(study, choice.target, site ? site->surrogate : "");
+  const Surrogate surrogate = surrogate_of(study, choice.target, site ? site->surrogate : "", shared.bodies);
   choice.target.surrogate = surrogate.words;
   const RegistrationSetup setup(options.registration, study, beams_of(study), shared.renderers);
   const std::vector<FixedImage> images = prepared(study.xrays);

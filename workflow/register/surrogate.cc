@@ -3,9 +3,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <set>
+#include <span>
+#include <vector>
 
 #include "base/error.h"
-#include "bodies/body_map.h"
+#include "bodies/lattice.h"
+#include "bodies/vertebrae.h"
 #include "io/dicom/structure_mask.h"
 #include "registration/bodies/carriers.h"
 
@@ -40,9 +44,67 @@ bool holds_bone(const Volume<float>& ct_hu, const Volume<std::uint8_t>& structur
   return found_mm3 >= kLeastMm3;
 }
 
+// The target's center and surface, as planned.
+std::vector<Eigen::Vector3d> points_patient_mm(const Study& study, const Target& target) {
+  const Eigen::Isometry3d patient_from_room = study.planned_room_from_patient.inverse();
+  std::vector<Eigen::Vector3d> points = {patient_from_room * target.center_room_mm};
+  for (const Eigen::Vector3d& point : target.extent_room_mm) points.push_back(patient_from_room * point);
+  return points;
+}
+
+// The kinds of the bodies that come within 20 mm of any of the points.
+std::set<Body::Kind> kinds_near(const BodyMap& map, std::span<const Eigen::Vector3d> points) {
+  std::set<Body::Kind> kinds;
+  const Volume<std::uint8_t>& labels = map.labels;
+  for (const Eigen::Vector3d& point : points) {
+    const Eigen::Vector3d center = labels.patient_from_voxel.inverse() * point;
+    const double edge_mm = labels.spacing_mm().x(), reach = kCarriersNearMm / edge_mm;
+    const Eigen::Vector3i first = (center.array() - reach).ceil().max(0.0).cast<int>();
+    const Eigen::Vector3i last =
+        (center.array() + reach).floor().min(labels.size.array().cast<double>() - 1.0).cast<int>();
+    for (int k = first.z(); k <= last.z(); ++k)
+      for (int j = first.y(); j <= last.y(); ++j)
+        for (int i = first.x(); i <= last.x(); ++i)
+          if (const int label = labels.at(i, j, k); label > 0 && (Eigen::Vector3d(i, j, k) - center).norm() <= reach)
+            kinds.insert(map.bodies[static_cast<std::size_t>(label) - 1].kind);
+  }
+  kinds.erase(Body::Kind::kCouch);
+  return kinds;
+}
+
+bool is_vertebra_near(std::span<const Vertebra> vertebrae, std::span<const Eigen::Vector3d> points) {
+  return std::ranges::any_of(vertebrae, [&](const Vertebra& vertebra) {
+    return std::ranges::any_of(points, [&](const Eigen::Vector3d& point) {
+      return (point - vertebra.center_patient_mm).norm() <= vertebra.radius_mm + kCarriersNearMm;
+    });
+  });
+}
+
+// Why the dense places near a target may not carry it as the whole patient moves. Only of a trunk: in a head bones hang
+// together. Vertebrae are looked for first, because they are found quickly and are what most targets lie near.
+std::optional<std::string> doubt_of_bones(const Study& study, const Target& target, BodyStore& bodies) {
+  constexpr std::size_t kVertebraeOfATrunk = 4;
+  const Volume<float>& ct_hu = study.ct->hu;
+  const std::vector<Vertebra> vertebrae = find_vertebrae(ct_hu, on_patient_axes(ct_hu, BodyOptions().lattice_mm));
+  const std::vector<Eigen::Vector3d> points = points_patient_mm(study, target);
+  if (vertebrae.size() < kVertebraeOfATrunk || is_vertebra_near(vertebrae, points)) return {};
+  const std::set<Body::Kind> kinds = kinds_near(*bodies.map(study.ct), points);
+  if (kinds.empty())
+    return fmt::format(
+        "what is dense within {:.0f} mm of the target is no bone that could carry it (contrast agent, "
+        "calcification), and the site file names no surrogate",
+        kCarriersNearMm);
+  if (kinds == std::set{Body::Kind::kRib})
+    return fmt::format(
+        "only ribs, a shoulder blade or a collar bone lie within {:.0f} mm of the target: they move with "
+        "the breath and the arms, and the site file names no surrogate",
+        kCarriersNearMm);
+  return {};
+}
+
 }  // namespace
 
-Surrogate surrogate_of(const Study& study, const Target& target, const std::string& by_site) {
+Surrogate surrogate_of(const Study& study, const Target& target, const std::string& by_site, BodyStore& bodies) {
   if (!by_site.empty()) {
     if (!study.structures)
       throw Error(
@@ -55,11 +117,11 @@ Surrogate surrogate_of(const Study& study, const Target& target, const std::stri
       throw Error(fmt::format("surrogate {} (the site file): the CT shows no bone in this structure", by_site));
     return {.words = fmt::format("bones in {} (the site file)", by_site), .drawn = std::move(drawn), .doubt = {}};
   }
-  const auto is_near = [&](const Eigen::Vector3d& room_mm) {
-    return is_bone_near(study.ct->hu, study.planned_room_from_patient.inverse() * room_mm);
-  };
-  if (is_near(target.center_room_mm) || std::ranges::any_of(target.extent_room_mm, is_near))
-    return {.words = fmt::format("bone within {:.0f} mm", kCarriersNearMm), .drawn = {}, .doubt = {}};
+  if (std::ranges::any_of(points_patient_mm(study, target),
+                          [&](const Eigen::Vector3d& point) { return is_bone_near(study.ct->hu, point); }))
+    return {.words = fmt::format("bone within {:.0f} mm", kCarriersNearMm),
+            .drawn = {},
+            .doubt = doubt_of_bones(study, target, bodies)};
   return {
       .words = "none",
       .drawn = {},

@@ -6,17 +6,6 @@
 
 namespace isoshift {
 
-std::shared_ptr<const CtBodies> BodyStore::get(const std::shared_ptr<const CtSeries>& ct) {
-  if (!last_ || ct != ct_) {
-    last_.reset();  // never two in memory
-    BodyMap map = find_bodies(ct->hu);
-    SoftMasks masks = soft_masks(map);
-    last_ = std::make_shared<const CtBodies>(CtBodies{.map = std::move(map), .masks = std::move(masks)});
-    ct_ = ct;
-  }
-  return last_;
-}
-
 TargetRegistration::TargetRegistration(const Study& study, const RegistrationRequest& request,
                                        const RegistrationSetup& setup, const TargetChoice& choice,
                                        const Surrogate& surrogate, BodyStore& bodies)
@@ -32,8 +21,8 @@ TargetRegistration::TargetRegistration(const Study& study, const RegistrationReq
 
 const BentPatient& TargetRegistration::bent_patient() const {
   std::call_once(bent_once_, [&] {
-    const std::shared_ptr<const CtBodies> of_ct = bodies_.get(study_.ct);
-    PatientBodies parts = patient_bodies(of_ct->map, of_ct->masks, *options_.target_patient_mm);
+    PatientBodies parts =
+        patient_bodies(*bodies_.map(study_.ct), *bodies_.masks(study_.ct), *options_.target_patient_mm);
     if (surrogate_.drawn) {
       parts.named_carriers = shares_of_bone_in(parts, *surrogate_.drawn);
       if (parts.named_carriers.empty())

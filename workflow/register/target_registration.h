@@ -7,30 +7,14 @@
 #include <optional>
 #include <span>
 
-#include "bodies/soft_masks.h"
 #include "registration/bodies/register_bodies.h"
 #include "workflow/observer.h"
+#include "workflow/register/body_store.h"
 #include "workflow/register/registration_setup.h"
 #include "workflow/register/surrogate.h"
 #include "workflow/register/target_of.h"
 
 namespace isoshift {
-
-// The rigid bodies of a CT, and what moves with them.
-struct CtBodies {
-  BodyMap map;
-  SoftMasks masks;
-};
-
-// Keeps the bodies of the last CT, for registrations that share it.
-class BodyStore {
- public:
-  std::shared_ptr<const CtBodies> get(const std::shared_ptr<const CtSeries>& ct);
-
- private:
-  std::shared_ptr<const CtSeries> ct_;
-  std::shared_ptr<const CtBodies> last_;
-};
 
 // Borrows all. What only a bent patient needs is made when the first one comes.
 class TargetRegistration {

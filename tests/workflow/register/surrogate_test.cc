@@ -47,9 +47,10 @@ Target target_at(const Study& study, const Vector3d& patient_mm, double radius_m
 
 TEST(Surrogate, BoneNearTheCenterOrTheSurfaceShowsTheTarget) {
   const Study study = study_with_bone();
+  BodyStore bodies;
   for (const Target& near :
        {target_at(study, {0, 0, -40}, 5.0), target_at(study, {0, 0, -15}, 2.0), target_at(study, {0, 0, 20}, 35.0)}) {
-    const Surrogate surrogate = surrogate_of(study, near, "");
+    const Surrogate surrogate = surrogate_of(study, near, "", bodies);
     EXPECT_EQ(surrogate.words, "bone within 20 mm");
     EXPECT_FALSE(surrogate.doubt);
     EXPECT_FALSE(surrogate.drawn);
@@ -58,8 +59,9 @@ TEST(Surrogate, BoneNearTheCenterOrTheSurfaceShowsTheTarget) {
 
 TEST(Surrogate, SoftTissueAloneIsADoubt) {
   const Study study = study_with_bone();
+  BodyStore bodies;
   for (const Target& far : {target_at(study, {0, 0, 20}, 10.0), target_at(study, {60, 0, -40}, 10.0)}) {
-    const Surrogate surrogate = surrogate_of(study, far, "");
+    const Surrogate surrogate = surrogate_of(study, far, "", bodies);
     ASSERT_TRUE(surrogate.doubt);
     EXPECT_THAT(*surrogate.doubt, HasSubstr("no bone lies within 20 mm of the target"));
   }
@@ -67,18 +69,19 @@ TEST(Surrogate, SoftTissueAloneIsADoubt) {
 
 TEST(Surrogate, IsTheStructureThatTheSiteNames) {
   Study study = study_with_bone();
+  BodyStore bodies;
   const Target far = target_at(study, {0, 0, 60}, 5.0);
-  const Surrogate surrogate = surrogate_of(study, far, "Pelvis");
+  const Surrogate surrogate = surrogate_of(study, far, "Pelvis", bodies);
   EXPECT_EQ(surrogate.words, "bones in Pelvis (the site file)");
   EXPECT_FALSE(surrogate.doubt);
   ASSERT_TRUE(surrogate.drawn);
   EXPECT_GT(std::ranges::count(surrogate.drawn->voxels, 1), 1000);
-  EXPECT_THROW(surrogate_of(study, far, "Femur"), Error);
+  EXPECT_THROW(surrogate_of(study, far, "Femur", bodies), Error);
   for (Contour& contour : study.structures->structures[0].contours)
     for (Vector3d& point : contour.points_patient_mm) point.z() += 80.0;
-  EXPECT_THROW(surrogate_of(study, far, "Pelvis"), Error) << "it holds no bone";
+  EXPECT_THROW(surrogate_of(study, far, "Pelvis", bodies), Error) << "it holds no bone";
   study.structures.reset();
-  EXPECT_THROW(surrogate_of(study, far, "Pelvis"), Error);
+  EXPECT_THROW(surrogate_of(study, far, "Pelvis", bodies), Error);
 }
 
 }  // namespace
