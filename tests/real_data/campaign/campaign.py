@@ -15,8 +15,8 @@ import pathlib
 import subprocess
 import sys
 
-# Of tuning, of breathing in steps of 1 mm, of patients who lie a vertebra off, of the first report and of the second.
-KINDS = [range(1000, 2000), range(2000, 3000), range(3000, 4000), range(5000, 6000), range(6000, 7000)]
+# Of tuning, of breathing in steps of 1 mm, of patients who lie a vertebra off, and of three reports.
+KINDS = [range(first, first + 1000) for first in (1000, 2000, 3000, 5000, 6000, 7000)]
 BOX_EDGE_MM = 15.0  # about the target's center
 STRATA = ["undisturbed", "bent", "breathing", "tissue", "small-field", "low-dose", "metal", "kv-mv", "view-angle"]
 
@@ -29,7 +29,8 @@ def seeds_of(text):
         seeds += range(int(first), int(last or first) + 1)
     if not any(all(seed in kind for seed in seeds) for kind in KINDS):
         raise argparse.ArgumentTypeError(f"{text}: seeds are 1000 to 1999 (tuning), 2000 to 2999 (breathing), 3000 to "
-                                         "3999 (a vertebra off), 5000 to 5999 or 6000 to 6999 (reports), of one kind in a call")
+                                         "3999 (a vertebra off), or 5000 to 5999, 6000 to 6999 or 7000 to 7999 "
+                                         "(reports), of one kind in a call")
     return seeds
 
 

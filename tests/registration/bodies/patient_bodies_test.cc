@@ -13,7 +13,7 @@ using Eigen::Vector3d;
 
 // A spine of three vertebrae, 30 mm apart, in the middle of a box of soft tissue; a rib on each side and one in front,
 // and a couch. Voxels of 2 mm; the middle vertebra lies at the origin.
-BodyMap small_trunk() {
+BodyMap small_trunk(bool has_spinous_process = false) {
   BodyMap map;
   map.labels = Volume<std::uint8_t>({120, 120, 60}, Eigen::Affine3d(Eigen::Translation3d(-119.0, -159.0, -59.0) *
                                                                     Eigen::Scaling(Vector3d::Constant(2.0))));
@@ -34,6 +34,7 @@ BodyMap small_trunk() {
   add(Body::Kind::kRib, {60, 0, 0}, {20, 5, 5});
   add(Body::Kind::kRib, {-60, 0, 0}, {20, 5, 5});
   add(Body::Kind::kRib, {0, -120, 0}, {40, 5, 5});
+  if (has_spinous_process) add(Body::Kind::kBone, {4, 40, -6}, {3, 12, 8});
   add(Body::Kind::kCouch, {0, 70, 0}, {100, 4, 58});
   return map;
 }
@@ -75,6 +76,14 @@ TEST(PatientBodies, AreNamedFromTheTarget) {
   }
   EXPECT_EQ(breathing_bones, 1U) << "the rib in front";
   EXPECT_GE(soft, 2U);
+}
+
+// Where its arch is too thin to be seen, it would else be one of the bones beside the spine.
+TEST(PatientBodies, ASpinousProcessGoesWithItsVertebra) {
+  const BodyMap map = small_trunk(true);
+  const PatientBodies patient = patient_bodies(map, soft_masks(map), {0, 0, 0});
+  EXPECT_EQ(patient.bodies.bodies.size(), small_patient({0, 0, 0}).bodies.bodies.size());
+  EXPECT_GT(shares_at(patient.carried, {4, 40, -6})[1], 0.99);
 }
 
 // Whatever moves is held by something: no body floats without a spring.

@@ -153,7 +153,13 @@ TEST(RegisterBodies, AWholeThatDoesNotShowTheTargetMayHaveBent) {
   EXPECT_FALSE(whole.may_have_bent(options, {20, 0, 0}));
   EXPECT_TRUE(whole.may_have_bent(options, {0, 90, 0})) << "far from all parts";
   whole.result.views[0].consistency.parts[1].disagrees = true;
-  EXPECT_TRUE(whole.may_have_bent(options)) << "one of three parts near the target matches elsewhere";
+  EXPECT_TRUE(whole.may_have_bent(options)) << "a part next to the target matches elsewhere";
+  // Farther off one in five may.
+  EXPECT_TRUE(whole.may_have_bent(options, {0, 0, 40})) << "one of three";
+  for (const double x : {90.0, 110.0})
+    whole.result.views[0].consistency.parts.push_back({.center_px = {x, 100.0}, .has_signal = true});
+  EXPECT_FALSE(whole.may_have_bent(options, {0, 40, 0})) << "one of five";
+  EXPECT_TRUE(whole.may_have_bent(options)) << "of many, too";
   whole = SeenWhole();
   for (ViewPart& part : whole.result.views[0].consistency.parts) part.has_signal = false;
   EXPECT_TRUE(whole.may_have_bent(options)) << "noise";

@@ -6,6 +6,8 @@
 #include <gtest/gtest.h>
 
 #include "base/error.h"
+#include "phantom/anatomy.h"
+#include "tests/support/phantom_ct.h"
 #include "tests/support/small_study.h"
 
 namespace isoshift {
@@ -65,6 +67,51 @@ TEST(Surrogate, SoftTissueAloneIsADoubt) {
     ASSERT_TRUE(surrogate.doubt);
     EXPECT_THAT(*surrogate.doubt, HasSubstr("no bone lies within 20 mm of the target"));
   }
+}
+
+// A trunk: vertebrae, ribs and a heart, as planned with the isocenter at the origin.
+Study study_of_thorax() {
+  Study study;
+  study.ct = std::make_shared<const CtSeries>(
+      CtSeries{.hu = PhantomCt{.anatomy = "thorax", .seed = 5, .spacing_mm = {2, 2, 3}}.make()});
+  study.planned_room_from_patient =
+      planned_room_from_patient(PatientPosition::kHfs, study.table, study.isocenter_patient_mm);
+  return study;
+}
+
+// Ribs breathe, and shoulder blades go with the arms: the answer of the whole patient is not theirs.
+TEST(Surrogate, RibsAloneAreADoubt) {
+  const Study study = study_of_thorax();
+  BodyStore bodies;
+  const BodyMap& map = *bodies.map(study.ct);
+  const auto at = [&](Body::Kind kind, double side_mm) -> Vector3d {
+    const auto body = std::ranges::find_if(map.bodies, [&](const Body& one) { return one.kind == kind; });
+    return body->center_patient_mm + Vector3d(side_mm, 0.0, 0.0);
+  };
+  const Surrogate by_rib = surrogate_of(study, target_at(study, at(Body::Kind::kRib, 0.0), 5.0), "", bodies);
+  ASSERT_TRUE(by_rib.doubt);
+  EXPECT_THAT(*by_rib.doubt, HasSubstr("only ribs, a shoulder blade or a collar bone"));
+  EXPECT_FALSE(surrogate_of(study, target_at(study, at(Body::Kind::kVertebra, 0.0), 5.0), "", bodies).doubt);
+  EXPECT_FALSE(surrogate_of(study, target_at(study, at(Body::Kind::kVertebra, 25.0), 5.0), "", bodies).doubt);
+}
+
+// What is dense beside the ribs of a trunk, and no bone.
+TEST(Surrogate, DenseSoftTissueIsNoBone) {
+  Study study = study_of_thorax();
+  BodyStore bodies;
+  const BodyMap map = *bodies.map(study.ct);
+  CtSeries ct = *study.ct;
+  const Vector3d front = map.bodies.front().center_patient_mm + Vector3d(-60.0, -70.0, 40.0);
+  int near = 0;
+  for (int k = 0; k < ct.hu.size.z(); ++k)
+    for (int j = 0; j < ct.hu.size.y(); ++j)
+      for (int i = 0; i < ct.hu.size.x(); ++i)
+        if ((ct.hu.patient_from_voxel * Vector3d(i, j, k) - front).norm() <= 4.0) ct.hu.at(i, j, k) = 400.0F, ++near;
+  ASSERT_GT(near, 10);
+  study.ct = std::make_shared<const CtSeries>(std::move(ct));
+  const Surrogate surrogate = surrogate_of(study, target_at(study, front, 5.0), "", bodies);
+  ASSERT_TRUE(surrogate.doubt);
+  EXPECT_THAT(*surrogate.doubt, HasSubstr("no bone that could carry it"));
 }
 
 TEST(Surrogate, IsTheStructureThatTheSiteNames) {
