@@ -30,4 +30,7 @@ inline constexpr std::array kFieldOrigins = {IrradiatedField::Origin::kWholeRece
 // "whole receptor", "found", "declared", "drawn".
 const char* to_string(IrradiatedField::Origin origin);
 
+// How far within a field's sides a place of the X-ray lies; negative outside. Precondition: the field has corners.
+double inside_px(const IrradiatedField& field, const Eigen::Vector2d& place_px);
+
 }  // namespace isoshift

@@ -15,16 +15,6 @@ int ViewConsistency::disagreeing() const {
   return static_cast<int>(std::ranges::count_if(parts, &ViewPart::disagrees));
 }
 
-const char* to_string(IrradiatedField::Origin origin) {
-  switch (origin) {
-    case IrradiatedField::Origin::kWholeReceptor: return "whole receptor";
-    case IrradiatedField::Origin::kFound: return "found";
-    case IrradiatedField::Origin::kDeclared: return "declared";
-    case IrradiatedField::Origin::kDrawn: return "drawn";
-  }
-  return "";
-}
-
 Eigen::Vector3d Uncertainty::sigma_translation_mm() const { return covariance.diagonal().head<3>().cwiseSqrt(); }
 
 Eigen::Matrix3d Uncertainty::covariance_at_mm2(const Eigen::Vector3d& found_room_mm) const {

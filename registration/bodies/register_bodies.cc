@@ -227,7 +227,8 @@ void register_bodies(const BentPatient& patient, std::span<const FixedImage> ima
   const auto begin = std::chrono::steady_clock::now();
   const Carriers carriers(patient.parts, patient.target, planned_room_from_patient, patient.parts.named_carriers);
   if (!carriers.exist()) {
-    result.demote(Verdict::kReview, "no bone carries the target: soft tissue is not seen in X-rays");
+    result.demote(Verdict::kReview,
+                  "no bone was recognized within 20 mm of the target: X-rays do not show soft tissue");
     return;
   }
   const FixedViews fixed = compared_views(options, images);

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
-#include <numbers>
 #include <numeric>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -18,24 +18,39 @@ using Eigen::Vector3d;
 
 constexpr double kPixelMm = 2.0, kCoarsePixelMm = 4.0, kSurroundingsMm = 40.0, kTargetMm = 20.0, kPartMm = 12.0;
 constexpr std::size_t kLeastPixelsOfAPart = 6;
-constexpr double kLeastShown = 0.6;  // share of the circle about the target; with less, all that is shown counts
+constexpr int kLeastPixels = 100;  // near the target, with all neighbors: the circles have about 300
+constexpr double kFarther = 1.2;
 constexpr double kKept = 0.7;
 constexpr int kMostSteps = 20;
 constexpr double kSameScale = 1e-9;
 
-// Of each view what lies near the target.
-std::vector<FixedImage> within(double reach_mm, std::vector<FixedImage> level, const Vector3d& target_room_mm) {
-  for (FixedImage& image : level) {
-    const auto center = image.view.project(target_room_mm);
-    const double reach_px = reach_mm * pixels_per_mm(image.view);
-    Image<std::uint8_t> near = image.field;
-    for (int row = 0; row < near.rows; ++row)
-      for (int column = 0; column < near.columns; ++column)
-        if (!center || (Eigen::Vector2d(column, row) - *center).norm() > reach_px) near.at(column, row) = 0;
-    const auto shown = static_cast<double>(std::ranges::count(near.pixels, 1));
-    if (shown >= kLeastShown * std::numbers::pi * reach_px * reach_px) image.field = std::move(near);
+// Pixels of a field whose neighbors lie in it, too: those with gradients.
+int pixels_with_neighbors(const Image<std::uint8_t>& field) {
+  int count = 0;
+  for (int row = 1; row + 1 < field.rows; ++row)
+    for (int column = 1; column + 1 < field.columns; ++column)
+      count += field.at(column, row) & field.at(column - 1, row) & field.at(column + 1, row) &
+               field.at(column, row - 1) & field.at(column, row + 1);
+  return count;
+}
+
+// Of a view what lies near the target: within `reach_mm`, or as much farther as it takes to see enough. Nothing in the
+// field if that is not to be had.
+FixedImage near(double reach_mm, const FixedImage& image, const Vector3d& target_room_mm) {
+  FixedImage near = image;
+  const auto center = image.view.project(target_room_mm);
+  for (double reach_px = reach_mm * pixels_per_mm(image.view); center; reach_px *= kFarther) {
+    bool is_all = true;
+    for (int row = 0; row < image.field.rows; ++row)
+      for (int column = 0; column < image.field.columns; ++column) {
+        const bool is_near = (Eigen::Vector2d(column, row) - *center).norm() <= reach_px;
+        is_all = is_all && is_near;
+        near.field.at(column, row) = is_near ? image.field.at(column, row) : 0;
+      }
+    if (is_all || pixels_with_neighbors(near.field) >= kLeastPixels) return near;
   }
-  return level;
+  std::ranges::fill(near.field.pixels, 0);
+  return near;
 }
 
 using PlaneGradients = Eigen::Matrix<double, Eigen::Dynamic, 2>;  // a row per pixel
@@ -126,7 +141,7 @@ Rendering of_whole(const Eigen::Isometry3d& room_from_patient) {
   };
 }
 
-// The measures of what lies within some distance of the target, on pixels of some size.
+// The measures of what lies within some distance of the target, on pixels of some size; 0 where too little is shown.
 struct Surroundings {
   const FixedViews& views;
   Renderer& renderer;
@@ -135,8 +150,12 @@ struct Surroundings {
   const Rendering& rendering;
 
   std::vector<double> measured(double pixel_mm, double reach_mm, const std::vector<Measure>& measures) const {
-    return means(within(reach_mm, views.reduced_to(pixel_mm, about, 0.0), target_room_mm), renderer, about, rendering,
-                 measures);
+    std::vector<FixedImage> level = views.reduced_to(pixel_mm, about, 0.0);
+    for (FixedImage& image : level) {
+      image = near(reach_mm, image, target_room_mm);
+      if (pixels_with_neighbors(image.field) < kLeastPixels) return std::vector<double>(measures.size(), 0.0);
+    }
+    return means(level, renderer, about, rendering, measures);
   }
   CoarseMatch coarse_match() const {
     const std::vector<double> both = measured(kCoarsePixelMm, kSurroundingsMm, {of_all, of_parts});

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <set>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "base/error.h"
@@ -52,54 +53,94 @@ std::vector<Eigen::Vector3d> points_patient_mm(const Study& study, const Target&
   return points;
 }
 
-// The kinds of the bodies that come within 20 mm of any of the points.
-std::set<Body::Kind> kinds_near(const BodyMap& map, std::span<const Eigen::Vector3d> points) {
-  std::set<Body::Kind> kinds;
-  const Volume<std::uint8_t>& labels = map.labels;
-  for (const Eigen::Vector3d& point : points) {
-    const Eigen::Vector3d center = labels.patient_from_voxel.inverse() * point;
-    const double edge_mm = labels.spacing_mm().x(), reach = kCarriersNearMm / edge_mm;
-    const Eigen::Vector3i first = (center.array() - reach).ceil().max(0.0).cast<int>();
-    const Eigen::Vector3i last =
-        (center.array() + reach).floor().min(labels.size.array().cast<double>() - 1.0).cast<int>();
-    for (int k = first.z(); k <= last.z(); ++k)
-      for (int j = first.y(); j <= last.y(); ++j)
-        for (int i = first.x(); i <= last.x(); ++i)
-          if (const int label = labels.at(i, j, k); label > 0 && (Eigen::Vector3d(i, j, k) - center).norm() <= reach)
-            kinds.insert(map.bodies[static_cast<std::size_t>(label) - 1].kind);
+// Which bodies hang on the spine by bones that touch, without ribs between them, as a pelvis does. Ribs breathe, and a
+// shoulder blade (thin bones beside the spine are "ribs") goes with the arm, and the arm's bones with it.
+std::vector<bool> hanging_on_spine(const BodyMap& map) {
+  std::vector<bool> hangs(map.bodies.size());
+  for (std::size_t n = 0; n < map.bodies.size(); ++n) hangs[n] = map.bodies[n].kind == Body::Kind::kVertebra;
+  const auto may_hang = [&](int body) { return map.bodies[static_cast<std::size_t>(body)].kind == Body::Kind::kBone; };
+  for (bool is_new = true; is_new;) {
+    is_new = false;
+    for (const Joint& joint : map.joints)
+      for (const auto& [from, to] : {std::pair(joint.a, joint.b), std::pair(joint.b, joint.a)}) {
+        const auto other = static_cast<std::size_t>(to);
+        if (!hangs[static_cast<std::size_t>(from)] || hangs[other] || !may_hang(to)) continue;
+        hangs[other] = is_new = true;
+      }
   }
-  kinds.erase(Body::Kind::kCouch);
-  return kinds;
+  return hangs;
 }
 
-bool is_vertebra_near(std::span<const Vertebra> vertebrae, std::span<const Eigen::Vector3d> points) {
+// The bodies that come within 20 mm of a point.
+std::set<std::size_t> bodies_near(const BodyMap& map, const Eigen::Vector3d& point_patient_mm) {
+  std::set<std::size_t> near;
+  const Volume<std::uint8_t>& labels = map.labels;
+  const Eigen::Vector3d center = labels.patient_from_voxel.inverse() * point_patient_mm;
+  const double reach = kCarriersNearMm / labels.spacing_mm().x();
+  const Eigen::Vector3i first = (center.array() - reach).ceil().max(0.0).cast<int>();
+  const Eigen::Vector3i last =
+      (center.array() + reach).floor().min(labels.size.array().cast<double>() - 1.0).cast<int>();
+  for (int k = first.z(); k <= last.z(); ++k)
+    for (int j = first.y(); j <= last.y(); ++j)
+      for (int i = first.x(); i <= last.x(); ++i)
+        if (const int label = labels.at(i, j, k); label > 0 && (Eigen::Vector3d(i, j, k) - center).norm() <= reach)
+          near.insert(static_cast<std::size_t>(label) - 1);
+  std::erase_if(near, [&](std::size_t body) { return map.bodies[body].kind == Body::Kind::kCouch; });
+  return near;
+}
+
+bool is_vertebra_near(std::span<const Vertebra> vertebrae, const Eigen::Vector3d& point_patient_mm) {
   return std::ranges::any_of(vertebrae, [&](const Vertebra& vertebra) {
-    return std::ranges::any_of(points, [&](const Eigen::Vector3d& point) {
-      return (point - vertebra.center_patient_mm).norm() <= vertebra.radius_mm + kCarriersNearMm;
-    });
+    return (point_patient_mm - vertebra.center_patient_mm).norm() <= vertebra.radius_mm + kCarriersNearMm;
   });
 }
 
-// Why the dense places near a target may not carry it as the whole patient moves. Only of a trunk: in a head bones hang
-// together. Vertebrae are looked for first, because they are found quickly and are what most targets lie near.
+// How many points have a bone near them that hangs on the spine, how many have other bones only, and how many have
+// something dense that was not recognized as a bone.
+struct PointsByBone {
+  int of_spine = 0, of_others = 0, unrecognized = 0;
+
+  bool are_carried() const { return of_spine >= of_others + unrecognized; }
+};
+
+PointsByBone points_by_bone(const Volume<float>& ct_hu, const BodyMap& map,
+                            std::span<const Eigen::Vector3d> points_patient_mm) {
+  const std::vector<bool> hangs = hanging_on_spine(map);
+  PointsByBone count;
+  for (const Eigen::Vector3d& point : points_patient_mm) {
+    const std::set<std::size_t> near = bodies_near(map, point);
+    if (std::ranges::any_of(near, [&](std::size_t body) { return hangs[body]; }))
+      ++count.of_spine;
+    else if (!near.empty())
+      ++count.of_others;
+    else if (is_bone_near(ct_hu, point))
+      ++count.unrecognized;
+  }
+  return count;
+}
+
+// Why the dense places near a target may not carry it as the whole patient moves. What is near its center counts, and
+// where nothing is, what most of its surface is near to. Only of a trunk: in a head bones hang together. Vertebrae are
+// looked for first, because they are found quickly and are what most targets lie near.
 std::optional<std::string> doubt_of_bones(const Study& study, const Target& target, BodyStore& bodies) {
   constexpr std::size_t kVertebraeOfATrunk = 4;
   const Volume<float>& ct_hu = study.ct->hu;
   const std::vector<Vertebra> vertebrae = find_vertebrae(ct_hu, on_patient_axes(ct_hu, BodyOptions().lattice_mm));
   const std::vector<Eigen::Vector3d> points = points_patient_mm(study, target);
-  if (vertebrae.size() < kVertebraeOfATrunk || is_vertebra_near(vertebrae, points)) return {};
-  const std::set<Body::Kind> kinds = kinds_near(*bodies.map(study.ct), points);
-  if (kinds.empty())
+  if (vertebrae.size() < kVertebraeOfATrunk || is_vertebra_near(vertebrae, points.front())) return {};
+  const BodyMap& map = *bodies.map(study.ct);
+  PointsByBone near = points_by_bone(ct_hu, map, std::span(points).first(1));
+  if (near.of_spine + near.of_others == 0) near = points_by_bone(ct_hu, map, points);
+  if (near.are_carried()) return {};
+  if (near.of_others < near.unrecognized)
     return fmt::format(
-        "what is dense within {:.0f} mm of the target is no bone that could carry it (contrast agent, "
-        "calcification), and the site file names no surrogate",
+        "what is dense within {:.0f} mm of the target was not recognized as a bone that could carry it "
+        "(it may be contrast agent, calcification or a thin bone), and the site file names no surrogate",
         kCarriersNearMm);
-  if (kinds == std::set{Body::Kind::kRib})
-    return fmt::format(
-        "only ribs, a shoulder blade or a collar bone lie within {:.0f} mm of the target: they move with "
-        "the breath and the arms, and the site file names no surrogate",
-        kCarriersNearMm);
-  return {};
+  return fmt::format(
+      "hardly more than ribs or bones of the shoulders lies within {:.0f} mm of the target: they move "
+      "with the breath and the arms, and the site file names no surrogate",
+      kCarriersNearMm);
 }
 
 }  // namespace

@@ -19,9 +19,9 @@ struct Surrogate {
 };
 
 // `by_site`: the structure whose bones carry the target, which the site file names for the anatomy; empty: bones within
-// 20 mm of the target's center or surface. In a trunk ribs, shoulder blades and collar bones alone are a doubt: they
-// move with the breath and the arms, and X-rays show little of them. Throws Error if the structure is not there or has
-// no closed contour.
+// 20 mm of the target's center or surface. In a trunk ribs, shoulder blades and collar bones are a doubt if little
+// else lies there: they move with the breath and the arms, and X-rays show little of them. Throws Error if the
+// structure is not there or has no closed contour.
 Surrogate surrogate_of(const Study& study, const Target& target, const std::string& by_site, BodyStore& bodies);
 
 }  // namespace isoshift

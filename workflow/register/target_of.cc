@@ -5,9 +5,11 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <optional>
 
 #include "base/error.h"
+#include "drr/attenuation.h"
 #include "geometry/mask.h"
 #include "io/dicom/structure_mask.h"
 
@@ -16,6 +18,7 @@ namespace {
 
 constexpr const char* kIsocenter = "isocenter";
 constexpr double kSurroundingsMm = 30.0;
+constexpr double kNearEndMm = 25.0;
 
 // The six neighbors of a cube's center, its edges and its corners.
 std::vector<Eigen::Vector3d> directions_all_around() {
@@ -186,6 +189,45 @@ TargetChoice chosen_by_plan(const Study& study) {
           .doubts = {}};
 }
 
+// How far from a point a CT ends although the body goes on there: at most kNearEndMm.
+std::optional<double> end_of_ct_near_mm(const Volume<float>& ct, const Eigen::Vector3d& point_patient_mm) {
+  const Eigen::Vector3d at = ct.patient_from_voxel.inverse() * point_patient_mm, spacing = ct.spacing_mm();
+  const auto threshold_hu = static_cast<float>(AttenuationModel().threshold_hu);
+  std::optional<double> nearest_mm;
+  for (int axis = 0; axis < 3; ++axis)
+    for (const int end : {0, ct.size[axis] - 1}) {
+      const double away_mm = (end == 0 ? at[axis] : end - at[axis]) * spacing[axis];
+      if (away_mm > nearest_mm.value_or(kNearEndMm)) continue;
+      const int u = (axis + 1) % 3, v = (axis + 2) % 3;
+      bool goes_on = false;
+      Eigen::Vector3i voxel;
+      voxel[axis] = end;
+      for (voxel[u] = 0; voxel[u] < ct.size[u] && !goes_on; ++voxel[u])
+        for (voxel[v] = 0; voxel[v] < ct.size[v] && !goes_on; ++voxel[v])
+          goes_on = std::hypot((voxel[u] - at[u]) * spacing[u], (voxel[v] - at[v]) * spacing[v]) <= kNearEndMm &&
+                    ct.at(voxel.x(), voxel.y(), voxel.z()) > threshold_hu;
+      if (goes_on) nearest_mm = std::max(0.0, away_mm);
+    }
+  return nearest_mm;
+}
+
+void doubt_near_end_of_ct(const Study& study, TargetChoice& choice) {
+  const Eigen::Vector3d center = study.planned_room_from_patient.inverse() * choice.target.center_room_mm;
+  if (const auto away_mm = end_of_ct_near_mm(study.ct->hu, center))
+    choice.doubts.push_back(
+        fmt::format("the CT ends {:.0f} mm from the target's center although the body goes on: X-rays show "
+                    "there what the CT does not",
+                    *away_mm));
+}
+
+TargetChoice chosen(const Study& study, const TargetWish& wish) {
+  if (!wish.by_person.empty()) return named(study, wish.by_person, "--target");
+  if (!wish.by_site.empty()) return named(study, wish.by_site, "the site file");
+  TargetChoice choice = chosen_by_plan(study);
+  doubt_lost_rois(study, choice);
+  return choice;
+}
+
 constexpr std::array kToldOf = {"PTV", "CTV", "GTV", "ORGAN", "AVOIDANCE", "CAVITY"};  // RT ROI Interpreted Types
 
 }  // namespace
@@ -207,10 +249,8 @@ std::vector<Target> structures_beside(const std::string& target, const Study& st
 }
 
 TargetChoice target_of(const Study& study, const TargetWish& wish) {
-  if (!wish.by_person.empty()) return named(study, wish.by_person, "--target");
-  if (!wish.by_site.empty()) return named(study, wish.by_site, "the site file");
-  TargetChoice choice = chosen_by_plan(study);
-  doubt_lost_rois(study, choice);
+  TargetChoice choice = chosen(study, wish);
+  doubt_near_end_of_ct(study, choice);
   return choice;
 }
 

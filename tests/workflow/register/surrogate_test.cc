@@ -90,7 +90,7 @@ TEST(Surrogate, RibsAloneAreADoubt) {
   };
   const Surrogate by_rib = surrogate_of(study, target_at(study, at(Body::Kind::kRib, 0.0), 5.0), "", bodies);
   ASSERT_TRUE(by_rib.doubt);
-  EXPECT_THAT(*by_rib.doubt, HasSubstr("only ribs, a shoulder blade or a collar bone"));
+  EXPECT_THAT(*by_rib.doubt, HasSubstr("hardly more than ribs or bones of the shoulders"));
   EXPECT_FALSE(surrogate_of(study, target_at(study, at(Body::Kind::kVertebra, 0.0), 5.0), "", bodies).doubt);
   EXPECT_FALSE(surrogate_of(study, target_at(study, at(Body::Kind::kVertebra, 25.0), 5.0), "", bodies).doubt);
 }
@@ -111,7 +111,7 @@ TEST(Surrogate, DenseSoftTissueIsNoBone) {
   study.ct = std::make_shared<const CtSeries>(std::move(ct));
   const Surrogate surrogate = surrogate_of(study, target_at(study, front, 5.0), "", bodies);
   ASSERT_TRUE(surrogate.doubt);
-  EXPECT_THAT(*surrogate.doubt, HasSubstr("no bone that could carry it"));
+  EXPECT_THAT(*surrogate.doubt, HasSubstr("was not recognized as a bone"));
 }
 
 TEST(Surrogate, IsTheStructureThatTheSiteNames) {

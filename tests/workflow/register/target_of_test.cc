@@ -13,6 +13,8 @@ namespace isoshift {
 namespace {
 
 using Eigen::Vector3d;
+using testing::Contains;
+using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
 
@@ -145,15 +147,26 @@ TEST(TargetOf, ADoseReferenceThatCannotBeFollowedIsADoubt) {
 
 TEST(TargetOf, ATargetThatReachesBeyondTheCtIsADoubt) {
   // The last slice lies at z = 80.
-  const Study inside = study_with({box(1, "PTV", "PTV", {10, 0, 60}, 32)}),
+  const Study inside = study_with({box(1, "PTV", "PTV", {10, 0, 50}, 32)}),
               beyond = study_with({box(1, "PTV", "PTV", {10, 0, 76}, 32)}),
               beside = study_with({box(1, "PTV", "PTV", {70, 0, 0}, 40)});
   EXPECT_THAT(target_of(inside, {.by_person = "PTV"}).doubts, IsEmpty());
   for (const Study* study : {&beyond, &beside}) {
     const TargetChoice choice = target_of(*study, {.by_person = "PTV"});
-    ASSERT_EQ(choice.doubts.size(), 1U);
-    EXPECT_THAT(choice.doubts[0], HasSubstr("the target PTV reaches beyond the CT"));
+    EXPECT_THAT(choice.doubts, Contains(HasSubstr("the target PTV reaches beyond the CT")));
   }
+}
+
+// X-rays show what lies beyond the last slice, and the CT does not.
+TEST(TargetOf, TheEndOfTheCtNearTheTargetIsADoubtWhereTheBodyGoesOn) {
+  Study study = study_with({box(1, "PTV", "PTV", {10, 0, 60}, 24)});
+  EXPECT_THAT(target_of(study, {.by_person = "PTV"}).doubts,
+              ElementsAre(HasSubstr("the CT ends 20 mm from the target's center although the body goes on")));
+  CtSeries ct = *study.ct;
+  for (int j = 0; j < ct.hu.size.y(); ++j)
+    for (int i = 0; i < ct.hu.size.x(); ++i) ct.hu.at(i, j, ct.hu.size.z() - 1) = -1000.0F;
+  study.ct = std::make_shared<const CtSeries>(std::move(ct));
+  EXPECT_THAT(target_of(study, {.by_person = "PTV"}).doubts, IsEmpty()) << "the top of a head";
 }
 
 TEST(TargetOf, ANameThatIsNotThereIsAnError) {
