@@ -117,8 +117,10 @@ def row_of(name, truth, results):
     result = json.loads(path.read_text())
     errors = target_error_mm(truth, result)
     row.update(verdict=result["verdict"], reasons="; ".join(result["reasons"]))
-    # A rejected result answers nothing; a target of which a direction was not measured is not determined.
-    row["determined"] = result["verdict"] != "rejected" and errors is not None
+    # A rejected result answers nothing; a target of which a direction was not measured, or that no bone carries, is not
+    # determined.
+    row["determined"] = (result["verdict"] != "rejected" and errors is not None
+                         and result["target"]["surrogate"] != "none")
     if errors is not None:
         row.update(center_mm=errors[0], box_mm=errors[1], is_bodies=bool(result.get("bodies")),
                    sigmas_off=sigmas_off(truth, result))
