@@ -163,10 +163,11 @@ std::string match_in_words(const RegistrationResult& result) {
 // The answer is that of the bodies that carry the target: they must be seen, and the target must not be bent itself.
 void judge_bodies(RegistrationResult& result) {
   if (!does_target_match(result))
-    review(result,
-           fmt::format("the target's surroundings match poorly: they may be another patient's, or the target may "
-                       "lie elsewhere ({})",
-                       match_in_words(result)));
+    review(
+        result,
+        fmt::format("the target's surroundings match poorly: they may have changed (metal, fluid, gas) or be another "
+                    "patient's, or the target may lie elsewhere ({})",
+                    match_in_words(result)));
   // What one bone alone wants, nothing confirms: one that is nearly straight fits as well where it has slid along.
   if (std::ranges::count_if(result.bodies, &BodyMotion::is_determined) < kMinDeterminedBones)
     review(result, "the images determine no bone but the one that carries the target: nothing confirms where it lies");
