@@ -79,10 +79,9 @@ class Finder {
 
   // Thin bones beside the spine, from 60 mm below the lowest vertebra to the highest: ribs, and shoulder blades.
   bool is_rib(const VoxelSet& voxels, const Volume<float>& depth, const std::vector<Vertebra>& vertebrae) const {
-    constexpr std::size_t kLeastVertebrae = 4;
     constexpr float kThickMm = 9.0F;
     constexpr double kAsideMm = 25.0, kBelowMm = 60.0;
-    if (vertebrae.size() < kLeastVertebrae) return false;
+    if (vertebrae.size() < kVertebraeOfATrunk) return false;
     double aside = 0.0;
     float deepest = 0.0F;
     std::size_t among = 0;

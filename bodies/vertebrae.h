@@ -22,6 +22,9 @@ struct Vertebra {
   bool is_cut = false;     // by the end of the CT or of the visible spine: its center is told from its neighbors
 };
 
+// A CT that shows as many is one of a trunk: with ribs, vessels and arms, and not of a head.
+inline constexpr std::size_t kVertebraeOfATrunk = 4;
+
 // The vertebra at the level of a point. Precondition: there is one.
 const Vertebra& level_of(const Eigen::Vector3d& at_patient_mm, const std::vector<Vertebra>& vertebrae);
 

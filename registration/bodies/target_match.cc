@@ -34,9 +34,9 @@ int pixels_with_neighbors(const Image<std::uint8_t>& field) {
   return count;
 }
 
-// Of a view what lies near the target: within `reach_mm`, or as much farther as it takes to see enough. Nothing in the
-// field if that is not to be had.
-FixedImage near(double reach_mm, const FixedImage& image, const Vector3d& target_room_mm) {
+// Of a view what lies near the target: within `reach_mm`, or as much farther as it takes to see enough. Nothing if that
+// is not to be had.
+std::optional<FixedImage> near_target(double reach_mm, const FixedImage& image, const Vector3d& target_room_mm) {
   FixedImage near = image;
   const auto center = image.view.project(target_room_mm);
   for (double reach_px = reach_mm * pixels_per_mm(image.view); center; reach_px *= kFarther) {
@@ -47,10 +47,10 @@ FixedImage near(double reach_mm, const FixedImage& image, const Vector3d& target
         is_all = is_all && is_near;
         near.field.at(column, row) = is_near ? image.field.at(column, row) : 0;
       }
-    if (is_all || pixels_with_neighbors(near.field) >= kLeastPixels) return near;
+    if (pixels_with_neighbors(near.field) >= kLeastPixels) return near;
+    if (is_all) break;
   }
-  std::ranges::fill(near.field.pixels, 0);
-  return near;
+  return std::nullopt;
 }
 
 using PlaneGradients = Eigen::Matrix<double, Eigen::Dynamic, 2>;  // a row per pixel
@@ -152,8 +152,9 @@ struct Surroundings {
   std::vector<double> measured(double pixel_mm, double reach_mm, const std::vector<Measure>& measures) const {
     std::vector<FixedImage> level = views.reduced_to(pixel_mm, about, 0.0);
     for (FixedImage& image : level) {
-      image = near(reach_mm, image, target_room_mm);
-      if (pixels_with_neighbors(image.field) < kLeastPixels) return std::vector<double>(measures.size(), 0.0);
+      std::optional<FixedImage> near = near_target(reach_mm, image, target_room_mm);
+      if (!near) return std::vector<double>(measures.size(), 0.0);
+      image = std::move(*near);
     }
     return means(level, renderer, about, rendering, measures);
   }

@@ -19,22 +19,28 @@ namespace {
 
 constexpr double kLeastMm3 = 100.0;
 
-// Whether a CT shows bone near a place: as much as a small piece of rib, or a ball. Quicker than finding its bodies,
-// which only bent patients need.
-bool is_bone_near(const Volume<float>& ct_hu, const Eigen::Vector3d& patient_mm) {
-  const double bone_hu = BodyOptions().bone_hu;
-  const Eigen::Vector3d center = ct_hu.patient_from_voxel.inverse() * patient_mm;
-  const Eigen::Vector3d spacing = ct_hu.spacing_mm(), reach = kCarriersNearMm * spacing.cwiseInverse();
+// Calls work(i, j, k) for the voxels within 20 mm of a place.
+template <class T, class Work>
+void for_voxels_near(const Volume<T>& volume, const Eigen::Vector3d& patient_mm, Work&& work) {
+  const Eigen::Vector3i& size = volume.size;
+  const Eigen::Vector3d center = volume.patient_from_voxel.inverse() * patient_mm;
+  const Eigen::Vector3d spacing = volume.spacing_mm(), reach = kCarriersNearMm * spacing.cwiseInverse();
   const Eigen::Vector3i first = (center - reach).array().ceil().max(0.0).cast<int>();
-  const Eigen::Vector3i last =
-      (center + reach).array().floor().min(ct_hu.size.array().cast<double>() - 1.0).cast<int>();
-  double found_mm3 = 0.0;
+  const Eigen::Vector3i last = (center + reach).array().floor().min(size.array().cast<double>() - 1.0).cast<int>();
   for (int k = first.z(); k <= last.z(); ++k)
     for (int j = first.y(); j <= last.y(); ++j)
       for (int i = first.x(); i <= last.x(); ++i)
-        if (ct_hu.at(i, j, k) >= bone_hu &&
-            (Eigen::Vector3d(i, j, k) - center).cwiseProduct(spacing).norm() <= kCarriersNearMm)
-          found_mm3 += spacing.prod();
+        if ((Eigen::Vector3d(i, j, k) - center).cwiseProduct(spacing).norm() <= kCarriersNearMm) work(i, j, k);
+}
+
+// Whether a CT shows bone near a place: as much as a small piece of rib, or a ball. Quicker than finding its bodies,
+// which only bent patients need.
+bool is_bone_near(const Volume<float>& ct_hu, const Eigen::Vector3d& patient_mm) {
+  const double bone_hu = BodyOptions().bone_hu, voxel_mm3 = ct_hu.spacing_mm().prod();
+  double found_mm3 = 0.0;
+  for_voxels_near(ct_hu, patient_mm, [&](int i, int j, int k) {
+    if (ct_hu.at(i, j, k) >= bone_hu) found_mm3 += voxel_mm3;
+  });
   return found_mm3 >= kLeastMm3;
 }
 
@@ -74,17 +80,9 @@ std::vector<bool> hanging_on_spine(const BodyMap& map) {
 // The bodies that come within 20 mm of a point.
 std::set<std::size_t> bodies_near(const BodyMap& map, const Eigen::Vector3d& point_patient_mm) {
   std::set<std::size_t> near;
-  const Volume<std::uint8_t>& labels = map.labels;
-  const Eigen::Vector3d center = labels.patient_from_voxel.inverse() * point_patient_mm;
-  const double reach = kCarriersNearMm / labels.spacing_mm().x();
-  const Eigen::Vector3i first = (center.array() - reach).ceil().max(0.0).cast<int>();
-  const Eigen::Vector3i last =
-      (center.array() + reach).floor().min(labels.size.array().cast<double>() - 1.0).cast<int>();
-  for (int k = first.z(); k <= last.z(); ++k)
-    for (int j = first.y(); j <= last.y(); ++j)
-      for (int i = first.x(); i <= last.x(); ++i)
-        if (const int label = labels.at(i, j, k); label > 0 && (Eigen::Vector3d(i, j, k) - center).norm() <= reach)
-          near.insert(static_cast<std::size_t>(label) - 1);
+  for_voxels_near(map.labels, point_patient_mm, [&](int i, int j, int k) {
+    if (const int label = map.labels.at(i, j, k); label > 0) near.insert(static_cast<std::size_t>(label) - 1);
+  });
   std::erase_if(near, [&](std::size_t body) { return map.bodies[body].kind == Body::Kind::kCouch; });
   return near;
 }
@@ -123,7 +121,6 @@ PointsByBone points_by_bone(const Volume<float>& ct_hu, const BodyMap& map,
 // where nothing is, what most of its surface is near to. Only of a trunk: in a head bones hang together. Vertebrae are
 // looked for first, because they are found quickly and are what most targets lie near.
 std::optional<std::string> doubt_of_bones(const Study& study, const Target& target, BodyStore& bodies) {
-  constexpr std::size_t kVertebraeOfATrunk = 4;
   const Volume<float>& ct_hu = study.ct->hu;
   const std::vector<Vertebra> vertebrae = find_vertebrae(ct_hu, on_patient_axes(ct_hu, BodyOptions().lattice_mm));
   const std::vector<Eigen::Vector3d> points = points_patient_mm(study, target);

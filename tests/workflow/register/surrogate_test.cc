@@ -6,7 +6,6 @@
 #include <gtest/gtest.h>
 
 #include "base/error.h"
-#include "phantom/anatomy.h"
 #include "tests/support/phantom_ct.h"
 #include "tests/support/small_study.h"
 
