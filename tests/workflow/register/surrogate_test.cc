@@ -68,30 +68,38 @@ TEST(Surrogate, SoftTissueAloneIsADoubt) {
   }
 }
 
-// A trunk: vertebrae, ribs and a heart, as planned with the isocenter at the origin.
-Study study_of_thorax() {
+// A trunk: vertebrae, ribs and a heart, as planned with the isocenter at the origin. A part of its length may be
+// cropped.
+Study study_of_thorax(double cropped_mm = 0.0) {
   Study study;
-  study.ct = std::make_shared<const CtSeries>(
-      CtSeries{.hu = PhantomCt{.anatomy = "thorax", .seed = 5, .spacing_mm = {2, 2, 3}}.make()});
+  const PhantomCt thorax{.anatomy = "thorax", .seed = 5, .spacing_mm = {2, 2, 3}, .cropped_mm = {0.0, 0.0, cropped_mm}};
+  study.ct = std::make_shared<const CtSeries>(CtSeries{.hu = thorax.make()});
   study.planned_room_from_patient =
       planned_room_from_patient(PatientPosition::kHfs, study.table, study.isocenter_patient_mm);
   return study;
 }
 
-// Ribs breathe, and shoulder blades go with the arms: the answer of the whole patient is not theirs.
+// Ribs breathe, and shoulder blades go with the arms: the answer of the whole patient is not theirs, also where a short
+// CT shows three vertebrae.
 TEST(Surrogate, RibsAloneAreADoubt) {
-  const Study study = study_of_thorax();
-  BodyStore bodies;
-  const BodyMap& map = *bodies.map(study.ct);
-  const auto at = [&](Body::Kind kind, double side_mm) -> Vector3d {
-    const auto body = std::ranges::find_if(map.bodies, [&](const Body& one) { return one.kind == kind; });
-    return body->center_patient_mm + Vector3d(side_mm, 0.0, 0.0);
-  };
-  const Surrogate by_rib = surrogate_of(study, target_at(study, at(Body::Kind::kRib, 0.0), 5.0), "", bodies);
-  ASSERT_TRUE(by_rib.doubt);
-  EXPECT_THAT(*by_rib.doubt, HasSubstr("hardly more than ribs or bones of the shoulders"));
-  EXPECT_FALSE(surrogate_of(study, target_at(study, at(Body::Kind::kVertebra, 0.0), 5.0), "", bodies).doubt);
-  EXPECT_FALSE(surrogate_of(study, target_at(study, at(Body::Kind::kVertebra, 25.0), 5.0), "", bodies).doubt);
+  for (const double cropped_mm : {0.0, 120.0}) {
+    const Study study = study_of_thorax(cropped_mm);
+    BodyStore bodies;
+    const BodyMap& map = *bodies.map(study.ct);
+    if (cropped_mm > 0.0) {
+      ASSERT_LT(std::ranges::count(map.bodies, Body::Kind::kVertebra, &Body::kind), 4);
+    }
+    const Vector3d vertebra = std::ranges::find(map.bodies, Body::Kind::kVertebra, &Body::kind)->center_patient_mm;
+    const auto aside = std::ranges::max(map.bodies, {}, [&](const Body& one) {
+      return one.kind == Body::Kind::kCouch ? 0.0 : (one.center_patient_mm - vertebra).norm();
+    });
+    const Surrogate by_rib = surrogate_of(study, target_at(study, aside.center_patient_mm, 5.0), "", bodies);
+    ASSERT_TRUE(by_rib.doubt) << cropped_mm;
+    EXPECT_THAT(*by_rib.doubt, HasSubstr("hardly more than ribs, bones of the shoulders"));
+    for (const double side_mm : {0.0, 25.0})
+      EXPECT_FALSE(surrogate_of(study, target_at(study, vertebra + side_mm * Vector3d::UnitX(), 5.0), "", bodies).doubt)
+          << cropped_mm;
+  }
 }
 
 // What is dense beside the ribs of a trunk, and no bone.
