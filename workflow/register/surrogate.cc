@@ -119,8 +119,10 @@ PointsByBone points_by_bone(const Volume<float>& ct_hu, const BodyMap& map,
 
 // Why the dense places near a target may not carry it as the whole patient moves. What is near its center counts, and
 // where nothing is, what most of its surface is near to. Only where the CT shows vertebrae: in a head bones hang
-// together. Vertebrae are looked for first, because they are found quickly and are what most targets lie near. Three of
-// them are enough: on a cropped thorax of three, shoulder blades and collar bones were accepted 18 to 38 mm off.
+// together. Vertebrae are looked for first, because they are found quickly and are what most targets lie near.
+// Of fewer than kVertebraeOfATrunk the bodies are not told apart as ribs and others, so that what touches the spine
+// through a rib counts as hanging on it: shoulder blades and collar bones of such short CTs were accepted 12 to 38 mm
+// off, and still are.
 std::optional<std::string> doubt_of_bones(const Study& study, const Target& target, BodyStore& bodies) {
   const Volume<float>& ct_hu = study.ct->hu;
   const std::vector<Vertebra> vertebrae = find_vertebrae(ct_hu, on_patient_axes(ct_hu, BodyOptions().lattice_mm));
@@ -136,9 +138,8 @@ std::optional<std::string> doubt_of_bones(const Study& study, const Target& targ
         "(it may be contrast agent, calcification or a thin bone), and the site file names no surrogate",
         kCarriersNearMm);
   return fmt::format(
-      "hardly more than ribs, bones of the shoulders or other bones that do not hang on the spine lies within {:.0f} "
-      "mm "
-      "of the target: they move by themselves, and the site file names no surrogate",
+      "hardly more than ribs, bones of the shoulders or other bones that do not hang on the spine lies within "
+      "{:.0f} mm of the target: they move by themselves, and the site file names no surrogate",
       kCarriersNearMm);
 }
 
