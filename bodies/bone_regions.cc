@@ -154,7 +154,6 @@ PatientAndCouch patient_and_couch(const Volume<float>& hu) {
 void remove_contrast_agent(Volume<std::uint8_t>& bone, const Volume<float>& hu,
                            const std::vector<Vertebra>& vertebrae) {
   constexpr float kSurelyMm = 4.0F, kGrownMm = 8.0F;
-  if (vertebrae.size() < kVertebraeOfATrunk) return;  // no trunk: no vessel as thick as a bone
   const ContrastAgent agent = contrast_agent_of(bone, hu, vertebrae);
   if (agent.brightest_hu == 0.0) return;
   const Volume<float> away = distance_mm(agent.cores);

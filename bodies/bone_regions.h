@@ -17,7 +17,7 @@ struct PatientAndCouch {
 PatientAndCouch patient_and_couch(const Volume<float>& hu);
 
 // Removes contrast agent from a mask of bone: large parts without a rim that is brighter than they are inside, and
-// what is no brighter than these. Vertebral bodies stay.
+// what is no brighter than these. Vertebral bodies stay. Precondition: there is a vertebra.
 void remove_contrast_agent(Volume<std::uint8_t>& bone, const Volume<float>& hu, const std::vector<Vertebra>& vertebrae);
 
 // The bone of each vertebra, its arch included: each voxel belongs to the vertebral body that is nearest along bone.

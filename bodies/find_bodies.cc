@@ -38,7 +38,8 @@ class Finder {
     for (std::size_t n = 0; n < bone_.voxels.size(); ++n)
       bone_.voxels[n] = dense.patient.voxels[n] != 0 && hu_.voxels[n] > static_cast<float>(options_.bone_hu) ? 1 : 0;
     const std::vector<Vertebra> vertebrae = find_vertebrae(ct_, hu_);
-    remove_contrast_agent(bone_, hu_, vertebrae);
+    is_trunk_ = is_trunk(vertebrae, hu_);
+    if (is_trunk_) remove_contrast_agent(bone_, hu_, vertebrae);  // elsewhere no vessel is as thick as a bone
     take_drawn(drawn);
     take_vertebrae(vertebrae);
     take_other_bones(vertebrae);
@@ -77,11 +78,13 @@ class Finder {
     }
   }
 
-  // Thin bones beside the spine, from 60 mm below the lowest vertebra to the highest: ribs, and shoulder blades.
+  // Thin bones beside the spine, from 60 mm below the lowest vertebra to the highest, or to the end of a CT without a
+  // head: ribs, shoulder blades and collar bones.
   bool is_rib(const VoxelSet& voxels, const Volume<float>& depth, const std::vector<Vertebra>& vertebrae) const {
     constexpr float kThickMm = 9.0F;
     constexpr double kAsideMm = 25.0, kBelowMm = 60.0;
-    if (vertebrae.size() < kVertebraeOfATrunk) return false;
+    if (!is_trunk_) return false;
+    const bool is_headless = ends_below_head(vertebrae, hu_);
     double aside = 0.0;
     float deepest = 0.0F;
     std::size_t among = 0;
@@ -90,7 +93,7 @@ class Finder {
       deepest = std::max(deepest, depth.voxels[n]);
       aside += std::abs(at.x() - level_of(at, vertebrae).center_patient_mm.x()) / static_cast<double>(voxels.size());
       const bool is_among = at.z() > vertebrae.front().center_patient_mm.z() - kBelowMm &&
-                            at.z() < vertebrae.back().center_patient_mm.z();
+                            (is_headless || at.z() < vertebrae.back().center_patient_mm.z());
       among += is_among ? 1 : 0;
     }
     return deepest < kThickMm && aside > kAsideMm && 2 * among > voxels.size();
@@ -231,6 +234,7 @@ class Finder {
   BodyOptions options_;
   Volume<float> hu_;
   double edge_mm_ = 0.0;
+  bool is_trunk_ = false;
   Volume<std::uint8_t> bone_;  // what no body has taken
   std::vector<Part> parts_;
   int next_bone_ = 0;

@@ -340,4 +340,16 @@ std::vector<Vertebra> find_vertebrae(const Volume<float>& ct_hu, const Volume<fl
   return is_spine ? found : std::vector<Vertebra>();
 }
 
+bool ends_below_head(const std::vector<Vertebra>& vertebrae, const Volume<float>& hu_on_patient_axes) {
+  constexpr double kHeadMm = 60.0;
+  const Eigen::Vector3d last =
+      hu_on_patient_axes.patient_from_voxel * Eigen::Vector3d(0.0, 0.0, hu_on_patient_axes.size.z() - 1.0);
+  return last.z() - vertebrae.back().upper.center_patient_mm.z() < kHeadMm;
+}
+
+bool is_trunk(const std::vector<Vertebra>& vertebrae, const Volume<float>& hu_on_patient_axes) {
+  constexpr std::size_t kSurely = 4;
+  return vertebrae.size() >= kSurely || (!vertebrae.empty() && ends_below_head(vertebrae, hu_on_patient_axes));
+}
+
 }  // namespace isoshift

@@ -22,14 +22,17 @@ struct Vertebra {
   bool is_cut = false;     // by the end of the CT or of the visible spine: its center is told from its neighbors
 };
 
-// A CT that shows as many is one of a trunk: with ribs, vessels and arms, and not of a head.
-inline constexpr std::size_t kVertebraeOfATrunk = 4;
-
 // The vertebra at the level of a point. Precondition: there is one.
 const Vertebra& level_of(const Eigen::Vector3d& at_patient_mm, const std::vector<Vertebra>& vertebrae);
 
 // From the feet to the head; empty if the CT shows fewer than two. `hu_on_patient_axes` is the CT on a lattice of about
 // 2 mm (on_patient_axes()).
 std::vector<Vertebra> find_vertebrae(const Volume<float>& ct_hu, const Volume<float>& hu_on_patient_axes);
+
+// Whether a CT ends so soon above the uppermost vertebra that it shows no head there. Precondition: there is one.
+bool ends_below_head(const std::vector<Vertebra>& vertebrae, const Volume<float>& hu_on_patient_axes);
+
+// Whether a CT shows a trunk, with ribs, vessels and arms: four vertebrae or more, or fewer without a head above.
+bool is_trunk(const std::vector<Vertebra>& vertebrae, const Volume<float>& hu_on_patient_axes);
 
 }  // namespace isoshift

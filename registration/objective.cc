@@ -87,10 +87,10 @@ Objective::Objective(Renderer& renderer, std::span<const FixedImage> images, con
   for (const FixedImage& image : images) {
     const std::vector<std::uint32_t> field = comparable_pixels(image.field, similarity_);
     if (field.size() < kMinPixels)
-      throw Error(
-          fmt::format("view {}: only {} of {} pixels lie in the irradiated field and are neither "
-                      "saturated nor excluded, too few to compare",
-                      views_.size() + 1, field.size(), image.field.pixels.size()));
+      throw Error(fmt::format(
+          "{}: only {} of {} pixels lie in the irradiated field and are neither saturated nor excluded, too "
+          "few to compare",
+          name_of_view(image.label, views_.size()), field.size(), image.field.pixels.size()));
     if (similarity_ != SimilarityKind::kGradientCorrelation) {
       add_view(image, drawn_pixels(field, options, random), about);
       continue;

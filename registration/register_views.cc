@@ -124,9 +124,11 @@ RegistrationResult register_views(const RendererPyramid& renderers, std::span<co
       leave_out_views(renderers, fixed, start_room_from_patient, search_options, found);
   for (std::size_t view = 0; view < left_out.size(); ++view) result.views[view].left_out = left_out[view];
 
-  const std::vector<Contradiction> of_views =
+  Contradictions found_alone =
       contradictions(renderers, fixed, start_room_from_patient, result.actual_room_from_patient, last, options.dof);
-  for (std::size_t view = 0; view < of_views.size(); ++view) result.views[view].contradiction = of_views[view];
+  for (std::size_t view = 0; view < found_alone.of_views.size(); ++view)
+    result.views[view].contradiction = found_alone.of_views[view];
+  result.turn = std::move(found_alone.turn);
 
   result.unobservable_room = unobservable_directions(views);
   judge(found.parameters, options, result);

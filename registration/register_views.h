@@ -44,6 +44,7 @@ struct RegistrationOptions {
 
 struct RegistrationResult : Registration {
   std::vector<ViewMatch> views;
+  TurnBetweenViews turn;
 };
 
 // What of the X-rays is compared, by the options' rectangles and region.

@@ -11,6 +11,7 @@
 #include "registration/bodies/carriers.h"
 #include "registration/bodies/target_match.h"
 #include "registration/bodies/target_search.h"
+#include "registration/bodies/turned_views.h"
 #include "registration/pose_parameters.h"
 #include "registration/quality/judge.h"
 
@@ -250,6 +251,8 @@ void register_bodies(const BentPatient& patient, std::span<const FixedImage> ima
   result.stages.back().reached_limit = result.stages.back().reached_limit && target.left_mm > kConvergedMm;
   report_match(scene, carriers, target, patient.target.center_room_mm, at_one_pose(scene, planned_room_from_patient),
                found.poses, 2.0 * options.stages.back().pixel_mm, result);
+  if (result.turn.is_clear())
+    result.turn.share_of_bodies_gain = share_explained_by_turn(scene, result.turn, found.poses);
   result.bodies = motions_of(patient.parts.bodies, patient.fine.apart, carriers, target, planned_room_from_patient,
                              found.poses, certainty);
   result.structures =

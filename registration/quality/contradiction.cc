@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "geometry/rotation.h"
 #include "geometry/target_error.h"
 #include "registration/objective.h"
 #include "registration/pose_objective.h"
@@ -81,30 +82,77 @@ Eigen::MatrixXd seen_motions(const XrayView& view, const Eigen::Isometry3d& setu
   return motions;
 }
 
+// What one view alone wants, on top of the pose of all.
+struct WantedAlone {
+  Eigen::Vector3d looks_along;
+  std::vector<double> parameters;  // PoseParameters
+  Eigen::MatrixXd covariance;      // of them
+
+  Eigen::Vector3d rotation() const { return Eigen::Map<const Eigen::Vector3d>(parameters.data() + 3); }  // times lever
+  double variance_about(const Eigen::Vector3d& axis) const { return axis.dot(covariance.block<3, 3>(3, 3) * axis); }
+};
+
+std::vector<double> without_translation_along(const Eigen::Vector3d& axis, const std::vector<double>& parameters) {
+  std::vector<double> without = parameters;
+  Eigen::Map<Eigen::Vector3d> translation(without.data());
+  translation -= translation.dot(axis) * axis;
+  return without;
+}
+
+TurnBetweenViews turn_between(const std::vector<WantedAlone>& views, const Eigen::Isometry3d& room_from_patient) {
+  constexpr double kLeastAcross = 1e-6;
+  TurnBetweenViews turn;
+  for (std::size_t a = 0; a < views.size(); ++a)
+    for (std::size_t b = a + 1; b < views.size(); ++b) {
+      const Eigen::Vector3d across = views[a].looks_along.cross(views[b].looks_along);
+      if (across.norm() < kLeastAcross) continue;  // opposed
+      const Eigen::Vector3d axis = across.normalized();
+      const double angle_rad = std::abs(axis.dot(views[a].rotation() - views[b].rotation())) / kLeverMm;
+      if (angle_rad < turn.angle_rad) continue;
+      turn.angle_rad = angle_rad;
+      turn.sigma_rad = std::sqrt(views[a].variance_about(axis) + views[b].variance_about(axis)) / kLeverMm;
+      turn.axis_room = axis;
+    }
+  for (const WantedAlone& view : views)
+    turn.room_from_patient.push_back(
+        setup_error_from_parameters(without_translation_along(turn.axis_room, view.parameters)) * room_from_patient);
+  return turn;
+}
+
 }  // namespace
 
-std::vector<Contradiction> contradictions(const RendererPyramid& renderers, const FixedViews& views,
-                                          const Eigen::Isometry3d& planned_room_from_patient,
-                                          const Eigen::Isometry3d& room_from_patient, const Stage& last_stage,
-                                          Dof dof) {
+bool TurnBetweenViews::is_clear() const {
+  constexpr double kMostRad = rad_from_deg(0.8), kMostSigmas = 3.5;
+  return !(angle_rad <= kMostRad || angle_rad <= kMostSigmas * sigma_rad);
+}
+
+Contradictions contradictions(const RendererPyramid& renderers, const FixedViews& views,
+                              const Eigen::Isometry3d& planned_room_from_patient,
+                              const Eigen::Isometry3d& room_from_patient, const Stage& last_stage, Dof dof) {
   if (views.images.size() < 2) return {};
   constexpr double kPixelMm = 2.0;
   const double pixel_mm = std::max(kPixelMm, last_stage.pixel_mm);
   Renderer& renderer = renderers.with_voxels_up_to(std::max(kPixelMm, last_stage.voxel_mm));
   const Eigen::Isometry3d error = room_from_patient * planned_room_from_patient.inverse();
   const auto targets = static_cast<double>(standard_targets_mm().size());
-  std::vector<Contradiction> result;
+  Contradictions result;
+  std::vector<WantedAlone> alone;
   for (const FixedImage& image : views.reduced_to(pixel_mm, room_from_patient, 0.0)) {
     Objective objective(
         renderer, std::span(&image, 1), room_from_patient,
         {.similarity = SimilarityKind::kGradientCorrelation, .pixel_fraction = 0.5, .min_pixels = 6000});
-    const std::vector<double> alone = wanted_alone(objective, renderer, room_from_patient, dof);
-    const Eigen::MatrixXd motions = seen_motions(image.view, error, alone.size());
-    const Eigen::MatrixXd covariance = pose_covariance(objective, room_from_patient, dof == Dof::kTranslation, kSpring);
-    const Eigen::Map<const Eigen::VectorXd> wanted(alone.data(), static_cast<Eigen::Index>(alone.size()));
-    result.push_back({.mm = (motions * wanted).norm() / std::sqrt(targets),
-                      .sigma_mm = std::sqrt((motions * covariance * motions.transpose()).trace() / targets)});
+    alone.push_back({.looks_along = image.view.central_direction_room(),
+                     .parameters = wanted_alone(objective, renderer, room_from_patient, dof),
+                     .covariance = pose_covariance(objective, room_from_patient, dof == Dof::kTranslation, kSpring)});
+    const WantedAlone& wanted = alone.back();
+    const Eigen::MatrixXd motions = seen_motions(image.view, error, wanted.parameters.size());
+    const Eigen::Map<const Eigen::VectorXd> parameters(wanted.parameters.data(),
+                                                       static_cast<Eigen::Index>(wanted.parameters.size()));
+    result.of_views.push_back(
+        {.mm = (motions * parameters).norm() / std::sqrt(targets),
+         .sigma_mm = std::sqrt((motions * wanted.covariance * motions.transpose()).trace() / targets)});
   }
+  if (dof == Dof::kRigid) result.turn = turn_between(alone, room_from_patient);
   return result;
 }
 

@@ -250,8 +250,9 @@ TEST(RegionOptionsTest, AStructureOfAStudyWithoutAnyIsAnError) {
 
 TEST(RegionOptionsTest, ARectangleNeedsALabelOfAnXrayAndFourNumbers) {
   const SmallStudy study;
-  for (const char* rectangle : {"KV_G000", "KV_G000=1,2,3", "KV_G000=1,2,3,x", "KV_G000=10,10,5,20",
-                                "KV_G000=1,2,30,40,5", "OTHER=10,10,80,80"}) {
+  for (const char* rectangle :
+       {"KV_G000", "KV_G000=1,2,3", "KV_G000=1,2,3,x", "KV_G000=10,10,5,20", "KV_G000=1,2,30,40,5", "OTHER=10,10,80,80",
+        "KV_G000=-5,10,80,80", "KV_G000=10,10,80,4000"}) {
     const CommandOutcome outcome = register_study(study, {"--rectangle", rectangle});
     EXPECT_EQ(outcome.exit_status, 2) << rectangle;
     EXPECT_THAT(outcome.err, HasSubstr(fmt::format("--rectangle {}: ", rectangle)));
@@ -261,7 +262,7 @@ TEST(RegionOptionsTest, ARectangleNeedsALabelOfAnXrayAndFourNumbers) {
 
 TEST(RegionOptionsTest, ADistanceThatIsNoneIsAUsageError) {
   const SmallStudy study;
-  for (const char* distance : {"0", "-5", "nan"})
+  for (const char* distance : {"0", "-5", "nan", "inf", "100000"})
     EXPECT_EQ(register_study(study, {"--around-isocenter", distance}).exit_status, 2) << distance;
 }
 

@@ -143,6 +143,30 @@ TEST(Quality, ViewsThatContradictEachOtherNeedReview) {
       [](RegistrationResult& r) { r.views[0].contradiction = {0.9, 0.4}, r.views[1].contradiction = {0.4, 0.1}; });
 }
 
+TEST(Quality, ViewsThatTurnThePatientAgainstEachOtherNeedReview) {
+  const auto with_turn = [](double degrees, double sigma_degrees) {
+    return [=](RegistrationResult& r) {
+      r.turn = {.angle_rad = rad_from_deg(degrees), .sigma_rad = rad_from_deg(sigma_degrees)};
+    };
+  };
+  expect_review(with_turn(2.0, 0.3), "patient turned, by 2.0 degrees against the other");
+  expect_review(with_turn(std::nan(""), 0.3), "the views contradict each other");
+  expect_accepted(with_turn(0.6, 0.1));
+  expect_accepted(with_turn(2.0, 0.8));
+  // Bones that are free to move explain it better, or do not.
+  const auto with_bodies = [&](double share) {
+    return [=](RegistrationResult& r) {
+      with_turn(2.0, 0.3)(r);
+      r.turn.share_of_bodies_gain = share;
+      r.bodies.assign(2, {.sigma_mm = Eigen::Vector3d::Constant(0.3), .image_share = 0.9});
+      r.target_match = {.of_all = 0.95, .of_parts = 0.94};
+      r.target_image_share = 0.6;
+    };
+  };
+  expect_accepted(with_bodies(0.1));
+  expect_review(with_bodies(0.6), "patient turned, by 2.0 degrees against the other");
+}
+
 TEST(Quality, AnExclusionThatCannotBeKeptNeedsReview) {
   expect_review([](RegistrationResult& r) { r.views[0].has_all_excluded = false; },
                 "what is excluded covers nearly all that view 1 shows");
@@ -396,6 +420,8 @@ TEST(Quality, OpposedViewsSeeNoDepthEither) {
 TEST(Quality, ViewsThirtyDegreesApartSeeAllAxes) {
   const std::array apart = {centered_view(0, 10, 1.0), centered_view(31, 10, 1.0)};
   EXPECT_TRUE(unobservable_directions(apart).empty());
+  const std::array from_both_sides = {centered_view(0, 10, 1.0), centered_view(150, 10, 1.0)};
+  EXPECT_TRUE(unobservable_directions(from_both_sides).empty());
   const std::array close = {centered_view(0, 10, 1.0), centered_view(29, 10, 1.0)};
   EXPECT_EQ(unobservable_directions(close).size(), 1U);
   const std::array around = {centered_view(0, 10, 1.0), centered_view(20, 10, 1.0), centered_view(340, 10, 1.0)};

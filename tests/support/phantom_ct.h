@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "phantom/shapes.h"
+#include "phantom/anatomy.h"
 
 namespace isoshift {
 
@@ -19,13 +19,18 @@ struct PhantomCt {
   double noise_hu = 20.0;
   double curve_mm = 0.0;  // of a scoliosis: the spine is bent sideways by as much
   bool has_screws = false;
+  bool has_shoulders = false;                            // of a thorax
   Eigen::Vector3d cropped_mm = Eigen::Vector3d::Zero();  // from the extent, about its middle
+  Eigen::Vector3d shifted_mm = Eigen::Vector3d::Zero();  // the middle of the extent
 
   static Eigen::Vector3d center() { return {3.0, -8.0, 21.0}; }
 
   std::vector<Shape> shapes() const {
     if (anatomy == "head") return head_phantom(center(), seed);
-    return anatomy == "spine" ? spine_phantom(center(), seed) : thorax_phantom(center(), seed, Eigen::Vector3d::Zero());
+    if (anatomy == "spine") return spine_phantom(center(), seed);
+    PhantomParts thorax = thorax_parts(center(), seed, Eigen::Vector3d::Zero());
+    if (has_shoulders) add_shoulders(thorax, center(), seed);
+    return thorax.shapes;
   }
   double aside_mm(double z) const { return curve_mm * std::sin(0.02 * (z - center().z())); }
 
@@ -49,7 +54,7 @@ struct PhantomCt {
     Eigen::Affine3d lattice = Eigen::Affine3d::Identity();
     lattice.linear() = axes * spacing_mm.asDiagonal();
     lattice.translation() =
-        center() + from_center - 0.5 * (lattice.linear() * (size.array() - 1).cast<double>().matrix());
+        center() + from_center + shifted_mm - 0.5 * (lattice.linear() * (size.array() - 1).cast<double>().matrix());
     std::vector<Shape> all = shapes();
     for (Shape& shape : all) {  // whole shapes move aside
       const Eigen::Vector3d at = shape.unit_from_patient.inverse().translation();

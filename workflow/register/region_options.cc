@@ -57,9 +57,13 @@ RectanglesByLabel RegionOptions::rectangles_of(const Study& study) const {
       throw UsageError(fmt::format(
           "--rectangle {}: expected LABEL=FIRST_COLUMN,FIRST_ROW,LAST_COLUMN,LAST_ROW, in pixels from 0", text));
     const std::string label = text.substr(0, equals);
-    const auto has_label = [&](const XrayImage& xray) { return xray.label == label; };
-    if (std::ranges::none_of(study.xrays, has_label))
+    const auto labeled = std::ranges::find(study.xrays, label, &XrayImage::label);
+    if (labeled == study.xrays.end())
       throw UsageError(fmt::format("--rectangle {}: no X-ray is labeled {}", text, label));
+    const XrayView& view = labeled->view;
+    if (r.first_column < 0 || r.first_row < 0 || r.last_column >= view.columns || r.last_row >= view.rows)
+      throw UsageError(fmt::format("--rectangle {}: it reaches beyond the X-ray, which has {} columns and {} rows",
+                                   text, view.columns, view.rows));
     by_label[label] = r;
   }
   return by_label;
@@ -67,6 +71,7 @@ RectanglesByLabel RegionOptions::rectangles_of(const Study& study) const {
 
 std::vector<std::string> RegionOptions::in_words() const {
   std::vector<std::string> words;
+  words.reserve(structures.size());
   for (const std::string& name : structures)
     words.push_back(fmt::format("structure {}, margin {} mm", name, margin_mm));
   if (around_isocenter_mm) words.push_back(fmt::format("within {} mm of the isocenter", *around_isocenter_mm));
@@ -80,7 +85,14 @@ RegionOfStudy region_of(const RegionOptions& options, const Study& study, double
     throw UsageError(fmt::format("--around-isocenter {}: expected more than 0 mm", *options.around_isocenter_mm));
   RegionOfInterest region;
   RegionOfStudy result;
-  if (options.around_isocenter_mm) region.volume = sphere(study, *options.around_isocenter_mm);
+  if (options.around_isocenter_mm) {
+    region.volume = sphere(study, *options.around_isocenter_mm);
+    if (std::ranges::all_of(region.volume->voxels, [](std::uint8_t inside) { return inside != 0; }))
+      throw UsageError(
+          fmt::format("--around-isocenter {}: the whole CT lies within this distance, which is what is "
+                      "registered without the switch",
+                      *options.around_isocenter_mm));
+  }
   for (const std::string& name : options.structures) {
     const Volume<std::uint8_t> mask = dilated(mask_in_ct(study, name), options.margin_mm);
     if (region.volume)

@@ -17,7 +17,8 @@ struct RegionOptions {
   std::optional<double> around_isocenter_mm;
   double margin_mm = 5.0;
 
-  // The rectangles by label. Throws UsageError for a rectangle that cannot be parsed, or whose label no X-ray has.
+  // The rectangles by label. Throws UsageError for a rectangle that cannot be parsed, whose label no X-ray has, or that
+  // reaches beyond the X-ray.
   RectanglesByLabel rectangles_of(const Study& study) const;
 
   // The region in words; empty if everything is compared.
@@ -30,7 +31,7 @@ struct RegionOfStudy {
   std::optional<Volume<float>> rendered_ct;
   ProjectedRegion projected;
 };
-// Throws UsageError for a radius that is not positive, and Error for a structure the study lacks.
+// Throws UsageError for a radius that is not positive or holds the whole CT, and Error for a structure the study lacks.
 RegionOfStudy region_of(const RegionOptions& options, const Study& study, double threshold_hu);
 
 }  // namespace isoshift

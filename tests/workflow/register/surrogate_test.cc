@@ -6,7 +6,6 @@
 #include <gtest/gtest.h>
 
 #include "base/error.h"
-#include "bodies/vertebrae.h"
 #include "tests/support/phantom_ct.h"
 #include "tests/support/small_study.h"
 
@@ -69,26 +68,28 @@ TEST(Surrogate, SoftTissueAloneIsADoubt) {
   }
 }
 
-// A trunk: vertebrae, ribs and a heart, as planned with the isocenter at the origin. A part of its length may be
-// cropped.
-Study study_of_thorax(double cropped_mm = 0.0) {
+// As planned with the isocenter at the origin.
+Study study_of(const PhantomCt& phantom) {
   Study study;
-  const PhantomCt thorax{.anatomy = "thorax", .seed = 5, .spacing_mm = {2, 2, 3}, .cropped_mm = {0.0, 0.0, cropped_mm}};
-  study.ct = std::make_shared<const CtSeries>(CtSeries{.hu = thorax.make()});
+  study.ct = std::make_shared<const CtSeries>(CtSeries{.hu = phantom.make()});
   study.planned_room_from_patient =
       planned_room_from_patient(PatientPosition::kHfs, study.table, study.isocenter_patient_mm);
   return study;
+}
+
+std::ptrdiff_t vertebrae_in(const BodyMap& map) {
+  return std::ranges::count(map.bodies, Body::Kind::kVertebra, &Body::kind);
 }
 
 // Ribs breathe, and shoulder blades go with the arms: the answer of the whole patient is not theirs, also where a short
 // CT shows three vertebrae.
 TEST(Surrogate, RibsAloneAreADoubt) {
   for (const double cropped_mm : {0.0, 120.0}) {
-    const Study study = study_of_thorax(cropped_mm);
+    const Study study =
+        study_of({.anatomy = "thorax", .seed = 5, .spacing_mm = {2, 2, 3}, .cropped_mm = {0.0, 0.0, cropped_mm}});
     BodyStore bodies;
     const BodyMap& map = *bodies.map(study.ct);
-    const auto vertebrae = std::ranges::count(map.bodies, Body::Kind::kVertebra, &Body::kind);
-    ASSERT_EQ(cropped_mm > 0.0, vertebrae < static_cast<std::ptrdiff_t>(kVertebraeOfATrunk));
+    ASSERT_EQ(cropped_mm > 0.0, vertebrae_in(map) < 4);
     const Vector3d vertebra = std::ranges::find(map.bodies, Body::Kind::kVertebra, &Body::kind)->center_patient_mm;
     const auto aside = std::ranges::max(map.bodies, {}, [&](const Body& one) {
       return one.kind == Body::Kind::kCouch ? 0.0 : (one.center_patient_mm - vertebra).norm();
@@ -102,9 +103,51 @@ TEST(Surrogate, RibsAloneAreADoubt) {
   }
 }
 
+// Collar bones, shoulder blades and the heads of the arms touch ribs, in a short CT as in a long one.
+TEST(Surrogate, ShouldersAreADoubt) {
+  for (const double length_mm : {210.0, 90.0}) {
+    const Study study = study_of({.anatomy = "thorax",
+                                  .seed = 5,
+                                  .spacing_mm = {2, 2, 3},
+                                  .has_shoulders = true,
+                                  .cropped_mm = {0.0, 0.0, 210.0 - length_mm},
+                                  .shifted_mm = {0.0, 0.0, 0.5 * (210.0 - length_mm)}});
+    BodyStore bodies;
+    ASSERT_EQ(length_mm < 210.0, vertebrae_in(*bodies.map(study.ct)) < 4);
+    const Vector3d spine = PhantomCt::center() + Vector3d(65.0, 0.0, 0.0);  // of a thorax, aside of its tumor
+    for (const double side : {-1.0, 1.0})
+      for (const Vector3d& at :
+           {Vector3d(30, -66, 81), Vector3d(72, -52, 88), Vector3d(88, 78, 48), Vector3d(128, 8, 80)}) {
+        const Vector3d shoulder = spine + Vector3d(side * at.x(), at.y(), at.z());
+        EXPECT_TRUE(surrogate_of(study, target_at(study, shoulder, 10.0), "", bodies).doubt)
+            << length_mm << " at " << side << ": " << at.transpose();
+      }
+  }
+}
+
+// The neck of a head CT, in front of its vertebrae and behind them; not the skull, and not the jaw at their height.
+TEST(Surrogate, AShortNeckIsADoubt) {
+  const PhantomCt head{.anatomy = "head", .seed = 5};
+  const Study study = study_of(head);
+  BodyStore bodies;
+  const std::ptrdiff_t count = vertebrae_in(*bodies.map(study.ct));
+  ASSERT_GT(count, 0);
+  ASSERT_LT(count, 4);
+  const Vector3d second = head.vertebrae()[1];
+  for (const double back_mm : {-25.0, 0.0, 26.0, 45.0}) {
+    const Surrogate surrogate =
+        surrogate_of(study, target_at(study, second + back_mm * Vector3d::UnitY(), 10.0), "", bodies);
+    ASSERT_TRUE(surrogate.doubt) << back_mm;
+    EXPECT_THAT(*surrogate.doubt, HasSubstr("the target lies at the neck"));
+  }
+  for (const Vector3d& at : {Vector3d(0, -30, -45), Vector3d(0, 40, -25), Vector3d(0, 4, 85), Vector3d(0, -60, -70)})
+    EXPECT_FALSE(surrogate_of(study, target_at(study, PhantomCt::center() + at, 10.0), "", bodies).doubt)
+        << at.transpose();
+}
+
 // What is dense beside the ribs of a trunk, and no bone.
 TEST(Surrogate, DenseSoftTissueIsNoBone) {
-  Study study = study_of_thorax();
+  Study study = study_of({.anatomy = "thorax", .seed = 5, .spacing_mm = {2, 2, 3}});
   BodyStore bodies;
   const BodyMap map = *bodies.map(study.ct);
   CtSeries ct = *study.ct;

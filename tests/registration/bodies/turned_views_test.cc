@@ -1,0 +1,51 @@
+// A view that was taken at another angle than its file says is told from bodies that moved.
+
+#include "registration/bodies/turned_views.h"
+
+#include <gtest/gtest.h>
+
+#include "geometry/rotation.h"
+#include "tests/support/bent_scene.h"
+
+namespace isoshift {
+namespace {
+
+using Eigen::Vector3d;
+
+// Bodies are searched from the pose of the middle one, which is that of the whole.
+double share_of(const BentScene& scene) {
+  const RenderedBodies rendered = rendered_bodies(scene, scene.bodies);
+  const FixedViews views = scene.views();
+  const BodyScene searched{.bodies = scene.bodies,
+                           .fine = rendered,
+                           .coarse = rendered,
+                           .views = views,
+                           .whole_room_from_patient = scene.truth[1] * scene.planned};
+  const BodySearchOptions options;
+  const BodyPoses found =
+      search_bodies(searched, at_one_pose(searched, searched.whole_room_from_patient), options.stages, options.bound_mm)
+          .poses;
+  const TurnBetweenViews turn{.axis_room = Vector3d::UnitY(),
+                              .room_from_patient = {2, searched.whole_room_from_patient}};
+  return share_explained_by_turn(searched, turn, found);
+}
+
+TEST(TurnedViews, AWrongGantryAngleExplainsWhatBodiesWould) {
+  const MovedGroup still{.translation_mm = {1.0, -2.0, 1.5}};
+  BentScene scene = bent_column({still, still, still});
+  const Eigen::Isometry3d gantry(Eigen::AngleAxisd(rad_from_deg(3.0), Vector3d::UnitY()));
+  scene.images[1].view.pixel_from_room = scene.images[1].view.pixel_from_room * gantry.matrix();
+  scene.images[1].view.source_room_mm = gantry.inverse() * scene.images[1].view.source_room_mm;
+  EXPECT_GT(share_of(scene), 0.5);
+}
+
+// Flexed above, and bent to the side below.
+TEST(TurnedViews, DoNotExplainABentSpine) {
+  EXPECT_LT(share_of(bent_column({{.translation_mm = {-2.0, -2.0, 1.5}, .rotation_deg = {0.0, 0.0, -6.0}},
+                                  {.translation_mm = {1.0, -2.0, 1.5}},
+                                  {.translation_mm = {1.0, -2.0, 5.0}, .rotation_deg = {8.0, 0.0, 0.0}}})),
+            0.3);
+}
+
+}  // namespace
+}  // namespace isoshift
