@@ -45,6 +45,16 @@ RenderedBodies rendered_bodies(const BentScene& scene, const JointedBodies& bodi
           .as_one = make_renderer(RendererKind::kCpu, scene.ct, {}, kOneBeam)};
 }
 
+SearchableScene::SearchableScene(const BentScene& scene, const JointedBodies& bodies,
+                                 const Eigen::Isometry3d& whole_room_from_patient)
+    : rendered_(rendered_bodies(scene, bodies)),
+      views_(scene.views()),
+      scene_{.bodies = bodies,
+             .fine = rendered_,
+             .coarse = rendered_,
+             .views = views_,
+             .whole_room_from_patient = whole_room_from_patient} {}
+
 std::vector<BodyShare> slabs(const Volume<float>& ct, const std::vector<double>& limits_mm, double soft_mm) {
   std::vector<BodyShare> shares(limits_mm.size() + 1, BodyShare(ct.size, ct.patient_from_voxel));
   for (int k = 0; k < ct.size.z(); ++k)

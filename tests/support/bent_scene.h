@@ -33,6 +33,22 @@ BentScene bent_column(const std::vector<MovedGroup>& groups);
 // The scene's CT as bodies.
 RenderedBodies rendered_bodies(const BentScene& scene, const JointedBodies& bodies);
 
+// The scene as searches take it, and what that borrows: all voxels are fine.
+class SearchableScene {
+ public:
+  SearchableScene(const BentScene& scene, const JointedBodies& bodies,
+                  const Eigen::Isometry3d& whole_room_from_patient);
+  SearchableScene(const SearchableScene&) = delete;
+  SearchableScene& operator=(const SearchableScene&) = delete;
+
+  const BodyScene& get() const { return scene_; }
+
+ private:
+  RenderedBodies rendered_;
+  FixedViews views_;
+  BodyScene scene_;
+};
+
 // Shares of slabs along the patient's z that add up to 255: from one to the next over `soft_mm` about each limit.
 std::vector<BodyShare> slabs(const Volume<float>& ct, const std::vector<double>& limits_mm, double soft_mm);
 

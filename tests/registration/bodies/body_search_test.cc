@@ -44,13 +44,8 @@ double error_mm(const BentScene& scene, std::size_t group, const Searched& found
 }
 
 Searched search_from(const BentScene& scene, const Vector3d& offset_mm, const JointedBodies& bodies) {
-  const RenderedBodies rendered = rendered_bodies(scene, bodies);
-  const FixedViews views = scene.views();
-  const BodyScene searched{.bodies = bodies,
-                           .fine = rendered,
-                           .coarse = rendered,
-                           .views = views,
-                           .whole_room_from_patient = Eigen::Translation3d(offset_mm) * scene.planned};
+  const SearchableScene searchable(scene, bodies, Eigen::Translation3d(offset_mm) * scene.planned);
+  const BodyScene& searched = searchable.get();
   const BodySearchOptions options;
   const BodyPoses start = at_one_pose(searched, searched.whole_room_from_patient);
   const BodyPoses poses = search_bodies(searched, start, options.stages, options.bound_mm).poses;

@@ -19,17 +19,11 @@ BentScene column() {
 
 // Around the isocenter, with every body off its true place by as much.
 TargetMatch match_at(const BentScene& scene, const Vector3d& off_room_mm) {
-  const RenderedBodies rendered = rendered_bodies(scene, scene.bodies);
-  const FixedViews views = scene.views();
-  const BodyScene searched{.bodies = scene.bodies,
-                           .fine = rendered,
-                           .coarse = rendered,
-                           .views = views,
-                           .whole_room_from_patient = scene.planned};
+  const SearchableScene searchable(scene, scene.bodies, scene.planned);
   BodyPoses poses;
   for (const Eigen::Isometry3d& truth : scene.truth)
     poses.emplace_back(scene.images.size(), Eigen::Translation3d(off_room_mm) * truth * scene.planned);
-  return match_near_target(searched, Vector3d::Zero(), poses);
+  return match_near_target(searchable.get(), Vector3d::Zero(), poses);
 }
 
 TEST(TargetMatch, TellsTheRightPlaceFromOthers) {

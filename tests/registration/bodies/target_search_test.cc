@@ -34,14 +34,8 @@ struct Column {
 
   // With the whole found too far toward the patient's head.
   TargetSearchResult searched_from(double too_far_mm) const {
-    const RenderedBodies rendered = rendered_bodies(scene, patient.bodies);
-    const FixedViews views = scene.views();
-    const BodyScene searched{.bodies = patient.bodies,
-                             .fine = rendered,
-                             .coarse = rendered,
-                             .views = views,
-                             .whole_room_from_patient = scene.planned * Eigen::Translation3d(0.0, 0.0, too_far_mm)};
-    return search_target(searched, carriers(), {}, {});
+    const SearchableScene searchable(scene, patient.bodies, scene.planned * Eigen::Translation3d(0.0, 0.0, too_far_mm));
+    return search_target(searchable.get(), carriers(), {}, {});
   }
 
   double error_mm(const TargetSearchResult& found) const {

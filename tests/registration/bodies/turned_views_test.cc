@@ -14,13 +14,8 @@ using Eigen::Vector3d;
 
 // Bodies are searched from the pose of the middle one, which is that of the whole.
 double share_of(const BentScene& scene) {
-  const RenderedBodies rendered = rendered_bodies(scene, scene.bodies);
-  const FixedViews views = scene.views();
-  const BodyScene searched{.bodies = scene.bodies,
-                           .fine = rendered,
-                           .coarse = rendered,
-                           .views = views,
-                           .whole_room_from_patient = scene.truth[1] * scene.planned};
+  const SearchableScene searchable(scene, scene.bodies, scene.truth[1] * scene.planned);
+  const BodyScene& searched = searchable.get();
   const BodySearchOptions options;
   const BodyPoses found =
       search_bodies(searched, at_one_pose(searched, searched.whole_room_from_patient), options.stages, options.bound_mm)
