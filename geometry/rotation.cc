@@ -54,4 +54,12 @@ ZxyAngles zxy_from_rotation(const Eigen::Matrix3d& rotation) {
           .y_rad = std::atan2(-rotation(2, 0), rotation(2, 2))};
 }
 
+std::optional<Eigen::Isometry3d> as_rigid(const Eigen::Affine3d& matrix) {
+  const Eigen::Matrix3d r = matrix.linear();
+  if (!((r.transpose() * r - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff() < kRigidTolerance) ||
+      r.determinant() < 0.0 || matrix.matrix().row(3) != Eigen::RowVector4d(0, 0, 0, 1))
+    return std::nullopt;
+  return Eigen::Isometry3d(matrix.matrix());
+}
+
 }  // namespace isoshift

@@ -1,8 +1,9 @@
 #pragma once
 // Right-handed rotations and the one angle order of isoshift, Rz * Rx * Ry (IEC 61217 table: support, pitch, roll).
 
-#include <Eigen/Core>
+#include <Eigen/Geometry>
 #include <numbers>
+#include <optional>
 
 namespace isoshift {
 
@@ -37,5 +38,11 @@ Eigen::Matrix3d rotation_from_zxy(const ZxyAngles& angles);
 
 // The inverse of rotation_from_zxy(): x within [-pi/2, pi/2], z and y within (-pi, pi].
 ZxyAngles zxy_from_rotation(const Eigen::Matrix3d& rotation);
+
+// How far the entries of R'R may lie from those of the identity, since the numbers of a stored rotation R are rounded.
+inline constexpr double kRigidTolerance = 1e-4;
+
+// A matrix as a rigid motion; nothing if it is none.
+std::optional<Eigen::Isometry3d> as_rigid(const Eigen::Affine3d& matrix);
 
 }  // namespace isoshift

@@ -28,6 +28,7 @@ struct RegistrationOptions {
   std::string preset;  // what the stages are called
   std::vector<Stage> stages;
   Dof dof = Dof::kRigid;
+  bool is_searched = true;       // false: the start itself is judged, and needs a review
   double bound_mm = 50.0;        // the search box about the start
   double bound_rad = 0.35;       // the same for rotations, about 20 degrees
   std::uint64_t seed = 1;        // the only source of randomness: same seed, same pose

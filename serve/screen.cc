@@ -6,6 +6,7 @@
 #include <array>
 #include <string_view>
 
+#include "serve/answers.h"
 #include "serve/pages/icon.svg.h"
 #include "serve/pages/room.css.h"
 #include "serve/pages/room.html.h"
@@ -21,51 +22,23 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-struct Page {
-  std::string_view path, type;
-  const char* text;
-  bool is_for_all = false;  // also for those who are not signed in
-};
-constexpr std::string_view kHtml = "text/html; charset=utf-8", kScript = "text/javascript; charset=utf-8";
-constexpr std::array kPages = {Page{"/", kHtml, kRoomHtml},
-                               Page{"/room.js", kScript, kRoomJs},
-                               Page{"/session.js", kScript, kSessionJs},
-                               Page{"/shared.js", kScript, kSharedJs, true},
-                               Page{"/sign-in", kHtml, kSignInHtml, true},
-                               Page{"/sign_in.js", kScript, kSignInJs, true},
-                               Page{"/icon.svg", "image/svg+xml", kIconSvg, true},
-                               Page{"/room.css", "text/css; charset=utf-8", kRoomCss, true}};
+constexpr std::array kRoomPages = {Page{"/", kHtml, kRoomHtml},
+                                   Page{"/room.js", kScript, kRoomJs},
+                                   Page{"/session.js", kScript, kSessionJs},
+                                   Page{"/shared.js", kScript, kSharedJs, true},
+                                   Page{"/sign-in", kHtml, kSignInHtml, true},
+                                   Page{"/sign_in.js", kScript, kSignInJs, true},
+                                   Page{"/icon.svg", kSvg, kIconSvg, true},
+                                   Page{"/room.css", kStyles, kRoomCss, true}};
 constexpr std::chrono::seconds kBeat(4);
 constexpr std::string_view kSessionPage = "/session/", kApi = "/api/", kSessionApi = "/api/sessions/",
                            kEvents = "/api/events";
-
-HttpResponse json(const Json& json, int status = 200) {
-  return {.status = status, .body = json.dump(-1, ' ', false, Json::error_handler_t::replace)};
-}
-HttpResponse refusal(int status, const std::string& why) { return json({{"error", why}}, status); }
-
-HttpResponse see_other(const std::string& place) { return {.status = 303, .headers = {{"Location", place}}}; }
 
 // Of a user of the system or of the proxy: whatever else arrives is not looked up, counted or logged.
 bool is_name(const std::string& user) {
   constexpr std::size_t kLongest = 64;
   return !user.empty() && user.size() <= kLongest &&
          std::ranges::all_of(user, [](unsigned char c) { return c > ' ' && c < 127; });
-}
-
-bool has_type_json(const HttpRequest& request) {
-  return request.header("content-type").starts_with("application/json");
-}
-
-// A session's report brings its own script and styles, and pictures as data. It runs in a frame of the session's page,
-// apart from everything else here.
-HttpResponse report(std::string html) {
-  return {.type = std::string(kHtml),
-          .body = std::move(html),
-          .headers = {{"Content-Security-Policy",
-                       "default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'unsafe-inline'; "
-                       "frame-ancestors 'self'; sandbox allow-scripts"},
-                      {"X-Frame-Options", "SAMEORIGIN"}}};
 }
 
 }  // namespace
@@ -78,8 +51,8 @@ HttpResponse Screen::answer(const HttpRequest& request) {
   auto who = sign_ins_.of(request, is_automatic ? SignIns::Use::kStays : SignIns::Use::kActs);
   if (who && !who->roles.contains(Role::kView)) who.reset();
   if (is_read) {
-    const auto* page = std::ranges::find(kPages, request.path, &Page::path);
-    if (page != kPages.end() && (who || (page->is_for_all && !by_proxy_)))
+    const auto* page = std::ranges::find(kRoomPages, request.path, &Page::path);
+    if (page != kRoomPages.end() && (who || (page->is_for_all && !by_proxy_)))
       return {.type = std::string(page->type), .body = page->text};
     if (who && request.path.starts_with(kSessionPage)) return {.type = std::string(kHtml), .body = kSessionHtml};
   }
@@ -102,7 +75,6 @@ HttpResponse Screen::answer(const HttpRequest& request) {
 }
 
 HttpResponse Screen::sign_in(const HttpRequest& request) {
-  // A form of another site can send no JSON without this program's consent.
   if (!has_type_json(request)) return refusal(415, "JSON is expected.");
   std::string user, password;
   try {
@@ -121,7 +93,7 @@ HttpResponse Screen::sign_in(const HttpRequest& request) {
     return refusal(403, "Name or password is wrong, or this user has no role here.");
   }
   room_.audit("signed in", user);
-  HttpResponse response = json({{"user", user}});
+  HttpResponse response = json_answer({{"user", user}});
   response.headers.emplace_back(
       "Set-Cookie", fmt::format("{}={}; Path=/; HttpOnly; SameSite=Strict{}", sign_in_cookie(request), *attempt.cookie,
                                 request.is_encrypted ? "; Secure" : ""));
@@ -130,7 +102,7 @@ HttpResponse Screen::sign_in(const HttpRequest& request) {
 
 HttpResponse Screen::sign_out(const HttpRequest& request) {
   sign_ins_.sign_out(request);
-  HttpResponse response = json(Json::object());
+  HttpResponse response = json_answer(Json::object());
   response.headers.emplace_back("Set-Cookie", fmt::format("{}=; Path=/; HttpOnly; Max-Age=0{}", sign_in_cookie(request),
                                                           request.is_encrypted ? "; Secure" : ""));
   return response;
@@ -140,13 +112,13 @@ HttpResponse Screen::api(const HttpRequest& request, const SignedIn& who) {
   if (request.method == "GET" && request.path == "/api/me") {
     Json roles = Json::array();
     for (const Role role : who.roles) roles.push_back(to_string(role));
-    return json({{"user", who.user}, {"roles", roles}, {"token", who.token}, {"can_sign_out", !by_proxy_}});
+    return json_answer({{"user", who.user}, {"roles", roles}, {"token", who.token}, {"can_sign_out", !by_proxy_}});
   }
   if (request.method == "GET" && request.path == "/api/room") {
     const auto seen = room_.seen();
     Json list = seen->list;
     list["version"] = seen->version;
-    return json(list);
+    return json_answer(list);
   }
   if (request.method == "GET" && request.path == kEvents) return events(request);
   if (request.path.starts_with(kSessionApi)) {
@@ -163,11 +135,11 @@ HttpResponse Screen::session(const HttpRequest& request, const SignedIn& who, co
     if (what == "release") return release(request, who, name);
     return refusal(404, "There is nothing at this address.");
   }
-  if (what.empty()) return json(room_.session(name));
+  if (what.empty()) return json_answer(room_.session(name));
   if (what != "report.html" && what != "report.pdf") return refusal(404, "There is nothing at this address.");
   std::string content = room_.file(name, what);
   room_.audit("viewed", who.user, name);
-  if (what == "report.html") return report(std::move(content));
+  if (what == "report.html") return report_answer(std::move(content));
   return {.type = "application/pdf", .body = std::move(content)};
 }
 
@@ -184,7 +156,7 @@ HttpResponse Screen::release(const HttpRequest& request, const SignedIn& who, co
     return refusal(400, "record, objection and despite are expected.");
   }
   room_.release(name, seen, who.user, despite);
-  return json({{"released", name}});
+  return json_answer({{"released", name}});
 }
 
 // The version of the list, and a beat that changes every few seconds: a browser that hears nothing has lost the server.

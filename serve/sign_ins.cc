@@ -13,8 +13,6 @@
 namespace isoshift {
 namespace {
 
-constexpr std::chrono::minutes kIdle(30);
-constexpr std::chrono::hours kLongest(12);
 constexpr int kWrongPasswords = 5;  // in a row; then the user waits
 constexpr std::chrono::minutes kWait(1);
 constexpr std::chrono::seconds kPatience(5);
@@ -35,12 +33,12 @@ std::string random_word() {
   return word;
 }
 
-SignIns::SignIns(const ServeFile& serve, const Clock& clock, IsPassword is_password)
-    : serve_(serve), clock_(clock), is_password_(std::move(is_password)) {}
+SignIns::SignIns(const ServeFile& serve, const Clock& clock, IsPassword is_password, const Limits& limits)
+    : serve_(serve), clock_(clock), is_password_(std::move(is_password)), limits_(limits) {}
 
 bool SignIns::is_over(const Open& open) const {
   const Clock::Time now = clock_.now();
-  return now - open.last > kIdle || now - open.since > kLongest;
+  return now - open.last > limits_.idle || now - open.since > limits_.longest;
 }
 
 std::optional<SignedIn> SignIns::by_proxy(const HttpRequest& request) {

@@ -34,8 +34,14 @@ class SignIns {
  public:
   using IsPassword = std::function<bool(const std::string& user, const std::string& password)>;
 
+  // How long who does nothing, and who does something, stays signed in.
+  struct Limits {
+    std::chrono::minutes idle{30}, longest{12 * 60};
+  };
   // `is_password` asks PAM.
-  SignIns(const ServeFile& serve, const Clock& clock, IsPassword is_password);
+  SignIns(const ServeFile& serve, const Clock& clock, IsPassword is_password)
+      : SignIns(serve, clock, std::move(is_password), Limits()) {}
+  SignIns(const ServeFile& serve, const Clock& clock, IsPassword is_password, const Limits& limits);
 
   // Nobody for a request of somebody who is not signed in, or has no role. kStays: an open page asks by itself, and its
   // user may have left: that does not put off the end.
@@ -66,6 +72,7 @@ class SignIns {
   const ServeFile& serve_;
   const Clock& clock_;
   IsPassword is_password_;
+  Limits limits_;
   std::mutex mutex_;
   std::timed_mutex checking_;
   std::map<std::string, Open> open_;           // by the SHA-256 of the cookie: what is kept here opens nothing

@@ -14,6 +14,7 @@
 #include "setup/identity.h"
 #include "setup/registration.h"
 #include "setup/site_rules.h"
+#include "setup/start.h"
 #include "setup/target.h"
 #include "setup/view_picture.h"
 
@@ -56,6 +57,8 @@ struct SetupResult : Registration {
   std::optional<Target> target;  // nothing: made by a version of isoshift that did not look for it
   Eigen::Isometry3d setup_error = Eigen::Isometry3d::Identity();
   bool translation_only = false;
+  std::optional<Start> start;  // nothing: the planned pose
+  bool is_searched = true;     // false: the pose is that of the start, and was only judged
 
   std::vector<View> views;
   std::string preset = "setup";

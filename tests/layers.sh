@@ -48,7 +48,7 @@ may_include io/objects base geometry setup io/dicom io/config io/study
 may_include io/report base geometry setup io/dicom io/config io/study io/objects
 may_include registration base geometry bodies setup drr
 may_include workflow base geometry bodies setup drr io registration
-may_include serve base io/config io/report setup workflow
+may_include serve base geometry io/config io/report setup workflow
 may_include phantom base geometry setup io/dicom
 may_include cli base geometry bodies setup drr io registration workflow serve phantom
 # The campaign reads and writes DICOM with isoshift and has a geometry of its own.

@@ -10,6 +10,7 @@
 #include "base/output_folder.h"
 #include "cli/commands/commands.h"
 #include "cli/commands/register_command.h"
+#include "cli/switches/options_as_typed.h"
 #include "cli/switches/registration_switches.h"
 #include "cli/switches/study_switches.h"
 #include "workflow/batch/batch.h"
@@ -27,17 +28,6 @@ struct BatchFlags {
 
 // The options that say which cases of a batch run, and how the outcome is printed.
 const std::set<std::string> kOfOneRun = {"cases", "output", "jobs", "shard", "merge", "slurm", "scan", "json", "help"};
-
-std::vector<std::string> kept_options(const CLI::App& command) {
-  std::vector<std::string> kept;
-  for (const CLI::Option* option : command.get_options()) {
-    const std::string name = option->get_single_name();
-    if (option->count() == 0 || kOfOneRun.contains(name)) continue;
-    for (const std::string& result : option->results())
-      kept.push_back(option->get_expected_max() == 0 ? "--" + name : fmt::format("--{}={}", name, result));
-  }
-  return kept;
-}
 
 Shard shard_from(const std::string& text) {
   Shard shard;
@@ -139,7 +129,7 @@ void add_batch_command(CLI::App& app, Console& console, int& exit_status) {
   add_registration_switches(*command, options.each.registration);
   command->callback([flags, command, &console, &exit_status] {
     flags->batch.each.registration.settle();
-    flags->batch.kept = kept_options(*command);
+    flags->batch.kept = options_as_typed(*command, kOfOneRun);
     exit_status = run_batch(*flags, console);
   });
 }

@@ -126,6 +126,15 @@ void add_register_command(CLI::App& app, Console& console, int& exit_status) {
   command->add_option("-o,--output", options->output, "Folder for the results")->required()->type_name("FOLDER");
   command->add_option("--truth", *truth, "truth.json of a phantom study, to print beside the result")
       ->type_name("FILE");
+  command
+      ->add_option(
+          "--start", options->start,
+          "Search from the setup error in this file instead of the planned pose: a result.json, truth.json, or "
+          "a pose set by hand")
+      ->type_name("FILE");
+  command->add_flag_callback(
+      "--no-search", [options] { options->registration.search.is_searched = false; },
+      "Judge the pose of --start, or the planned one, and search none");
   add_result_options(*command, *options);
   command->add_flag("--overwrite", options->overwrite, "Replace an earlier output in that folder");
   command->add_flag("--json", *as_json, "Print result.json instead of the report");

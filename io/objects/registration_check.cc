@@ -8,6 +8,7 @@
 #include <set>
 
 #include "base/error.h"
+#include "geometry/rotation.h"
 #include "io/objects/object_header.h"
 #include "io/objects/spatial_registration.h"
 

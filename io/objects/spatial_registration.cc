@@ -8,6 +8,7 @@
 #include <optional>
 
 #include "base/error.h"
+#include "geometry/rotation.h"
 #include "io/objects/object_header.h"
 
 namespace isoshift {
@@ -217,14 +218,6 @@ DicomFile open_spatial_registration(const std::filesystem::path& path) {
     throw Error(fmt::format("{}: {} is {}, expected Spatial Registration Storage", path.string(),
                             described(DCM_SOPClassUID), sop_class));
   return file;
-}
-
-std::optional<Eigen::Isometry3d> as_rigid(const Eigen::Affine3d& matrix) {
-  const Eigen::Matrix3d r = matrix.linear();
-  if (!((r.transpose() * r - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff() < kRigidTolerance) ||
-      r.determinant() < 0.0 || matrix.matrix().row(3) != Eigen::RowVector4d(0, 0, 0, 1))
-    return std::nullopt;
-  return Eigen::Isometry3d(matrix.matrix());
 }
 
 SpatialRegistration read_spatial_registration(const std::filesystem::path& path) {

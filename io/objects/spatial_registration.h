@@ -44,12 +44,6 @@ std::string write_spatial_registration(const Study& study, const Eigen::Isometry
 // A Spatial Registration object of any program. Throws Error for anything else.
 DicomFile open_spatial_registration(const std::filesystem::path& path);
 
-// How far the entries of R'R may lie from those of the identity, since the numbers of a stored rotation R are rounded.
-inline constexpr double kRigidTolerance = 1e-4;
-
-// A matrix as a rigid motion; nothing if it is none.
-std::optional<Eigen::Isometry3d> as_rigid(const Eigen::Affine3d& matrix);
-
 // The part of a Spatial Registration that positions patients: per item the source frame and the composed matrix.
 struct SpatialRegistration {
   struct Item {

@@ -28,21 +28,36 @@ Json array_of(const Vector& values) {
   return array;
 }
 
-Json setup_error_json(const SetupResult& report, const ShownShift& shown) {
+Json rotation_json(const Eigen::Isometry3d& motion) {
   Json rows = Json::array();
-  for (int row = 0; row < 3; ++row) rows.push_back(array_of(Eigen::RowVector3d(report.setup_error.linear().row(row))));
+  for (int row = 0; row < 3; ++row) rows.push_back(array_of(Eigen::RowVector3d(motion.linear().row(row))));
+  return rows;
+}
+
+Json setup_error_json(const SetupResult& report, const ShownShift& shown) {
   Json translation = Json::array();
   for (const auto& component : shown.setup_error_mm) translation.push_back(or_null(component));
   return {{"frame", "IEC 61217 fixed"},
           {"about", "isocenter"},
           {"translation_mm", translation},
           {"known_translation_mm", array_of(Eigen::Vector3d(known_setup_error(report).translation()))},
-          {"rotation_matrix", rows},
+          {"rotation_matrix", rotation_json(report.setup_error)},
           {"rotation_deg",
            {{"order", "Rz*Rx*Ry"},
             {"rx", shown.setup_error_deg[0]},
             {"ry", shown.setup_error_deg[1]},
             {"rz", shown.setup_error_deg[2]}}}};
+}
+
+Json start_json(const SetupResult& report) {
+  if (!report.start) return nullptr;
+  const Start& start = *report.start;
+  return {{"setup_error",
+           {{"translation_mm", array_of(Eigen::Vector3d(start.setup_error.translation()))},
+            {"rotation_matrix", rotation_json(start.setup_error)}}},
+          {"file", start.file},
+          {"sha256", start.sha256},
+          {"set_by", or_null(start.set_by)}};
 }
 
 Json couch_shift_json(const ShownShift& shown) {
@@ -314,6 +329,8 @@ std::string json_report(const SetupResult& report) {
                {"stages", Json::array()},
                {"preset", report.preset},
                {"dof", report.translation_only ? "translation" : "rigid"},
+               {"start", start_json(report)},
+               {"searched", report.is_searched},
                {"seed", report.seed},
                {"attenuation", report.attenuation},
                {"threshold_hu", report.threshold_hu},

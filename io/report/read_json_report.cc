@@ -29,6 +29,20 @@ double or_nan(const Json& json) { return number_from(json).value_or(std::numeric
 
 std::string text_from(const Json& json) { return json.is_null() ? "" : json.get<std::string>(); }
 
+Eigen::Matrix3d rotation_from(const Json& rows) {
+  Eigen::Matrix3d rotation;
+  for (std::size_t row = 0; row < 3; ++row) rotation.row(static_cast<Eigen::Index>(row)) = vector_from<3>(rows.at(row));
+  return rotation;
+}
+
+Start start_from(const Json& json) {
+  Start start{.file = json.at("file"), .sha256 = json.at("sha256"), .set_by = text_from(json.at("set_by"))};
+  const Json& error = json.at("setup_error");
+  start.setup_error.translation() = vector_from<3>(error.at("translation_mm"));
+  start.setup_error.linear() = rotation_from(error.at("rotation_matrix"));
+  return start;
+}
+
 std::vector<Polygon> polygons_from(const Json& json) {
   std::vector<Polygon> polygons;
   for (const Json& points : json) {
@@ -262,14 +276,15 @@ SetupResult report_from(const Json& json) {
   }
   const Json& error = json.at("setup_error");
   report.setup_error.translation() = vector_from<3>(error.at("known_translation_mm"));
-  for (std::size_t row = 0; row < 3; ++row)
-    report.setup_error.linear().row(static_cast<Eigen::Index>(row)) =
-        vector_from<3>(error.at("rotation_matrix").at(row));
+  report.setup_error.linear() = rotation_from(error.at("rotation_matrix"));
   const Json& uncertainty = json.at("uncertainty");
   for (const Json& direction : uncertainty.at("unobservable"))
     report.unobservable_room.push_back(vector_from<3>(direction));
   report.uncertainty = uncertainty_from(uncertainty);
   report.translation_only = json.at("dof") == "translation";
+  // Results of before 2026-11-25 do not say: they began at the planned pose, and were searched.
+  if (const Json start = json.value("start", Json()); !start.is_null()) report.start = start_from(start);
+  report.is_searched = json.value("searched", true);
   for (const Json& view : json.at("views")) report.views.push_back(view_from(view));
   for (const Json& stage : json.at("stages")) report.stages.push_back(stage_from(stage));
   for (const Json& alternative : json.at("alternatives"))

@@ -104,6 +104,15 @@ std::string described_view(const SetupResult::View& view) {
                  view.origin.empty() ? "" : "angles " + printable(view.origin)});
 }
 
+// Empty where the pose was searched from the planned one.
+std::string start_words(const SetupResult& report) {
+  if (!report.start) return report.is_searched ? "" : "as planned, NOT SEARCHED";
+  const Start& start = *report.start;
+  const std::string from =
+      start.set_by.empty() ? "taken from " + printable(start.file) : "set by hand by " + printable(start.set_by);
+  return report.is_searched ? "searched from a start " + from : from + ", NOT SEARCHED";
+}
+
 std::vector<ReportPage::Row> who(const SetupResult& report, const std::string& bent) {
   const Identity& patient = report.identity;
   std::vector<ReportPage::Row> rows;
@@ -125,6 +134,7 @@ std::vector<ReportPage::Row> who(const SetupResult& report, const std::string& b
                                           deg_from_rad(report.table.yaw_rad()))});
   for (std::size_t n = 0; n < report.views.size(); ++n)
     rows.push_back({fmt::format("X-ray {}", n + 1), described_view(report.views[n])});
+  if (const std::string words = start_words(report); !words.empty()) rows.push_back({"Pose", words});
   if (report.machine) rows.push_back({"Machine", fmt::format("profile \"{}\"", printable(report.machine->name))});
   if (report.site) rows.push_back({"Site", printable(report.site->name)});
   rows.push_back({"Made on", report.made_on});

@@ -67,9 +67,14 @@ ReportPage::Section left_over_section(const ReportPage& page) {
 
 ReportPage::Section search_section(const SetupResult& report) {
   ReportPage::Section section{.title = "Search"};
-  section.rows.push_back({"Preset", fmt::format("{}, seed {}, {}", report.preset, report.seed,
-                                                report.translation_only ? "translations only: rotations were taken as 0"
-                                                                        : "six degrees of freedom")});
+  section.rows.push_back(
+      {"Preset", fmt::format("{}, seed {}, {}", report.preset, report.seed,
+                             !report.is_searched       ? "not searched"
+                             : report.translation_only ? "translations only: rotations were taken as 0"
+                                                       : "six degrees of freedom")});
+  if (report.start)
+    section.rows.push_back(
+        {"Start", fmt::format("{}, SHA-256 {}", printable(report.start->file), printable(report.start->sha256))});
   section.rows.push_back(
       {"Region", report.region.empty() ? "everything" : printable(fmt::format("{}", fmt::join(report.region, "; ")))});
   for (const StageReport& stage : report.stages)
@@ -104,10 +109,10 @@ ReportPage::Section checks_section(const SetupResult& report) {
   ReportPage::Section section{.title = "Checks"};
   for (const SetupResult::View& view : report.views) {
     std::string words =
-        fmt::format("similarity {:.4f} as planned, {:.4f} as found; {}{} of {} parts with signal match elsewhere",
-                    view.match.similarity_start, view.match.similarity_final,
-                    report.bodies.empty() ? "" : "of the patient as a whole ", view.match.consistency.disagreeing(),
-                    view.match.consistency.with_signal());
+        fmt::format("similarity {:.4f} {}, {:.4f} as found; {}{} of {} parts with signal match elsewhere",
+                    view.match.similarity_start, report.start ? "at the start" : "as planned",
+                    view.match.similarity_final, report.bodies.empty() ? "" : "of the patient as a whole ",
+                    view.match.consistency.disagreeing(), view.match.consistency.with_signal());
     if (const auto& left_out = view.match.left_out)
       words += fmt::format("; without it the pose moves {:.2f} mm, {:.2f} deg", left_out->distance_mm,
                            deg_from_rad(left_out->angle_rad));

@@ -6,11 +6,15 @@
 namespace isoshift {
 namespace {
 
-// Gray value 0..1 of line integrals between the 1st and the 99.5th percentile.
+// The line integrals that are black and white.
 struct Scale {
-  double low = 0.0, high = 1.0;
-  double operator()(double value) const { return std::clamp((value - low) / (high - low), 0.0, 1.0); }
+  double black, white;
 };
+
+// From black, 0, to white, 1.
+double shade(const Scale& scale, double value) {
+  return std::clamp((value - scale.black) / (scale.white - scale.black), 0.0, 1.0);
+}
 
 Scale scale_of(std::vector<float> values) {
   const auto at_share = [&](double share) {
@@ -18,8 +22,8 @@ Scale scale_of(std::vector<float> values) {
     std::ranges::nth_element(values, nth);
     return static_cast<double>(*nth);
   };
-  const double low = at_share(0.01);
-  return {.low = low, .high = std::max(at_share(0.995), low + 1e-6)};
+  const double black = at_share(0.01);
+  return {.black = black, .white = std::max(at_share(0.995), black + 1e-6)};
 }
 
 std::vector<float> pixels_in_field(const Image<float>& image, const Image<std::uint8_t>& field) {
@@ -55,7 +59,7 @@ Image<std::uint8_t> grays(const Image<float>& image, const Line& line, const Sca
   Image<std::uint8_t> result(image.columns, image.rows);
   for (std::size_t n = 0; n < image.pixels.size(); ++n)
     result.pixels[n] = static_cast<std::uint8_t>(std::lround(255.0 * (field.pixels[n] != 0 ? 1.0 : kDimmed) *
-                                                             scale(line.slope * image.pixels[n] + line.offset)));
+                                                             shade(scale, line.slope * image.pixels[n] + line.offset)));
   return result;
 }
 
@@ -69,6 +73,45 @@ void put_grays(ViewPicture& picture, const Image<float>& xray, const Image<float
   picture.xray = grays(xray, as_is, scale, field);
   picture.drr_planned = grays(drr_planned, line, scale, field);
   picture.drr_found = grays(drr_found, line, scale, field);
+}
+
+GrayScale GrayScale::of(const Image<float>& line_integral, const Image<std::uint8_t>& field) {
+  const Scale scale = scale_of(pixels_in_field(line_integral, field));
+  GrayScale result;
+  result.low_ = scale.black;
+  result.high_ = scale.white;
+  for (std::size_t n = 0; n < kSteps; ++n) result.grays_[n] = static_cast<std::uint8_t>(255 * n / (kSteps - 1));
+  return result;
+}
+
+GrayScale GrayScale::like(const Image<float>& drr, const Image<std::uint8_t>& xray, const Image<std::uint8_t>& field) {
+  std::vector<float> values = pixels_in_field(drr, field);
+  std::vector<std::uint8_t> grays;
+  for (std::size_t n = 0; n < xray.pixels.size(); ++n)
+    if (field.pixels[n] != 0) grays.push_back(xray.pixels[n]);
+  if (grays.empty()) grays = xray.pixels;
+  std::ranges::sort(values);
+  std::ranges::sort(grays);
+  GrayScale result;
+  result.low_ = values.front();
+  result.high_ = std::max(values.back(), values.front() + 1e-6F);
+  for (std::size_t n = 0; n < kSteps; ++n) {
+    const auto value =
+        static_cast<float>(result.low_ + (result.high_ - result.low_) * static_cast<double>(n) / (kSteps - 1));
+    const auto darker = static_cast<std::size_t>(std::ranges::upper_bound(values, value) - values.begin());
+    result.grays_[n] = grays[std::min(darker, grays.size() - 1)];
+  }
+  return result;
+}
+
+Image<std::uint8_t> GrayScale::operator()(const Image<float>& line_integral) const {
+  Image<std::uint8_t> picture(line_integral.columns, line_integral.rows);
+  const double steps_per_unit = (kSteps - 1) / (high_ - low_);
+  std::ranges::transform(line_integral.pixels, picture.pixels.begin(), [&](float value) {
+    const double step = std::clamp((value - low_) * steps_per_unit, 0.0, static_cast<double>(kSteps - 1));
+    return grays_[static_cast<std::size_t>(std::lround(step))];
+  });
+  return picture;
 }
 
 Image<std::uint8_t> radiograph(const Image<float>& line_integral) {

@@ -10,6 +10,23 @@
 
 namespace isoshift {
 
+// A gray for every line integral, made once for many pictures.
+class GrayScale {
+ public:
+  // Black at the 1st and white at the 99.5th percentile of what lies in the field (1 inside; all if it is empty).
+  static GrayScale of(const Image<float>& line_integral, const Image<std::uint8_t>& field);
+  // DRRs in the grays of their X-ray, of the same size: the share of the field that is darker than a gray is the same
+  // in both. So X-rays that are hardened and scattered look as DRRs do, wherever the patient lies.
+  static GrayScale like(const Image<float>& drr, const Image<std::uint8_t>& xray, const Image<std::uint8_t>& field);
+
+  Image<std::uint8_t> operator()(const Image<float>& line_integral) const;
+
+ private:
+  static constexpr std::size_t kSteps = 1024;
+  double low_ = 0.0, high_ = 1.0;
+  std::array<std::uint8_t, kSteps> grays_{};  // from low to high
+};
+
 // The line integrals of X-ray, DRR as planned and DRR as found, all of one size, as gray values. The DRRs are brought
 // to the X-ray's scale by one straight line, fitted in the field (1 inside) at the pose found.
 void put_grays(ViewPicture& picture, const Image<float>& xray, const Image<float>& drr_planned,

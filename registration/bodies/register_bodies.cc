@@ -160,7 +160,8 @@ RenderedBodies rendered(const Volume<float>& ct_hu, const AttenuationModel& atte
 // Whether nothing but the whole image was chosen, and all six degrees of freedom were searched and checked.
 bool can_bodies_answer(const RegistrationOptions& options, const RegistrationResult& whole) {
   const bool is_whole = options.region == nullptr || !options.region->has_volume();
-  return is_whole && options.dof == Dof::kRigid && options.check_alternatives && whole.unobservable_room.empty();
+  return is_whole && options.is_searched && options.dof == Dof::kRigid && options.check_alternatives &&
+         whole.unobservable_room.empty();
 }
 
 // Whether parts of every view near the target have a signal and match where the whole puts them. Jaws that had opened

@@ -62,6 +62,10 @@ double parts_that_may_disagree(int parts, bool is_volume_chosen) {
 void review(RegistrationResult& result, std::string reason) { result.demote(Verdict::kReview, std::move(reason)); }
 
 void judge_search(std::span<const double> parameters, const RegistrationOptions& options, RegistrationResult& result) {
+  if (!options.is_searched) {
+    review(result, "the pose was set, not searched");
+    return;
+  }
   for (std::size_t axis = 0; axis < parameters.size(); ++axis) {
     const double bound = axis < 3 ? options.bound_mm : options.bound_rad * kLeverMm;
     if (std::abs(parameters[axis]) >= kAtBoundShare * bound)
@@ -258,7 +262,7 @@ void judge(std::span<const double> parameters, const RegistrationOptions& option
   judge_uncertainty(target_found_room_mm(options, result), result);
   if (!result.bodies.empty()) judge_bodies(result);
   judge_alternatives(result);
-  if (!options.check_alternatives)
+  if (options.is_searched && !options.check_alternatives)
     review(result, "the preset leaves out the check for mirrored, turned and exchanged images");
   // On the phantom of the demo, where ray casters end 0.1 mm beside the truth, splatting ended 1.4 mm beside it: its
   // noise belongs to the voxels, moves with them, and carries its own gradients into the last stage.

@@ -1,5 +1,5 @@
 // The list of sessions. An update changes rows only: filter, sort, scroll and focus stay as a person has set them.
-import {element, follow, get, make, nameForPeople, signedIn, verdictCell} from "/shared.js";
+import {element, follow, get, make, nameForPeople, showSignedIn, verdictCell} from "/shared.js";
 
 const kColumns = [["patient", "Patient"], ["acquired", "Acquired"], ["verdict", "Verdict"], ["action", "Action"],
                   ["state", "State"], ["session", "Session"]];
@@ -72,7 +72,7 @@ for (const [column, name] of kColumns) {
 }
 element("filter").addEventListener("input", show);
 
-await signedIn();
+await showSignedIn();
 let isAsking = false;
 follow(async now => {
   if (now.version === list.version || isAsking) return;

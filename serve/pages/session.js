@@ -1,5 +1,5 @@
 // A session: its report, what speaks against it, and the release of what is on the screen.
-import {element, follow, get, nameForPeople, post, signedIn, verdictCell} from "/shared.js";
+import {element, follow, get, nameForPeople, post, showSignedIn, verdictCell} from "/shared.js";
 
 const session = decodeURIComponent(location.pathname.split("/").pop());
 const address = "/api/sessions/" + encodeURIComponent(session);
@@ -65,7 +65,7 @@ element("release").addEventListener("click", async () => {
 
 element("name").textContent = session;
 element("pdf").href = address + "/report.pdf";
-me = await signedIn();
+me = await showSignedIn();
 await update();
 element("report").src = address + "/report.html";
 let version = null, isAsking = false;

@@ -32,10 +32,27 @@ export const post = async (path, body) => answered(await fetch(path, {
   body: JSON.stringify(body)
 }));
 
-// Shows who is signed in, and returns that.
+// Bytes, and the headers that came with them; of a POST if there is a body.
+export async function bytes(path, body) {
+  const response = await fetch(path, body === undefined ? {} : {
+    method: "POST",
+    headers: {"Content-Type": "application/json", "X-Isoshift-Token": token},
+    body: JSON.stringify(body)
+  });
+  if (!response.ok) await answered(response);
+  return {data: new Uint8Array(await response.arrayBuffer()), headers: response.headers};
+}
+
+// Learns who is signed in, and returns that.
 export async function signedIn() {
   const me = await get("/api/me");
   token = me.token;
+  return me;
+}
+
+// The same, shown in the page's head.
+export async function showSignedIn() {
+  const me = await signedIn();
   element("user").textContent = me.user + " (" + me.roles.join(", ") + ")";
   const out = element("sign-out");
   out.hidden = !me.can_sign_out;

@@ -85,6 +85,75 @@ TEST_F(RegisterCommandTest, WhatNobodyMeasuredIsWrittenAsZeroOnlyOnRequest) {
   EXPECT_NEAR(shift["lateral_mm"], result()["couch_shift"]["lateral_mm"], 1e-6);
 }
 
+// A pose in a file, as a person has set it.
+void write_pose(const std::filesystem::path& file, const Eigen::Isometry3d& setup_error) {
+  const auto& r = setup_error.linear();
+  const auto& t = setup_error.translation();
+  const auto row = [&](int n) { return std::array{r(n, 0), r(n, 1), r(n, 2)}; };
+  std::ofstream(file) << nlohmann::json{
+      {"setup_error",
+       {{"translation_mm", std::array{t.x(), t.y(), t.z()}}, {"rotation_matrix", std::array{row(0), row(1), row(2)}}}},
+      {"set_by", "jdoe"}};
+}
+
+TEST_F(RegisterCommandTest, APoseSetByHandSaysSoEverywhereAndIsForReview) {
+  const std::filesystem::path pose = study_.path() / "pose.json";
+  const Eigen::Isometry3d truth = read_setup_error(study_.truth());
+  write_pose(pose, truth);
+  const CommandOutcome outcome =
+      register_study(study_, {"--start", pose.string(), "--no-search", "--write-reg-for-review"});
+  EXPECT_EQ(outcome.exit_status, 3) << outcome.err;
+  EXPECT_THAT(read_setup_error(study_.output() / "result.json"), PoseNear(truth, 1e-6, 1e-6));
+  EXPECT_THAT(outcome.out, HasSubstr("set by hand by jdoe, NOT SEARCHED"));
+  EXPECT_THAT(outcome.out, HasSubstr("the pose was set, not searched"));
+  EXPECT_EQ(result()["searched"], false);
+  EXPECT_EQ(result()["start"]["set_by"], "jdoe");
+  const DicomFile file = DicomFile::read(study_.output() / "spatial_registration.dcm", DicomFile::Extent::kWhole);
+  EXPECT_EQ(file.dataset().text(DCM_ContentLabel), "SETUP_BY_HAND");
+  EXPECT_EQ(file.dataset().text(DCM_ContentDescription), "SET BY HAND: REVIEW");
+}
+
+TEST_F(RegisterCommandTest, ASearchBeginsWhereTheFileSays) {
+  const CommandOutcome first = register_study(study_);
+  const std::filesystem::path pose = study_.path() / "pose.json";
+  Eigen::Isometry3d near = Eigen::Isometry3d::Identity();
+  near.translation() = Eigen::Vector3d(3.0, 2.0, -4.0);
+  write_pose(pose, near * read_setup_error(study_.truth()));
+  const CommandOutcome outcome = register_study(study_, {"--start", pose.string(), "--overwrite"});
+  EXPECT_EQ(outcome.exit_status, first.exit_status) << outcome.out;
+  EXPECT_THAT(outcome.out, HasSubstr("searched from a start set by hand by jdoe"));
+  EXPECT_THAT(read_setup_error(study_.output() / "result.json"), PoseNear(read_setup_error(study_.truth()), 0.5, 0.5));
+  // A result is a start, too.
+  const std::filesystem::path before = study_.path() / "before.json";
+  std::filesystem::copy_file(study_.output() / "result.json", before);
+  EXPECT_EQ(register_study(study_, {"--start", before.string(), "--overwrite"}).exit_status, first.exit_status);
+  EXPECT_TRUE(result()["start"]["set_by"].is_null());
+  EXPECT_EQ(result()["start"]["file"], "before.json");
+}
+
+TEST_F(RegisterCommandTest, AStartThatCannotBeOneIsRefused) {
+  const std::filesystem::path pose = study_.path() / "pose.json";
+  const auto refusal = [&](const std::string& text) {
+    std::ofstream(pose) << text;
+    const CommandOutcome outcome = register_study(study_, {"--start", pose.string()});
+    EXPECT_EQ(outcome.exit_status, 1) << text;
+    EXPECT_FALSE(std::filesystem::exists(study_.output())) << text;
+    EXPECT_THAT(outcome.err, HasSubstr(pose.string()));
+    return outcome.err;
+  };
+  const std::string about = R"("setup_error": {"translation_mm": [1, 2, 3], "rotation_matrix": )",
+                    straight = "[[1, 0, 0], [0, 1, 0], [0, 0, 1]]}";
+  EXPECT_THAT(refusal("{}"), HasSubstr("holds no complete setup error"));
+  EXPECT_THAT(refusal("no JSON"), HasSubstr("is not valid JSON"));
+  EXPECT_THAT(refusal("{" + about + "[[1, 0, 0], [0, 1, 0], [0, 0, -1]]}}"), HasSubstr("is no rotation"));
+  EXPECT_THAT(refusal("{" + about + straight + R"(, "patient": {"patient_id": "Smith"}})"),
+              HasSubstr("is of the patient \"Smith\""));
+  EXPECT_THAT(refusal("{" + about + straight + R"(, "isocenter_patient_mm": [1, 2, 3]})"),
+              HasSubstr("its isocenter is (1.00, 2.00, 3.00)"));
+  EXPECT_THAT(refusal("{" + about + straight + R"(, "set_by": 3})"), HasSubstr("pose set by hand"));
+  EXPECT_EQ(register_study(study_, {"--no-search", "--check-vertebrae"}).exit_status, 2);
+}
+
 TEST_F(RegisterCommandTest, ASiteFileDecidesAboutActionAndCouch) {
   const std::filesystem::path site = study_.path() / "site.json";
   std::ofstream(site) << R"({"site_file": 1, "name": "Linac 3", "action_levels": {"head": {"translation_mm": 1}},

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <limits>
 #include <random>
 
 #include "tests/support/pose_near.h"
@@ -42,6 +43,19 @@ TEST(Rotation, AnglesWrapToHalfATurn) {
   EXPECT_NEAR(deg_from_rad(wrapped_rad(rad_from_deg(359.998))), -0.002, 1e-12);
   EXPECT_DOUBLE_EQ(wrapped_rad(rad_from_deg(540.0)), std::numbers::pi);
   EXPECT_DOUBLE_EQ(wrapped_rad(rad_from_deg(-180.0)), std::numbers::pi);
+}
+
+TEST(Rotation, AMatrixIsARigidMotionOrNothing) {
+  Eigen::Affine3d matrix = Eigen::Affine3d::Identity();
+  matrix.linear() = rotation_z(0.3);
+  matrix.translation() = Eigen::Vector3d(1, 2, 3);
+  ASSERT_TRUE(as_rigid(matrix));
+  EXPECT_TRUE(as_rigid(matrix)->isApprox(Eigen::Isometry3d(matrix.matrix())));
+  Eigen::Affine3d mirrored = matrix, longer = matrix, unknown = matrix;
+  mirrored.linear().col(0) *= -1.0;
+  longer.linear() *= 1.001;
+  unknown.linear()(0, 0) = std::numeric_limits<double>::quiet_NaN();
+  for (const Eigen::Affine3d& wrong : {mirrored, longer, unknown}) EXPECT_FALSE(as_rigid(wrong));
 }
 
 }  // namespace

@@ -163,6 +163,23 @@ TEST(RegisterViews, TranslationOnlyLeavesTheRotationAlone) {
   EXPECT_THAT(Eigen::Vector3d(error.translation()), VectorNear(Eigen::Vector3d(scene.truth.translation()), 2.0));
 }
 
+TEST(RegisterViews, ASetPoseIsJudgedAsItIsAndNeedsAReview) {
+  Scene scene = make_scene(PatientPosition::kHfs, 0.0, {0.0, 90.0});
+  RegistrationOptions options = preset("setup");
+  options.is_searched = false;
+  const auto right = register_views(*scene.renderers, prepared(scene.xrays), scene.truth * scene.planned, options);
+  EXPECT_THAT(right.actual_room_from_patient, PoseNear(scene.truth * scene.planned, 1e-9, 1e-9));
+  EXPECT_EQ(right.verdict, Verdict::kReview);
+  EXPECT_THAT(right.reasons, testing::ElementsAre("the pose was set, not searched"));
+  EXPECT_TRUE(right.stages.empty());
+  EXPECT_TRUE(right.uncertainty);
+  // The planned pose lies 10 mm off, and what is judged shows it.
+  const auto wrong = register_views(*scene.renderers, prepared(scene.xrays), scene.planned, options);
+  EXPECT_NE(wrong.verdict, Verdict::kAccepted);
+  EXPECT_GT(wrong.reasons.size(), 1U);
+  EXPECT_LT(wrong.views[0].similarity_final, right.views[0].similarity_final - 0.1);
+}
+
 TEST(RegisterViews, AShiftThatUndoesTheErrorRestoresThePlannedView) {
   // Rendered check of the couch's algebra: move the found patient back and render again.
   Scene scene = make_scene(PatientPosition::kFfs, 30.0, {0.0, 90.0});

@@ -9,6 +9,7 @@
 #include "io/report/result_folder.h"
 #include "setup/couch_shift.h"
 #include "workflow/register/setup_result_of.h"
+#include "workflow/register/start_pose.h"
 #include "workflow/register/target_of.h"
 
 namespace isoshift {
@@ -38,8 +39,10 @@ Eigen::Isometry3d written_pose(const Study& study, const SetupResult& result, No
   return known_setup_error(result) * study.planned_room_from_patient;
 }
 
-SpatialRegistrationOptions registration_options(RegistrationSource source, Verdict verdict) {
-  if (verdict == Verdict::kAccepted) return {.source = source};
+SpatialRegistrationOptions registration_options(RegistrationSource source, const SetupResult& result) {
+  if (!result.is_searched)
+    return {.content_label = "SETUP_BY_HAND", .content_description = "SET BY HAND: REVIEW", .source = source};
+  if (result.verdict == Verdict::kAccepted) return {.source = source};
   return {.content_label = "SETUP_REVIEW", .content_description = "NOT ACCEPTED: REVIEW", .source = source};
 }
 
@@ -55,6 +58,8 @@ SetupResult register_study(const RegisterOptions& options, SharedWork& shared, O
   StudyOptions named = options.study;
   if (site_file && site_file->sessions) named.max_span_s = site_file->sessions->max_span_s;
   const Study study = load(named, notes, observer, shared.cts);
+  std::optional<Start> start;
+  if (!options.start.empty()) start = read_start(options.start, study);
   TargetChoice choice = target_of(study, {options.target, site ? site->target : ""});
   const Surrogate surrogate = surrogate_of(study, choice.target, site ? site->surrogate : "", shared.bodies);
   choice.target.surrogate = surrogate.words;
@@ -62,13 +67,15 @@ SetupResult register_study(const RegisterOptions& options, SharedWork& shared, O
   const std::vector<FixedImage> images = prepared(study.xrays);
   const double seconds_load = total.seconds();
   const TargetRegistration registration(study, options.registration, setup, choice, surrogate, shared.bodies);
-  RegistrationResult found = registration.from(study.planned_room_from_patient, images, observer);
+  const Eigen::Isometry3d setup_error = start ? start->setup_error : Eigen::Isometry3d::Identity();
+  RegistrationResult found = registration.from(setup_error * study.planned_room_from_patient, images, observer);
 
   SetupResult result = setup_result_of(study, images, options.registration, setup, choice.target, std::move(found));
   result.site = std::move(site);
+  result.start = std::move(start);
   if (may_write_registration(options, result))
     result.spatial_registration_uid = write_spatial_registration(study, written_pose(study, result, notes),
-                                                                 registration_options(options.source, result.verdict),
+                                                                 registration_options(options.source, result),
                                                                  output.path() / kRegistrationFile, notes);
   result.overrides = notes.overrides;
   result.left_aside = notes.left_aside;

@@ -20,6 +20,7 @@ struct RegisterOptions {
   std::filesystem::path output;
   std::filesystem::path site;  // empty: no site file
   std::string anatomy;
+  std::filesystem::path start;  // a pose (start_pose.h); empty: the planned one
   std::string target;  // the structure that the setup must bring right, or "isocenter"; empty: as target_of() finds it
   bool overwrite = false;
   bool write_reg_for_review = false;

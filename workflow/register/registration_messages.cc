@@ -17,6 +17,7 @@ namespace fs = std::filesystem;
 
 constexpr const char* kText = "a text";
 constexpr const char* kTexts = "a list of texts";
+constexpr const char* kYesOrNo = "true or false";
 
 RawText raw(const fs::path& path) { return {path.string()}; }
 RawText raw(const std::string& text) { return {text}; }
@@ -47,6 +48,9 @@ Verdict verdict_in(JsonSection& section) {
 
 struct ToJson {
   nlohmann::json operator()(const Ready&) const { return {{"ready", nlohmann::json::object()}}; }
+  nlohmann::json operator()(const Progressed& progressed) const {
+    return {{"progressed", {{"step", raw(progressed.step)}, {"share", progressed.share}}}};
+  }
   nlohmann::json operator()(const Ended& ended) const { return {{"ended", {{"verdict", to_string(ended.verdict)}}}}; }
   nlohmann::json operator()(const Failed& failed) const {
     return {{"failed", {{"why", raw(failed.why)}, {"is_of_disk", failed.is_of_disk}}}};
@@ -67,7 +71,10 @@ std::string to_line(const RegistrationOrder& order) {
                     {"flags", raw(order.flags)},
                     {"site", raw(order.site)},
                     {"anatomy", raw(order.anatomy)},
+                    {"start", raw(order.start)},
+                    {"is_searched", order.is_searched},
                     {"output", raw(order.output)},
+                    {"tells_progress", order.tells_progress},
                     {"at_a_time", order.at_a_time}}}});
 }
 
@@ -88,7 +95,10 @@ RegistrationOrder registration_order_from(const std::string& line, const std::st
                           .flags = texts_in<std::string>(*section, "flags"),
                           .site = text_in(*section, "site"),
                           .anatomy = text_in(*section, "anatomy"),
+                          .start = text_in(*section, "start"),
+                          .is_searched = section->required<bool>("is_searched", kYesOrNo),
                           .output = text_in(*section, "output"),
+                          .tells_progress = section->required<bool>("tells_progress", kYesOrNo),
                           .at_a_time = section->required<int>("at_a_time", "a number of registrations")};
   if (order.at_a_time < 1) section->refuse("at_a_time", "at least 1");
   section->end();
@@ -98,16 +108,17 @@ RegistrationOrder registration_order_from(const std::string& line, const std::st
 RegistrationMessage registration_message_from(const std::string& line, const std::string& name) {
   const nlohmann::json json = json_from(line, name);
   JsonSection message(json, name);
-  std::optional<JsonSection> ready = message.section("ready"), ended = message.section("ended"),
-                             failed = message.section("failed");
+  std::optional<JsonSection> ready = message.section("ready"), progressed = message.section("progressed"),
+                             ended = message.section("ended"), failed = message.section("failed");
   message.end();
-  if (json.size() != 1) throw Error(fmt::format("{}: expected ready, ended or failed", message.where()));
-  JsonSection& section = ready ? *ready : ended ? *ended : *failed;
+  if (json.size() != 1) throw Error(fmt::format("{}: expected ready, progressed, ended or failed", message.where()));
+  JsonSection& section = ready ? *ready : progressed ? *progressed : ended ? *ended : *failed;
   RegistrationMessage result = Ready();
+  if (progressed)
+    result = Progressed{.step = text_in(section, "step"), .share = section.required<double>("share", "a share")};
   if (ended) result = Ended{verdict_in(section)};
   if (failed)
-    result =
-        Failed{.why = text_in(section, "why"), .is_of_disk = section.required<bool>("is_of_disk", "true or false")};
+    result = Failed{.why = text_in(section, "why"), .is_of_disk = section.required<bool>("is_of_disk", kYesOrNo)};
   section.end();
   return result;
 }

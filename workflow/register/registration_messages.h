@@ -17,15 +17,25 @@ struct RegistrationOrder {
   std::vector<std::string> flags;  // of isoshift register, without those that name parts, or the output
   std::filesystem::path site;      // site file; empty: that of the flags, if any
   std::string anatomy;             // empty: that of the flags, if any
+  std::filesystem::path start;     // a pose (start_pose.h); empty: the planned one
+  bool is_searched = true;         // false: the start is only judged
   std::filesystem::path output;
+  bool tells_progress = false;
   int at_a_time = 1;  // orders that are worked on at the same time, by children that share the cores
 
   bool operator==(const RegistrationOrder&) const = default;
 };
 
-// A child says Ready once, and then Ended or Failed in answer to every order.
+// A child says Ready once, and then Ended or Failed in answer to every order; before that Progressed, if the order says
+// so.
 struct Ready {
   bool operator==(const Ready&) const = default;
+};
+struct Progressed {
+  std::string step;
+  double share = 0.0;  // of the step, 0 to 1
+
+  bool operator==(const Progressed&) const = default;
 };
 struct Ended {
   Verdict verdict = Verdict::kRejected;  // of the result, which is in the output folder
@@ -38,7 +48,7 @@ struct Failed {
 
   bool operator==(const Failed&) const = default;
 };
-using RegistrationMessage = std::variant<Ready, Ended, Failed>;
+using RegistrationMessage = std::variant<Ready, Progressed, Ended, Failed>;
 
 std::string to_line(const RegistrationOrder& order);
 std::string to_line(const RegistrationMessage& message);

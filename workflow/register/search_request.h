@@ -15,6 +15,7 @@ struct SearchRequest {
   std::optional<double> pixel_fraction;
   std::string dof = "rigid";
   bool check_vertebrae = false;
+  bool is_searched = true;  // false: the start is only judged
   std::uint64_t seed = 1;
 
   // Throws UsageError for a switch that has no effect on the preset.

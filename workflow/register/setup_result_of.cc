@@ -115,6 +115,7 @@ SetupResult setup_result_of(const Study& study, std::span<const FixedImage> imag
   result.table_position_mm = table_position(study);
   result.setup_error = setup_error_from_poses(study.planned_room_from_patient, result.actual_room_from_patient);
   result.translation_only = registration.dof == Dof::kTranslation;
+  result.is_searched = registration.is_searched;
   for (std::size_t n = 0; n < study.rt_images.size(); ++n)
     result.views.push_back(
         view_of(study.rt_images[n], study.xrays[n].view, std::move(matches[n]), std::move(pictures[n])));

@@ -11,6 +11,7 @@
 #include "base/error.h"
 #include "geometry/rotation.h"
 #include "geometry/target_error.h"
+#include "workflow/register/setup_error_json.h"
 
 namespace isoshift {
 
@@ -18,7 +19,7 @@ namespace {
 
 nlohmann::json parsed(const std::filesystem::path& path) {
   std::ifstream file(path);
-  if (!file) throw Error(fmt::format("{}: cannot be opened", path.string()));
+  if (!file) throw Error("cannot be opened");
   return nlohmann::json::parse(file);
 }
 
@@ -26,20 +27,14 @@ Eigen::Vector3d vector_from(const nlohmann::json& json) {
   return {json.at(0).get<double>(), json.at(1).get<double>(), json.at(2).get<double>()};
 }
 
-Eigen::Isometry3d motion_from(const nlohmann::json& json) {
-  Eigen::Isometry3d motion = Eigen::Isometry3d::Identity();
-  motion.translation() = vector_from(json.at("translation_mm"));
-  for (int row = 0; row < 3; ++row)
-    motion.linear().row(row) = vector_from(json.at("rotation_matrix").at(static_cast<std::size_t>(row)));
-  return motion;
-}
-
 }  // namespace
 
 Eigen::Isometry3d read_setup_error(const std::filesystem::path& path) {
   try {
     const nlohmann::json json = parsed(path);
-    return motion_from(json.contains("setup_error") ? json.at("setup_error") : json.at("setup_error_room"));
+    return setup_error_from(json.contains("setup_error") ? json.at("setup_error") : json.at("setup_error_room"));
+  } catch (const Error& error) {
+    throw Error(fmt::format("{}: {}", path.string(), error.what()));
   } catch (const nlohmann::json::exception& error) {
     throw Error(fmt::format("{}: holds no complete setup error (a result.json or truth.json is needed): {}",
                             path.string(), error.what()));
@@ -54,8 +49,10 @@ std::vector<BodyTruth> read_body_truths(const std::filesystem::path& path) {
     if (json.contains("setup_error") || !json.contains(list)) return truths;
     for (const nlohmann::json& body : json.at(list))
       truths.push_back(
-          {.center_patient_mm = vector_from(body.at("center_patient_mm")), .setup_error = motion_from(body)});
+          {.center_patient_mm = vector_from(body.at("center_patient_mm")), .setup_error = setup_error_from(body)});
     return truths;
+  } catch (const Error& error) {
+    throw Error(fmt::format("{}: {}", path.string(), error.what()));
   } catch (const nlohmann::json::exception& error) {
     throw Error(fmt::format("{}: the motions of its bodies cannot be read: {}", path.string(), error.what()));
   }

@@ -1,7 +1,6 @@
 #include "workflow/register/view_pictures.h"
 
 #include <algorithm>
-#include <array>
 
 #include "registration/preprocess/image_operations.h"
 #include "registration/region.h"
@@ -10,18 +9,6 @@ namespace isoshift {
 namespace {
 
 constexpr int kMaxEdge = 640;
-
-// The directions of the patient at the four edges of the image, by where a step from the isocenter is projected.
-std::array<std::string, 4> directions_at_edges(const XrayView& view, const Eigen::Isometry3d& room_from_patient) {
-  constexpr double kStepMm = 10.0;
-  const Eigen::Vector2d isocenter = view.project(Eigen::Vector3d::Zero()).value();
-  Eigen::Matrix<double, 2, 3> pixels_from_patient;
-  for (int axis = 0; axis < 3; ++axis)
-    pixels_from_patient.col(axis) = view.project(kStepMm * room_from_patient.linear().col(axis)).value() - isocenter;
-  const Eigen::Vector3d right = pixels_from_patient.row(0), down = pixels_from_patient.row(1);
-  return {orientation_letters(-right), orientation_letters(right), orientation_letters(-down),
-          orientation_letters(down)};
-}
 
 std::vector<Polygon> silhouette(const ProjectedRegion& structure, const XrayView& view, const Eigen::Isometry3d& pose) {
   FixedImage shadow{.view = view,
@@ -41,6 +28,21 @@ Polygon arrow(const Eigen::Vector2d& from, const Eigen::Vector2d& tip) {
 }
 
 }  // namespace
+
+Eigen::Matrix<double, 2, 3> pixels_of_steps(const XrayView& view, const Eigen::Matrix3d& steps_room_mm) {
+  const Eigen::Vector2d isocenter = view.project(Eigen::Vector3d::Zero()).value();
+  Eigen::Matrix<double, 2, 3> steps_px;
+  for (int step = 0; step < 3; ++step) steps_px.col(step) = view.project(steps_room_mm.col(step)).value() - isocenter;
+  return steps_px;
+}
+
+std::array<std::string, 4> directions_at_edges(const XrayView& view, const Eigen::Isometry3d& room_from_patient) {
+  constexpr double kStepMm = 10.0;
+  const Eigen::Matrix<double, 2, 3> pixels_from_patient = pixels_of_steps(view, kStepMm * room_from_patient.linear());
+  const Eigen::Vector3d right = pixels_from_patient.row(0), down = pixels_from_patient.row(1);
+  return {orientation_letters(-right), orientation_letters(right), orientation_letters(-down),
+          orientation_letters(down)};
+}
 
 std::vector<Polygon> motion_arrows(const XrayView& view, std::span<const BodyMotion> bodies,
                                    const Eigen::Isometry3d& setup_error) {

@@ -4,8 +4,8 @@
 #include <chrono>
 #include <memory>
 
-#include "base/process.h"
 #include "io/config/watch_file.h"
+#include "workflow/register/registration_process.h"
 #include "workflow/room/runner.h"
 
 namespace isoshift {
@@ -21,12 +21,9 @@ class ChildRunner : public Runner {
   void give_up() override { child_.reset(); }
 
  private:
-  Failure failure_of(const ProcessEnd& end) const;
-
   const WatchFile& watch_;
   std::chrono::milliseconds limit_;  // a registration that takes longer is ended
-  std::filesystem::path folder_;
-  std::unique_ptr<Process> child_;
+  std::unique_ptr<RegistrationProcess> child_;
 };
 
 }  // namespace isoshift

@@ -10,6 +10,7 @@
 #include <nlohmann/json.hpp>
 
 #include "base/error.h"
+#include "geometry/rotation.h"
 #include "io/report/formats.h"
 #include "tests/support/command.h"
 #include "tests/support/oblique_report.h"
@@ -51,6 +52,23 @@ TEST_F(ResultFolderTest, IsReadBackWhole) {
   EXPECT_EQ(read.views[0].picture.drr_found.pixels, report_.views[0].picture.drr_found.pixels);
   EXPECT_EQ(csv_report(read), csv_report(report_));
   EXPECT_EQ(text_of(read), text_of(report_));
+}
+
+TEST_F(ResultFolderTest, WhereItBeganIsReadBackAndSaidFirst) {
+  EXPECT_THAT(text_of(report_), Not(HasSubstr("SEARCHED")));
+  Eigen::Isometry3d set = Eigen::Isometry3d::Identity();
+  set.translation() = Eigen::Vector3d(1.5, -2.0, 0.25);
+  set.linear() = rotation_z(0.1);
+  report_.start = Start{.setup_error = set, .file = "pose.json", .sha256 = "ab", .set_by = "jdoe"};
+  EXPECT_THAT(text_of(report_), HasSubstr("searched from a start set by hand by jdoe"));
+  report_.is_searched = false;
+  EXPECT_THAT(text_of(report_), HasSubstr("set by hand by jdoe, NOT SEARCHED"));
+  const SetupResult read = report_from_json(json_report(report_), "result.json");
+  EXPECT_EQ(json_report(read), json_report(report_));
+  EXPECT_EQ(text_of(read), text_of(report_));
+  EXPECT_TRUE(read.start->setup_error.isApprox(set, 1e-12));
+  report_.start.reset();
+  EXPECT_THAT(text_of(report_), HasSubstr("as planned, NOT SEARCHED"));
 }
 
 TEST_F(ResultFolderTest, WhatBodiesDidIsReadBack) {

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "io/report/canvas.h"
 
 namespace isoshift {
@@ -26,6 +28,29 @@ TEST(ViewPicture, GraysAreThoseOfTheXrayForADrrOfAnotherScale) {
     EXPECT_NEAR(picture.drr_found.pixels[n], picture.xray.pixels[n], 1);
   const auto gray = overlay(picture.xray, picture.drr_found);
   EXPECT_NEAR(gray.at(10, 10)[0], gray.at(10, 10)[1], 1);
+}
+
+TEST(ViewPicture, ADrrHasTheGraysOfAnXrayThatWasHardened) {
+  Image<float> xray(40, 40), drr(40, 40);
+  for (std::size_t n = 0; n < xray.pixels.size(); ++n) {
+    drr.pixels[n] = static_cast<float>(n % 800);
+    xray.pixels[n] = std::sqrt(drr.pixels[n]);
+  }
+  Image<std::uint8_t> field(40, 40, 1);
+  for (int row = 0; row < 40; ++row) field.at(0, row) = 0;
+  for (int row = 0; row < 40; ++row) drr.at(0, row) = 1e6F;  // what is not compared has no say
+  const Image<std::uint8_t> picture = GrayScale::of(xray, field)(xray);
+  const GrayScale like = GrayScale::like(drr, picture, field);
+  const Image<std::uint8_t> alike = like(drr);
+  for (int row = 0; row < 40; ++row)
+    for (int column = 1; column < 40; ++column) ASSERT_NEAR(alike.at(column, row), picture.at(column, row), 3);
+  // Elsewhere a line integral keeps its gray.
+  Image<float> moved(2, 1);
+  moved.pixels = {drr.at(5, 5), -1e9F};
+  EXPECT_EQ(like(moved).at(0, 0), alike.at(5, 5));
+  EXPECT_EQ(like(moved).at(1, 0), alike.at(1, 0));
+  const Image<std::uint8_t> nothing(40, 40);
+  EXPECT_EQ(GrayScale::like(drr, picture, nothing)(drr).pixels.size(), picture.pixels.size());
 }
 
 }  // namespace

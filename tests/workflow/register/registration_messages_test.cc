@@ -29,7 +29,10 @@ TEST(RegistrationMessages, OrdersComeBackAsTheyWere) {
                                .flags = {"--preset=fast", "--allow=gaps=it's \xE4lter"},
                                .site = "/etc/site.json",
                                .anatomy = "head",
+                               .start = "/in/pose.json",
+                               .is_searched = false,
                                .output = "/out/a",
+                               .tells_progress = true,
                                .at_a_time = 4};
   EXPECT_EQ(registration_order_from(line_without_end(to_line(full)), ""), full);
   EXPECT_EQ(registration_order_from(line_without_end(to_line(RegistrationOrder())), ""), RegistrationOrder());
@@ -37,9 +40,9 @@ TEST(RegistrationMessages, OrdersComeBackAsTheyWere) {
 
 TEST(RegistrationMessages, AnswersComeBackAsTheyWere) {
   for (const RegistrationMessage& message :
-       {RegistrationMessage(Ready()), RegistrationMessage(Ended{Verdict::kAccepted}),
-        RegistrationMessage(Ended{Verdict::kReview}), RegistrationMessage(Ended{Verdict::kRejected}),
-        RegistrationMessage(Failed{.why = "no CT\n       Name \xFC"}),
+       {RegistrationMessage(Ready()), RegistrationMessage(Progressed{.step = "Registering", .share = 0.25}),
+        RegistrationMessage(Ended{Verdict::kAccepted}), RegistrationMessage(Ended{Verdict::kReview}),
+        RegistrationMessage(Ended{Verdict::kRejected}), RegistrationMessage(Failed{.why = "no CT\n       Name \xFC"}),
         RegistrationMessage(Failed{.why = "disk full", .is_of_disk = true})})
     EXPECT_EQ(registration_message_from(line_without_end(to_line(message)), ""), message) << to_line(message);
 }
@@ -48,9 +51,10 @@ TEST(RegistrationMessages, DamagedAndUnknownOnesAreErrorsThatNameTheSender) {
   EXPECT_THAT(error_of("ready"), HasSubstr("a worker: is not JSON"));
   EXPECT_THAT(error_of("{\"ended\":{\"verd"), HasSubstr("a worker: is not JSON"));
   EXPECT_EQ(error_of("3"), "a worker: expected an object");
-  EXPECT_EQ(error_of("{}"), "a worker: expected ready, ended or failed");
-  EXPECT_EQ(error_of("{\"ready\":{},\"ended\":{}}"), "a worker: expected ready, ended or failed");
-  EXPECT_EQ(error_of("{\"begun\":{}}"), "a worker: there is no key begun; the keys are ready, ended, failed");
+  EXPECT_EQ(error_of("{}"), "a worker: expected ready, progressed, ended or failed");
+  EXPECT_EQ(error_of("{\"ready\":{},\"ended\":{}}"), "a worker: expected ready, progressed, ended or failed");
+  EXPECT_EQ(error_of("{\"begun\":{}}"),
+            "a worker: there is no key begun; the keys are ready, progressed, ended, failed");
   EXPECT_EQ(error_of("{\"ready\":true}"), "a worker: ready: expected an object");
   EXPECT_EQ(error_of("{\"ended\":{}}"), "a worker: ended: verdict is missing, expected a verdict");
   EXPECT_EQ(error_of("{\"ended\":{\"verdict\":\"fine\"}}"), "a worker: ended: verdict is \"fine\", expected a verdict");

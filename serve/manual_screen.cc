@@ -1,0 +1,154 @@
+#include "serve/manual_screen.h"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <chrono>
+#include <fstream>
+#include <iterator>
+
+#include "base/error.h"
+#include "io/report/polygons_json.h"
+#include "io/report/report_page.h"
+#include "io/report/result_folder.h"
+#include "serve/answers.h"
+#include "workflow/register/setup_error_json.h"
+
+namespace isoshift {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr std::array kDetails = {LiveStudy::Detail::kFull, LiveStudy::Detail::kHalf, LiveStudy::Detail::kQuarter};
+constexpr double kMostMm = 1000.0;  // nobody is moved farther by hand
+
+template <class Vector>
+Json array_of(const Vector& values) {
+  Json array = Json::array();
+  for (const auto& value : values) array.push_back(value);
+  return array;
+}
+
+Json rows_of(const auto& matrix) {
+  Json rows = Json::array();
+  for (Eigen::Index row = 0; row < matrix.rows(); ++row) {
+    Json& values = rows.emplace_back(Json::array());
+    for (Eigen::Index column = 0; column < matrix.cols(); ++column) values.push_back(matrix(row, column));
+  }
+  return rows;
+}
+
+// A browser's numbers drift: its rotation is brought back to the nearest one.
+Eigen::Isometry3d pose_from(const Json& json) {
+  Eigen::Isometry3d pose = setup_error_from(json);
+  if (!(pose.translation().norm() <= kMostMm)) throw Error("setup_error: moves the patient by more than 1000 mm.");
+  pose.linear() = Eigen::Quaterniond(pose.linear()).normalized().toRotationMatrix();
+  return pose;
+}
+
+Json view_json(const LiveStudy::View& view) {
+  Json sizes = Json::array();
+  for (std::size_t n = 0; n < kDetails.size(); ++n) sizes.push_back({view.xray.columns >> n, view.xray.rows >> n});
+  return {{"label", view.label},
+          {"sizes", sizes},
+          {"isocenter_px", array_of(view.isocenter_px)},
+          {"px_per_mm", rows_of(view.px_per_mm)},
+          {"from_source", array_of(view.from_source)},
+          {"field", polygons_json(view.field)},
+          {"directions", array_of(view.directions)}};
+}
+
+void append(std::string& bytes, const Image<std::uint8_t>& image) {
+  bytes.append(reinterpret_cast<const char*>(image.pixels.data()), image.pixels.size());
+}
+
+HttpResponse pixels_answer(std::string bytes) { return {.type = "application/octet-stream", .body = std::move(bytes)}; }
+
+}  // namespace
+
+HttpResponse ManualScreen::answer(const HttpRequest& request, const SignedIn& who, const std::string& what) {
+  if (request.method == "GET") {
+    if (what == "study") return study();
+    if (what == "xrays") return xrays();
+    if (what == "state") return state();
+    if (what == "report.html") return report();
+    return refusal(404, "There is nothing at this address.");
+  }
+  if (!has_type_json(request)) return refusal(415, "JSON is expected.");
+  try {
+    if (what == "drrs") return drrs(request);
+    if (what == "begin") return begin(request, who);
+  } catch (const Json::exception&) {
+    return refusal(400, "setup_error with translation_mm and rotation_matrix is expected, and detail or searched.");
+  }
+  if (what != "cancel") return refusal(404, "There is nothing at this address.");
+  registration_.cancel();
+  return state();
+}
+
+HttpResponse ManualScreen::study() const {
+  const Study& study = study_.study();
+  Json views = Json::array();
+  for (const LiveStudy::View& view : study_.views()) views.push_back(view_json(view));
+  const Identity& patient = study.ct->identity;
+  return json_answer({{"patient", name_for_people(patient.patient_name)},
+                      {"patient_id", patient.patient_id},
+                      {"plan", study.plan ? study.plan->label : ""},
+                      {"views", std::move(views)}});
+}
+
+HttpResponse ManualScreen::xrays() const {
+  std::string bytes;
+  for (const LiveStudy::View& view : study_.views()) append(bytes, view.xray);
+  return pixels_answer(std::move(bytes));
+}
+
+HttpResponse ManualScreen::drrs(const HttpRequest& request) const {
+  const Json body = Json::parse(request.body);
+  const Eigen::Isometry3d setup_error = pose_from(body.at("setup_error"));
+  const auto detail = body.at("detail").get<std::size_t>();
+  if (detail >= kDetails.size()) return refusal(400, "detail is 0 (full), 1 (half) or 2 (a quarter).");
+  const auto begin = std::chrono::steady_clock::now();
+  std::string bytes;
+  for (const Image<std::uint8_t>& drr : study_.drrs(setup_error, kDetails[detail])) append(bytes, drr);
+  const std::chrono::duration<double, std::milli> passed = std::chrono::steady_clock::now() - begin;
+  HttpResponse response = pixels_answer(std::move(bytes));
+  response.headers.emplace_back("X-Isoshift-Milliseconds", fmt::format("{:.1f}", passed.count()));
+  return response;
+}
+
+HttpResponse ManualScreen::begin(const HttpRequest& request, const SignedIn& who) {
+  if (!who.roles.contains(Role::kRegister)) return refusal(403, fmt::format("{} may not register.", who.user));
+  const Json body = Json::parse(request.body);
+  registration_.begin(pose_from(body.at("setup_error")), who.user, body.at("searched"));
+  return state();
+}
+
+HttpResponse ManualScreen::state() {
+  const ManualRegistration::State now = registration_.state();
+  using What = ManualRegistration::State::What;
+  switch (now.what) {
+    case What::kIdle: return json_answer({{"state", "idle"}});
+    case What::kRuns:
+      return json_answer({{"state", "runs"}, {"step", now.progress.step}, {"share", now.progress.share}});
+    case What::kFailed: return json_answer({{"state", "failed"}, {"why", now.failure}});
+    case What::kEnded: break;
+  }
+  const SetupResult result = read_report(now.result);
+  return json_answer({{"state", "ended"},
+                      {"folder", now.result.string()},
+                      {"verdict", to_string(result.verdict)},
+                      {"reasons", result.reasons},
+                      {"searched", result.is_searched},
+                      {"setup_error", json_of_setup_error(result.setup_error)}});
+}
+
+HttpResponse ManualScreen::report() {
+  const ManualRegistration::State now = registration_.state();
+  if (now.result.empty()) return refusal(404, "There is no result yet.");
+  std::ifstream file(now.result / "report.html", std::ios::binary);
+  if (!file) return refusal(404, "The result has no report any more.");
+  return report_answer({std::istreambuf_iterator<char>(file), {}});
+}
+
+}  // namespace isoshift

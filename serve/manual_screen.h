@@ -1,0 +1,39 @@
+#pragma once
+// Registration by hand in a browser: what the page "manual" asks for.
+
+#include "serve/http_message.h"
+#include "serve/sign_ins.h"
+#include "workflow/manual/live_study.h"
+#include "workflow/manual/manual_registration.h"
+
+namespace isoshift {
+
+// May be called from several threads.
+class ManualScreen {
+ public:
+  ManualScreen(const LiveStudy& study, ManualRegistration& registration) : study_(study), registration_(registration) {}
+
+  // `what`: the part of the address behind that of the study.
+  //
+  //   GET study         the patient and the views, as JSON
+  //   GET xrays         the X-rays: a byte per pixel, view by view
+  //   POST drrs         the DRRs at a pose, likewise; with how long rendering took
+  //   GET state         what registers, or its result
+  //   POST begin        registers from a pose, or keeps it
+  //   POST cancel
+  //   GET report.html   of the last result
+  HttpResponse answer(const HttpRequest& request, const SignedIn& who, const std::string& what);
+
+ private:
+  HttpResponse study() const;
+  HttpResponse xrays() const;
+  HttpResponse drrs(const HttpRequest& request) const;
+  HttpResponse begin(const HttpRequest& request, const SignedIn& who);
+  HttpResponse state();
+  HttpResponse report();
+
+  const LiveStudy& study_;
+  ManualRegistration& registration_;
+};
+
+}  // namespace isoshift

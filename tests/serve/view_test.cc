@@ -1,0 +1,168 @@
+// Registration by hand: what the page asks for, and the whole in a browser.
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <thread>
+
+#include "serve/view_screen.h"
+#include "tests/support/command.h"
+#include "tests/support/small_study.h"
+#include "workflow/register/truth.h"
+
+namespace isoshift {
+namespace {
+
+using Json = nlohmann::json;
+using namespace std::chrono_literals;
+
+class ViewTest : public testing::Test {
+ protected:
+  ViewTest() {
+    HttpResponse opened = screen_.answer({.method = "GET", .path = "/open/word"});
+    for (const auto& [name, value] : opened.headers)
+      if (name == "Set-Cookie") cookie_ = value.substr(0, value.find(';'));
+  }
+  HttpResponse get(const std::string& path) {
+    return screen_.answer({.method = "GET", .path = path, .headers = {{"cookie", cookie_}}});
+  }
+  HttpResponse post(const std::string& path, const Json& body) {
+    return screen_.answer({.method = "POST",
+                           .path = path,
+                           .headers = {{"cookie", cookie_},
+                                       {"content-type", "application/json"},
+                                       {"x-isoshift-token", Json::parse(get("/api/me").body).at("token")}},
+                           .body = body.dump()});
+  }
+  static Json pose(double x_mm) {
+    return {{"translation_mm", {x_mm, 0, 0}}, {"rotation_matrix", {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}}};
+  }
+  static StudyOptions options_of(const SmallStudy& study) {
+    StudyOptions options;
+    options.parts.study = study.path();
+    return options;
+  }
+  Json end_of_registration() {
+    for (;;) {
+      const Json state = Json::parse(get("/api/manual/state").body);
+      if (state.at("state") != "runs") return state;
+      std::this_thread::sleep_for(20ms);
+    }
+  }
+
+  SmallStudy files_;
+  Observer nobody_;
+  LiveStudy study_{options_of(files_), nobody_};
+  ManualRegistration registration_{{.parts = options_of(files_).parts, .flags = {"--preset=fast"}}, files_.output()};
+  ManualScreen manual_{study_, registration_};
+  ServeFile serve_{.roles = {{"doe", {Role::kView, Role::kRegister}}}};
+  SystemClock clock_;
+  bool is_used_ = false;
+  SignIns sign_ins_{serve_, clock_, [this](const std::string&, const std::string& password) {
+                      return password == "word" && !std::exchange(is_used_, true);
+                    }};
+  ViewScreen screen_{manual_, sign_ins_, "doe"};
+  std::string cookie_;
+};
+
+TEST_F(ViewTest, TheAddressOpensOnceAndNothingElseDoes) {
+  EXPECT_FALSE(cookie_.empty());
+  EXPECT_EQ(get("/").status, 200);
+  EXPECT_EQ(screen_.answer({.method = "GET", .path = "/open/word"}).status, 403);
+  EXPECT_EQ(screen_.answer({.method = "GET", .path = "/open/other"}).status, 403);
+  for (const char* path : {"/", "/manual.js", "/api/me", "/api/manual/study", "/api/manual/xrays", "/api/manual/state"})
+    EXPECT_EQ(screen_.answer({.method = "GET", .path = path}).status, 403) << path;
+  EXPECT_EQ(screen_
+                .answer({.method = "POST",
+                         .path = "/api/manual/begin",
+                         .headers = {{"cookie", cookie_}, {"content-type", "application/json"}},
+                         .body = Json{{"setup_error", pose(0)}, {"searched", true}}.dump()})
+                .status,
+            403)
+      << "without the token";
+  EXPECT_EQ(get("/api/manual/other").status, 404);
+}
+
+TEST_F(ViewTest, TheViewsArePicturesOfTheXraysAndSayWhereTheRoomLies) {
+  const Json study = Json::parse(get("/api/manual/study").body);
+  ASSERT_EQ(study.at("views").size(), 2U);
+  const Json& front = study.at("views")[0];
+  EXPECT_EQ(front.at("sizes"), Json({{96, 96}, {48, 48}, {24, 24}}));
+  // Gantry 0: x of the room to the right on the picture, y up, and z not at all.
+  const Json& step = front.at("px_per_mm");
+  EXPECT_GT(step[0][0], 0.1);
+  EXPECT_NEAR(step[0][1], 0.0, 1e-9);
+  EXPECT_LT(step[1][1], -0.1);
+  EXPECT_NEAR(step[0][2].get<double>() + step[1][2].get<double>(), 0.0, 1e-6);
+  EXPECT_NEAR(front.at("from_source")[2], -1.0, 1e-9);
+  EXPECT_EQ(get("/api/manual/xrays").body.size(), 2U * 96 * 96);
+}
+
+TEST_F(ViewTest, TheDrrsFollowThePose) {
+  const HttpResponse still = post("/api/manual/drrs", {{"setup_error", pose(0)}, {"detail", 0}});
+  ASSERT_EQ(still.body.size(), 2U * 96 * 96);
+  EXPECT_EQ(post("/api/manual/drrs", {{"setup_error", pose(0)}, {"detail", 2}}).body.size(), 2U * 24 * 24);
+  const HttpResponse moved = post("/api/manual/drrs", {{"setup_error", pose(20)}, {"detail", 0}});
+  // To the right in the first view, toward the source of the second: seen by the mean column of bright pixels.
+  const auto mean_column = [](const std::string& bytes) {
+    double sum = 0.0, weights = 0.0;
+    for (std::size_t n = 0; n < std::size_t{96} * 96; ++n) {
+      const auto gray = static_cast<unsigned char>(bytes[n]);
+      sum += gray * static_cast<double>(n % 96);
+      weights += gray;
+    }
+    return sum / weights;
+  };
+  const Json study = Json::parse(get("/api/manual/study").body);
+  const double expected = 20.0 * study.at("views")[0].at("px_per_mm")[0][0].get<double>();
+  EXPECT_NEAR(mean_column(moved.body) - mean_column(still.body), expected, 0.2 * expected);
+}
+
+TEST_F(ViewTest, WhatIsNoPoseIsRefused) {
+  for (const Json& wrong : {Json{}, Json{{"translation_mm", {1, 2}}}, Json{{"translation_mm", {1, 2, 3}}}})
+    EXPECT_EQ(post("/api/manual/drrs", {{"setup_error", wrong}, {"detail", 0}}).status, 400) << wrong;
+  Json sheared = pose(0);
+  sheared["rotation_matrix"][0][1] = 0.5;
+  EXPECT_EQ(post("/api/manual/drrs", {{"setup_error", sheared}, {"detail", 0}}).status, 409);
+  EXPECT_EQ(post("/api/manual/drrs", {{"setup_error", pose(1e6)}, {"detail", 0}}).status, 409);
+  EXPECT_EQ(post("/api/manual/drrs", {{"setup_error", pose(0)}, {"detail", 7}}).status, 400);
+}
+
+TEST_F(ViewTest, ARegistrationRunsFromThePoseAndTellsHowFarItIs) {
+  EXPECT_EQ(Json::parse(get("/api/manual/state").body).at("state"), "idle");
+  EXPECT_EQ(post("/api/manual/begin", {{"setup_error", pose(3)}, {"searched", true}}).status, 200);
+  EXPECT_EQ(post("/api/manual/begin", {{"setup_error", pose(3)}, {"searched", true}}).status, 409) << "one at a time";
+  std::set<std::string> steps;
+  Json state = Json::parse(get("/api/manual/state").body);
+  for (; state.at("state") == "runs"; state = Json::parse(get("/api/manual/state").body)) {
+    steps.insert(state.at("step").get<std::string>());
+    std::this_thread::sleep_for(5ms);
+  }
+  EXPECT_EQ(state.at("state"), "ended") << state;
+  EXPECT_TRUE(steps.contains("Registering")) << testing::PrintToString(steps);
+  EXPECT_EQ(get("/api/manual/report.html").status, 200);
+  EXPECT_EQ(Json::parse(get("/api/manual/state").body).at("folder"), (files_.output() / "1").string());
+  EXPECT_EQ(post("/api/manual/begin", {{"setup_error", pose(3)}, {"searched", false}}).status, 200);
+  state = end_of_registration();
+  EXPECT_EQ(state.at("verdict"), "review");
+  EXPECT_EQ(state.at("folder"), (files_.output() / "2").string());
+  EXPECT_NEAR(read_setup_error(files_.output() / "2" / "result.json").translation().x(), 3.0, 1e-9);
+}
+
+TEST_F(ViewTest, WhatIsCancelledLeavesNothing) {
+  EXPECT_EQ(post("/api/manual/begin", {{"setup_error", pose(0)}, {"searched", true}}).status, 200);
+  EXPECT_EQ(Json::parse(post("/api/manual/cancel", Json::object()).body).at("state"), "idle");
+  EXPECT_TRUE(std::filesystem::is_empty(files_.output()));
+}
+
+TEST(View, IsUsedInABrowser) {
+  if (!std::filesystem::exists("/usr/bin/chromedriver")) GTEST_SKIP() << "chromium-driver is not installed";
+  const TemporaryFolder work;
+  const CommandOutcome used = run_shell(fmt::format("/usr/bin/python3 {}/tests/serve/view_in_browser.py {} {}",
+                                                    ISOSHIFT_SOURCE_DIR, ISOSHIFT_PROGRAM, (work / "").string()));
+  EXPECT_EQ(used.exit_status, 0) << used.out;
+}
+
+}  // namespace
+}  // namespace isoshift

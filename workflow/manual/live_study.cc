@@ -1,0 +1,74 @@
+#include "workflow/manual/live_study.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "registration/preprocess/image_operations.h"
+#include "workflow/register/view_pictures.h"
+
+namespace isoshift {
+namespace {
+
+constexpr int kMaxEdge = 512;
+
+Study loaded(const StudyOptions& options, Observer& observer) {
+  Notes notes;
+  Study study = load(options, notes, observer);
+  for (const std::string& warning : notes.warnings) observer.say("warning: " + warning);
+  return study;
+}
+
+LiveStudy::View view_of(const FixedImage& image, const Eigen::Isometry3d& planned_room_from_patient) {
+  LiveStudy::View view{.label = image.label,
+                       .xray = GrayScale::of(image.line_integral, image.field)(image.line_integral),
+                       .isocenter_px = image.view.project(Eigen::Vector3d::Zero()).value(),
+                       .px_per_mm = pixels_of_steps(image.view, Eigen::Matrix3d::Identity()),
+                       .from_source = image.view.central_direction_room(),
+                       .field = outlines(image.field),
+                       .directions = directions_at_edges(image.view, planned_room_from_patient)};
+  return view;
+}
+
+}  // namespace
+
+LiveStudy::LiveStudy(const StudyOptions& options, Observer& observer) : study_(loaded(options, observer)) {
+  renderers_ =
+      std::make_unique<RendererPyramid>(RendererKind::kCpu, study_.ct->hu, AttenuationModel{}, beams_of(study_));
+  std::vector<FixedImage> images = prepared(study_.xrays);
+  for (FixedImage& image : images) {
+    const int edge = std::max(image.view.columns, image.view.rows);
+    image = reduced(image, (edge + kMaxEdge - 1) / kMaxEdge);
+    views_.push_back(view_of(image, study_.planned_room_from_patient));
+  }
+  int factor = 1;
+  for (Level& level : levels_) {
+    double pixel_mm = 0.0;
+    for (const FixedImage& image : images) {
+      const XrayView& camera = level.cameras.emplace_back(image.view.downscaled(factor));
+      pixel_mm = std::max(pixel_mm, 1.0 / pixels_per_mm(camera));
+    }
+    level.renderer = factor == 1 ? &renderers_->finest() : &renderers_->with_voxels_up_to(pixel_mm);
+    factor *= 2;
+  }
+  const std::vector<Image<float>> planned = line_integrals(Eigen::Isometry3d::Identity(), levels_.front());
+  for (std::size_t n = 0; n < images.size(); ++n)
+    grays_.push_back(GrayScale::like(planned[n], views_[n].xray, images[n].field));
+}
+
+std::vector<Image<float>> LiveStudy::line_integrals(const Eigen::Isometry3d& setup_error, const Level& level) const {
+  const std::array poses = {Eigen::Isometry3d(setup_error * study_.planned_room_from_patient)};
+  const RenderResult drrs = level.renderer->render(level.cameras, poses, PixelSet::all());
+  std::vector<Image<float>> images;
+  for (std::size_t view = 0; view < level.cameras.size(); ++view)
+    images.push_back(image_of(level.cameras[view], drrs.line_integrals(0, view)));
+  return images;
+}
+
+std::vector<Image<std::uint8_t>> LiveStudy::drrs(const Eigen::Isometry3d& setup_error, Detail detail) const {
+  std::vector<Image<std::uint8_t>> pictures;
+  const std::vector<Image<float>> images = line_integrals(setup_error, levels_[static_cast<std::size_t>(detail)]);
+  for (std::size_t view = 0; view < images.size(); ++view) pictures.push_back(grays_[view](images[view]));
+  return pictures;
+}
+
+}  // namespace isoshift

@@ -1,0 +1,49 @@
+#pragma once
+// What a person does with a study on the screen: registers it from the pose set by hand, or keeps that pose. Every
+// registration runs in a child process and leaves a result of its own.
+
+#include <Eigen/Geometry>
+#include <filesystem>
+#include <memory>
+#include <mutex>
+#include <string>
+
+#include "workflow/register/registration_process.h"
+
+namespace isoshift {
+
+// Several threads may use it.
+class ManualRegistration {
+ public:
+  // `order`: what is registered, and how; its start, output and progress are set here. Results are written to
+  // `results`/1, `results`/2 and so on, which must be of a folder that nobody else writes into at the same time.
+  ManualRegistration(RegistrationOrder order, std::filesystem::path results);
+
+  // Begins a registration from a pose that `by` has set, or keeps the pose as it is. Throws Error if another one runs.
+  void begin(const Eigen::Isometry3d& setup_error, const std::string& by, bool is_searched);
+
+  struct State {
+    enum class What { kIdle, kRuns, kEnded, kFailed } what = What::kIdle;
+    Progressed progress;           // of what runs
+    std::filesystem::path result;  // folder of what has ended
+    std::string failure;           // why the last one has no result
+  };
+  State state();
+
+  // Ends what runs, without a result.
+  void cancel();
+
+ private:
+  void look();
+  void end_process();
+  std::filesystem::path pose_file() const { return results_ / ".pose.json"; }
+
+  const RegistrationOrder order_;
+  const std::filesystem::path results_;
+  std::mutex mutex_;
+  std::unique_ptr<RegistrationProcess> running_;
+  std::filesystem::path output_;  // of what runs
+  State state_;
+};
+
+}  // namespace isoshift

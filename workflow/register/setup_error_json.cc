@@ -1,0 +1,28 @@
+#include "workflow/register/setup_error_json.h"
+
+#include <array>
+
+#include "base/error.h"
+#include "geometry/rotation.h"
+
+namespace isoshift {
+
+nlohmann::json json_of_setup_error(const Eigen::Isometry3d& setup_error) {
+  const auto numbers = [](const auto& vector) { return std::array{vector[0], vector[1], vector[2]}; };
+  const Eigen::Matrix3d rotation = setup_error.linear();
+  return {{"translation_mm", numbers(Eigen::Vector3d(setup_error.translation()))},
+          {"rotation_matrix", {numbers(rotation.row(0)), numbers(rotation.row(1)), numbers(rotation.row(2))}}};
+}
+
+Eigen::Isometry3d setup_error_from(const nlohmann::json& json) {
+  const auto translation_mm = json.at("translation_mm").get<std::array<double, 3>>();
+  const auto rows = json.at("rotation_matrix").get<std::array<std::array<double, 3>, 3>>();
+  Eigen::Isometry3d setup_error = Eigen::Isometry3d::Identity();
+  setup_error.translation() = Eigen::Vector3d(translation_mm.data());
+  for (std::size_t row = 0; row < rows.size(); ++row)
+    setup_error.linear().row(static_cast<Eigen::Index>(row)) = Eigen::RowVector3d(rows[row].data());
+  if (!as_rigid(Eigen::Affine3d(setup_error.matrix()))) throw Error("rotation_matrix is no rotation");
+  return setup_error;
+}
+
+}  // namespace isoshift
