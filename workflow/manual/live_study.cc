@@ -59,14 +59,16 @@ std::vector<Image<float>> LiveStudy::line_integrals(const Eigen::Isometry3d& set
   const std::array poses = {Eigen::Isometry3d(setup_error * study_.planned_room_from_patient)};
   const RenderResult drrs = level.renderer->render(level.cameras, poses, PixelSet::all());
   std::vector<Image<float>> images;
+  images.reserve(level.cameras.size());
   for (std::size_t view = 0; view < level.cameras.size(); ++view)
     images.push_back(image_of(level.cameras[view], drrs.line_integrals(0, view)));
   return images;
 }
 
 std::vector<Image<std::uint8_t>> LiveStudy::drrs(const Eigen::Isometry3d& setup_error, Detail detail) const {
-  std::vector<Image<std::uint8_t>> pictures;
   const std::vector<Image<float>> images = line_integrals(setup_error, levels_[static_cast<std::size_t>(detail)]);
+  std::vector<Image<std::uint8_t>> pictures;
+  pictures.reserve(images.size());
   for (std::size_t view = 0; view < images.size(); ++view) pictures.push_back(grays_[view](images[view]));
   return pictures;
 }

@@ -16,7 +16,7 @@ constexpr double kSameIsocenterMm = 0.01;
 
 void require_same_patient(const Json& json, const Identity& patient, const std::string& file) {
   if (!json.contains("patient")) return;  // a truth, or a pose set by hand
-  const std::string id = json.at("patient").at("patient_id");
+  const std::string id = json.at("patient").at("id");
   if (id != patient.patient_id)
     throw Error(fmt::format("{}: is of the patient \"{}\", and the CT of \"{}\": a start must be of the same patient",
                             file, id, patient.patient_id));
