@@ -94,6 +94,7 @@ HttpResponse ManualScreen::study() const {
   return json_answer({{"patient", name_for_people(patient.patient_name)},
                       {"patient_id", patient.patient_id},
                       {"plan", study.plan ? study.plan->label : ""},
+                      {"start", json_of_setup_error(start_)},
                       {"views", std::move(views)}});
 }
 

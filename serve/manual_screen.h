@@ -11,7 +11,10 @@ namespace isoshift {
 // May be called from several threads.
 class ManualScreen {
  public:
-  ManualScreen(const LiveStudy& study, ManualRegistration& registration) : study_(study), registration_(registration) {}
+  // `start`: the setup error that the page shows first.
+  ManualScreen(const LiveStudy& study, ManualRegistration& registration,
+               const Eigen::Isometry3d& start = Eigen::Isometry3d::Identity())
+      : study_(study), registration_(registration), start_(start) {}
 
   // `what`: the part of the address behind that of the study.
   //
@@ -34,6 +37,7 @@ class ManualScreen {
 
   const LiveStudy& study_;
   ManualRegistration& registration_;
+  Eigen::Isometry3d start_;
 };
 
 }  // namespace isoshift

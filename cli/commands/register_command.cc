@@ -95,6 +95,14 @@ void add_result_options(CLI::App& command, RegisterOptions& options) {
       ->default_str("treatment");
 }
 
+void add_start_option(CLI::App& command, RegisterOptions& options) {
+  command
+      .add_option("--start", options.start,
+                  "Begin at the setup error in this file instead of the planned pose: a result.json, truth.json, or a "
+                  "pose set by hand")
+      ->type_name("FILE");
+}
+
 RegisterOptions register_options_from(const std::vector<std::string>& flags) {
   CLI::App app;
   RegisterOptions options;
@@ -126,12 +134,7 @@ void add_register_command(CLI::App& app, Console& console, int& exit_status) {
   command->add_option("-o,--output", options->output, "Folder for the results")->required()->type_name("FOLDER");
   command->add_option("--truth", *truth, "truth.json of a phantom study, to print beside the result")
       ->type_name("FILE");
-  command
-      ->add_option(
-          "--start", options->start,
-          "Search from the setup error in this file instead of the planned pose: a result.json, truth.json, or "
-          "a pose set by hand")
-      ->type_name("FILE");
+  add_start_option(*command, *options);
   command->add_flag_callback(
       "--no-search", [options] { options->registration.search.is_searched = false; },
       "Judge the pose of --start, or the planned one, and search none");

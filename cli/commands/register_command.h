@@ -10,6 +10,9 @@ namespace isoshift {
 // Adds the flags that decide which files are written.
 void add_result_options(CLI::App& command, RegisterOptions& options);
 
+// Adds --start.
+void add_start_option(CLI::App& command, RegisterOptions& options);
+
 // What flags of isoshift register say that name no parts of a study and no output. Throws UsageError for other flags,
 // and for those that contradict each other.
 RegisterOptions register_options_from(const std::vector<std::string>& flags);

@@ -18,20 +18,24 @@
 #include "io/report/canvas.h"
 #include "serve/http_server.h"
 #include "serve/view_screen.h"
+#include "workflow/register/start_pose.h"
 #include "workflow/room/clock.h"
 
 namespace isoshift {
 namespace {
 
 // The options that say what is shown, not how it is registered.
-const std::set<std::string> kOfTheView = {"study", "ct", "image", "plan", "structures", "output", "port", "help"};
+const std::set<std::string> kOfTheView = {"study",  "ct",   "image", "plan", "structures",
+                                          "output", "port", "start", "help"};
 
 void run_view(const RegisterOptions& options, std::uint16_t port, const std::vector<std::string>& typed,
               Console& console) {
   ConsoleObserver observer(console);
   const LiveStudy study(options.study, observer);
   ManualRegistration registration({.parts = options.study.parts, .flags = typed}, options.output);
-  ManualScreen manual(study, registration);
+  ManualScreen manual(
+      study, registration,
+      options.start.empty() ? Eigen::Isometry3d::Identity() : read_start(options.start, study.study()).setup_error);
 
   const std::string user = system_user().name;
   ServeFile serve;
@@ -73,6 +77,7 @@ void add_view_command(CLI::App& app, Console& console, int& exit_status) {
   add_study_options(*command, options->study);
   command->add_option("-o,--output", options->output, "Folder for the results")->required()->type_name("FOLDER");
   command->add_option("--port", *port, "Port to listen at [any that is free]");
+  add_start_option(*command, *options);
   add_result_options(*command, *options);
   add_registration_switches(*command, options->registration);
   command->callback([options, port, command, &console, &exit_status] {

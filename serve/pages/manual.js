@@ -236,6 +236,7 @@ try {
     const [columns, rows] = view.sizes[0];
     views.push(new ManualView(element("views"), view, data.subarray(at, at += columns * rows), on));
   }
+  pose = restingPose = study.start;
   addEventListener("resize", layOut);
   layOut();
   showNumbers();

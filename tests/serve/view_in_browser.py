@@ -92,11 +92,23 @@ def main(program, work):
         kept = json.loads((results / "2" / "result.json").read_text())
         expect(kept["verdict"] == "review" and not kept["searched"], f"{kept['verdict']}, searched: {kept['searched']}")
         one("#undo").click()
+        wait_for(lambda: [round(mm) for mm in shown()] == [13, -12, 12], 10, "the DRRs of the pose before")
+
+        # A result is looked at again.
+        view.kill()
+        view.wait()
+        view = subprocess.Popen([program, "view", study, "-o", results, "--start", results / "1" / "result.json"],
+                                stdout=log.open("w"))
+        wait_for(lambda: "/open/" in log.read_text(), 60, "the second address")
+        browser.get(re.search(r"http://\S+", log.read_text())[0])
+        wait_for(lambda: "rendered in" in one("#times").text, 20, "the DRRs of the result")
+        expect(abs(shown()[0] - 15) < 0.2, f"the page begins at {shown()}")
         for mode in ("side", "wipe", "flicker", "difference", "blend"):
             one(f"input[value={mode}]").click()
             time.sleep(0.3)
             browser.save_screenshot(str(work / f"{mode}.png"))
-        expect(not problems(browser), f"the browser complains: {problems(browser)}")
+        complaints = problems(browser)
+        expect(not complaints, f"the browser complains: {complaints}")
     finally:
         view.kill()
         view.wait()

@@ -97,6 +97,7 @@ TEST_F(ViewTest, TheViewsArePicturesOfTheXraysAndSayWhereTheRoomLies) {
   EXPECT_NEAR(step[0][2].get<double>() + step[1][2].get<double>(), 0.0, 1e-6);
   EXPECT_NEAR(front.at("from_source")[2], -1.0, 1e-9);
   EXPECT_EQ(get("/api/manual/xrays").body.size(), 2U * 96 * 96);
+  EXPECT_EQ(study.at("start"), pose(0));
 }
 
 TEST_F(ViewTest, TheDrrsFollowThePose) {
