@@ -1,5 +1,7 @@
 #include "workflow/register/setup_error_json.h"
 
+#include <fmt/format.h>
+
 #include <array>
 
 #include "base/error.h"
@@ -23,6 +25,17 @@ Eigen::Isometry3d setup_error_from(const nlohmann::json& json) {
     setup_error.linear().row(static_cast<Eigen::Index>(row)) = Eigen::RowVector3d(rows[row].data());
   if (!as_rigid(Eigen::Affine3d(setup_error.matrix()))) throw Error("rotation_matrix is no rotation");
   return setup_error;
+}
+
+Eigen::Isometry3d setup_error_in(const nlohmann::json& file, const std::string& name) {
+  try {
+    return setup_error_from(file.contains("setup_error") ? file.at("setup_error") : file.at("setup_error_room"));
+  } catch (const Error& error) {
+    throw Error(fmt::format("{}: {}", name, error.what()));
+  } catch (const nlohmann::json::exception& error) {
+    throw Error(fmt::format("{}: holds no complete setup error (a result.json or truth.json is needed): {}", name,
+                            error.what()));
+  }
 }
 
 }  // namespace isoshift

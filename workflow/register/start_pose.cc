@@ -4,7 +4,7 @@
 
 #include "base/error.h"
 #include "base/json_file.h"
-#include "workflow/register/truth.h"
+#include "workflow/register/setup_error_json.h"
 
 namespace isoshift {
 namespace {
@@ -37,7 +37,7 @@ void require_same_isocenter(const Json& json, const Eigen::Vector3d& isocenter_p
 Start read_start(const std::filesystem::path& file, const Study& study) {
   const std::string name = file.string();
   const auto [json, sha256] = read_json_file(file);
-  const Eigen::Isometry3d setup_error = read_setup_error(file);
+  const Eigen::Isometry3d setup_error = setup_error_in(json, name);
   try {
     require_same_patient(json, study.ct->identity, name);
     require_same_isocenter(json, study.isocenter_patient_mm, name);

@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "base/error.h"
+#include "base/json_file.h"
 #include "geometry/rotation.h"
 #include "geometry/target_error.h"
 #include "workflow/register/setup_error_json.h"
@@ -30,15 +31,7 @@ Eigen::Vector3d vector_from(const nlohmann::json& json) {
 }  // namespace
 
 Eigen::Isometry3d read_setup_error(const std::filesystem::path& path) {
-  try {
-    const nlohmann::json json = parsed(path);
-    return setup_error_from(json.contains("setup_error") ? json.at("setup_error") : json.at("setup_error_room"));
-  } catch (const Error& error) {
-    throw Error(fmt::format("{}: {}", path.string(), error.what()));
-  } catch (const nlohmann::json::exception& error) {
-    throw Error(fmt::format("{}: holds no complete setup error (a result.json or truth.json is needed): {}",
-                            path.string(), error.what()));
-  }
+  return setup_error_in(read_json_file(path).json, path.string());
 }
 
 std::vector<BodyTruth> read_body_truths(const std::filesystem::path& path) {
