@@ -9,15 +9,7 @@
 
 namespace isoshift {
 
-inline constexpr std::string_view kHtml = "text/html; charset=utf-8", kScript = "text/javascript; charset=utf-8",
-                                  kStyles = "text/css; charset=utf-8", kSvg = "image/svg+xml";
-
-// A file of serve/pages/ and its address.
-struct Page {
-  std::string_view path, type;
-  const char* text;
-  bool is_for_all = false;  // also for those who are not signed in
-};
+inline constexpr std::string_view kHtml = "text/html; charset=utf-8";
 
 HttpResponse json_answer(const nlohmann::ordered_json& json, int status = 200);
 HttpResponse refusal(int status, const std::string& why);

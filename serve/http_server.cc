@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <atomic>
 #include <cctype>
+#include <csignal>
+#include <mutex>
 #include <thread>
 #include <utility>
 #include <vector>
@@ -117,7 +119,11 @@ class HttpServer::Implementation {
   std::uint16_t port() const { return acceptor_.local_endpoint().port(); }
 
   void run(const std::function<bool()>& is_end_asked_for, const std::function<void(const std::string&)>& complain) {
-    complain_ = complain;
+    std::signal(SIGPIPE, SIG_IGN);
+    complain_ = [this, complain](const std::string& trouble) {
+      const std::lock_guard lock(complaining_);
+      complain(trouble);
+    };
     net::co_spawn(io_, accept(), net::detached);
     std::vector<std::jthread> threads;
     threads.reserve(static_cast<std::size_t>(options_.threads));
@@ -266,6 +272,7 @@ class HttpServer::Implementation {
 
   HttpServerOptions options_;
   HttpHandler handler_;
+  std::mutex complaining_;
   std::function<void(const std::string&)> complain_;
   std::atomic<std::size_t> open_ = 0;
   net::ssl::context tls_{net::ssl::context::tls_server};

@@ -37,7 +37,8 @@ class HttpServer {
   std::uint16_t port() const;
 
   // Answers until the end is asked for. The handler is called from several threads. What it throws is answered with
-  // status 500, without a word of the error: that goes to `complain`.
+  // status 500, without a word of the error: that goes to `complain`, one at a time. A browser may close its connection
+  // at any time: the signal SIGPIPE is ignored from then on.
   void run(
       const std::function<bool()>& is_end_asked_for,
       const std::function<void(const std::string&)>& complain = [](const std::string&) {});

@@ -132,8 +132,18 @@ Json Room::session(const std::string& name) {
   if (session.verdict == to_string(Verdict::kRejected))
     json["obstacle"] = "The result was rejected: there is nothing to release.";
   if (tree_.is_released(name)) json["obstacle"] = "The session has been released.";
+  json["newest"] = tree_.newest_of_same_xrays(name);
+  if (json["newest"] != name) json["obstacle"] = "The X-rays have a newer result.";
+  json["decision"] = nullptr;
+  json["pose_set_by"] = "";
   try {
-    json["record"] = tree_.registered(name).sha256;
+    const SessionRecord record = tree_.registered(name);
+    json["record"] = record.sha256;
+    json["pose_set_by"] = record.pose_set_by;
+    if (const auto decision = tree_.decision(name)) {
+      json["decision"] = {{"kind", to_string(decision->kind)}, {"by", decision->by}, {"words", in_words(*decision)}};
+      if (decision->forbids()) json["obstacle"] = "It was decided not to use the result.";
+    }
     (void)registered_content(name, kReport);
   } catch (const Error& error) {
     json["obstacle"] = error.what();
@@ -165,6 +175,33 @@ void Room::release(const std::string& session, const ResultsTree::Seen& seen, co
                 {.by = user, .user = user_.name, .sudo_user = user_.sudo_user, .despite_objection = despite_objection},
                 watch_.names_of_peers(), seen);
   seen_.reset();
+}
+
+void Room::decide(const Decision& decision) {
+  const std::lock_guard lock(mutex_);
+  tree_.decide(decision);
+  seen_.reset();
+}
+
+RegistrationOrder Room::order(const std::string& session) {
+  const std::lock_guard lock(mutex_);
+  look();
+  (void)listed(session);
+  return tree_.order(session);
+}
+
+Eigen::Isometry3d Room::setup_error(const std::string& session) {
+  const std::lock_guard lock(mutex_);
+  return read_report(tree_.session(tree_.newest_of_same_xrays(session))).setup_error;
+}
+
+std::filesystem::path Room::by_hand(const std::string& session) const {
+  return watch_.results / "by_hand" / name_of_xrays(session);
+}
+
+std::string Room::hand_over(const std::string& session, const std::filesystem::path& result, const std::string& user) {
+  const std::lock_guard lock(mutex_);
+  return tree_.hand_over(session, result, user);
 }
 
 void Room::audit(const std::string& event, const std::string& user, const std::string& session) {

@@ -1,6 +1,8 @@
 #pragma once
 // What the screen shows of a results tree, and what people do there. The engine, isoshift watch, is another process.
 
+#include <Eigen/Geometry>
+#include <filesystem>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -50,6 +52,18 @@ class Room {
   // Throws Error, and releases nothing, where ResultsTree::release() does.
   void release(const std::string& session, const ResultsTree::Seen& seen, const std::string& user,
                bool despite_objection);
+
+  // Records what a user has decided. Throws Error where ResultsTree::decide() does.
+  void decide(const Decision& decision);
+
+  // What a person who registers a session by hand begins with: how its X-rays are registered, the setup error that was
+  // found, and the folder for results. Throws NotThere, and Error if nobody kept how.
+  RegistrationOrder order(const std::string& session);
+  Eigen::Isometry3d setup_error(const std::string& session);
+  std::filesystem::path by_hand(const std::string& session) const;
+  // Hands a finished result to the engine, and returns the name of the session that the engine will make of it. Throws
+  // Error where ResultsTree::hand_over() does.
+  std::string hand_over(const std::string& session, const std::filesystem::path& result, const std::string& user);
 
   // A line in the audit log: that a user has signed in or looked at a session. If it cannot be written now, it is kept:
   // on a full disk people must see reports all the same.

@@ -3,36 +3,22 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <string_view>
 
 #include "serve/answers.h"
-#include "serve/pages/icon.svg.h"
-#include "serve/pages/room.css.h"
-#include "serve/pages/room.html.h"
-#include "serve/pages/room.js.h"
-#include "serve/pages/session.html.h"
-#include "serve/pages/session.js.h"
-#include "serve/pages/shared.js.h"
-#include "serve/pages/sign_in.html.h"
-#include "serve/pages/sign_in.js.h"
+#include "serve/pages.h"
 
 namespace isoshift {
 namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr std::array kRoomPages = {Page{"/", kHtml, kRoomHtml},
-                                   Page{"/room.js", kScript, kRoomJs},
-                                   Page{"/session.js", kScript, kSessionJs},
-                                   Page{"/shared.js", kScript, kSharedJs, true},
-                                   Page{"/sign-in", kHtml, kSignInHtml, true},
-                                   Page{"/sign_in.js", kScript, kSignInJs, true},
-                                   Page{"/icon.svg", kSvg, kIconSvg, true},
-                                   Page{"/room.css", kStyles, kRoomCss, true}};
 constexpr std::chrono::seconds kBeat(4);
-constexpr std::string_view kSessionPage = "/session/", kApi = "/api/", kSessionApi = "/api/sessions/",
-                           kEvents = "/api/events";
+constexpr std::size_t kLongestReason = 1000;
+constexpr std::string_view kSessionPage = "/session/", kByHand = "/by-hand", kApi = "/api/",
+                           kSessionApi = "/api/sessions/", kManual = "manual/", kEvents = "/api/events";
+// What the page on which people sign in is made of.
+constexpr std::array kForAll = {"/shared.js", "/sign_in.js", "/icon.svg", "/room.css"};
 
 // Of a user of the system or of the proxy: whatever else arrives is not looked up, counted or logged.
 bool is_name(const std::string& user) {
@@ -51,10 +37,12 @@ HttpResponse Screen::answer(const HttpRequest& request) {
   auto who = sign_ins_.of(request, is_automatic ? SignIns::Use::kStays : SignIns::Use::kActs);
   if (who && !who->roles.contains(Role::kView)) who.reset();
   if (is_read) {
-    const auto* page = std::ranges::find(kRoomPages, request.path, &Page::path);
-    if (page != kRoomPages.end() && (who || (page->is_for_all && !by_proxy_)))
-      return {.type = std::string(page->type), .body = page->text};
-    if (who && request.path.starts_with(kSessionPage)) return {.type = std::string(kHtml), .body = kSessionHtml};
+    if (!by_proxy_ && request.path == "/sign-in") return page_answer(Page::kSignIn);
+    if (who || (!by_proxy_ && std::ranges::find(kForAll, request.path) != kForAll.end()))
+      if (auto file = static_answer(request.path)) return *std::move(file);
+    if (who && request.path == "/") return page_answer(Page::kSessions);
+    if (who && request.path.starts_with(kSessionPage))
+      return page_answer(request.path.ends_with(kByHand) ? Page::kManual : Page::kSession);
   }
   if (!is_read && request.path == "/api/sign-in" && !by_proxy_) return sign_in(request);
   if (!who) {
@@ -94,17 +82,14 @@ HttpResponse Screen::sign_in(const HttpRequest& request) {
   }
   room_.audit("signed in", user);
   HttpResponse response = json_answer({{"user", user}});
-  response.headers.emplace_back(
-      "Set-Cookie", fmt::format("{}={}; Path=/; HttpOnly; SameSite=Strict{}", sign_in_cookie(request), *attempt.cookie,
-                                request.is_encrypted ? "; Secure" : ""));
+  response.headers.emplace_back("Set-Cookie", sign_in_cookie_header(request, *attempt.cookie));
   return response;
 }
 
 HttpResponse Screen::sign_out(const HttpRequest& request) {
   sign_ins_.sign_out(request);
   HttpResponse response = json_answer(Json::object());
-  response.headers.emplace_back("Set-Cookie", fmt::format("{}=; Path=/; HttpOnly; Max-Age=0{}", sign_in_cookie(request),
-                                                          request.is_encrypted ? "; Secure" : ""));
+  response.headers.emplace_back("Set-Cookie", sign_in_cookie_header(request, ""));
   return response;
 }
 
@@ -131,7 +116,9 @@ HttpResponse Screen::api(const HttpRequest& request, const SignedIn& who) {
 
 HttpResponse Screen::session(const HttpRequest& request, const SignedIn& who, const std::string& name,
                              const std::string& what) {
+  if (what.starts_with(kManual)) return desk_.answer(request, who, name, what.substr(kManual.size()));
   if (request.method == "POST") {
+    if (what == "decide") return decide(request, who, name);
     if (what == "release") return release(request, who, name);
     return refusal(404, "There is nothing at this address.");
   }
@@ -141,6 +128,26 @@ HttpResponse Screen::session(const HttpRequest& request, const SignedIn& who, co
   room_.audit("viewed", who.user, name);
   if (what == "report.html") return report_answer(std::move(content));
   return {.type = "application/pdf", .body = std::move(content)};
+}
+
+HttpResponse Screen::decide(const HttpRequest& request, const SignedIn& who, const std::string& name) {
+  if (!who.roles.contains(Role::kRelease)) return refusal(403, fmt::format("{} may not decide.", who.user));
+  if (!has_type_json(request)) return refusal(415, "JSON is expected.");
+  Decision decision{.session = name, .by = who.user};
+  try {
+    const Json body = Json::parse(request.body);
+    const auto kind = decision_kind_from(body.at("decision").get<std::string>());
+    if (!kind) return refusal(400, "decision is agreed, rejected, repeat or reopened.");
+    decision.kind = *kind;
+    decision.record = body.at("record");
+    decision.reason = body.at("reason");
+  } catch (const Json::exception&) {
+    return refusal(400, "decision, record and reason are expected.");
+  }
+  if (decision.reason.size() > kLongestReason) return refusal(400, "The reason is too long.");
+  if (decision.reason.empty() && decision.kind != DecisionKind::kAgreed) return refusal(400, "A reason is missing.");
+  room_.decide(decision);
+  return json_answer({{"decided", to_string(decision.kind)}});
 }
 
 HttpResponse Screen::release(const HttpRequest& request, const SignedIn& who, const std::string& name) {

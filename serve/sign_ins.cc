@@ -33,6 +33,11 @@ std::string random_word() {
   return word;
 }
 
+std::string sign_in_cookie_header(const HttpRequest& request, const std::string& value) {
+  return fmt::format("{}={}; Path=/; HttpOnly; SameSite=Strict{}{}", sign_in_cookie(request), value,
+                     value.empty() ? "; Max-Age=0" : "", request.is_encrypted ? "; Secure" : "");
+}
+
 SignIns::SignIns(const ServeFile& serve, const Clock& clock, IsPassword is_password, const Limits& limits)
     : serve_(serve), clock_(clock), is_password_(std::move(is_password)), limits_(limits) {}
 

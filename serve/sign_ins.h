@@ -27,6 +27,8 @@ struct SignedIn {
 inline const char* sign_in_cookie(const HttpRequest& request) {
   return request.is_encrypted ? "__Host-isoshift" : "isoshift";
 }
+// The header Set-Cookie that gives it a value; without one: that takes it away.
+std::string sign_in_cookie_header(const HttpRequest& request, const std::string& value);
 inline constexpr const char* kTokenHeader = "x-isoshift-token";
 
 // May be called from several threads.

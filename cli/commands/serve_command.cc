@@ -2,12 +2,11 @@
 
 #include <fmt/format.h>
 
-#include <csignal>
 #include <memory>
-#include <mutex>
 
 #include "base/graceful_end.h"
 #include "cli/commands/commands.h"
+#include "cli/commands/register_command.h"
 #include "io/config/serve_file.h"
 #include "io/report/canvas.h"
 #include "serve/http_server.h"
@@ -22,25 +21,20 @@ namespace {
 void run_serve(const std::filesystem::path& file, Console& console) {
   const ServeFile serve = read_serve_file(file);
   const GracefulEnd end;
-  std::signal(SIGPIPE, SIG_IGN);  // a browser may close its connection at any time
   SystemClock clock;
   Room room(serve.watch, clock);
   SignIns sign_ins(serve, clock, [&](const std::string& user, const std::string& password) {
     return is_password_of(serve.pam_service, user, password);
   });
-  Screen screen(room, sign_ins, clock, serve.proxy.has_value());
+  Desk desk(room, clock, register_options_from);
+  Screen screen(room, desk, sign_ins, clock, serve.proxy.has_value());
   HttpServer server({.address = serve.address, .port = serve.port, .tls = serve.tls},
                     [&](const HttpRequest& request) { return screen.answer(request); });
   ConsoleObserver observer(console);
-  std::mutex saying;
   observer.say(fmt::format("serving {} at {}://{}:{}", serve.watch.results.string(), serve.tls ? "https" : "http",
                            serve.address.find(':') == std::string::npos ? serve.address : "[" + serve.address + "]",
                            server.port()));
-  server.run([&] { return end.is_asked_for(); },
-             [&](const std::string& trouble) {
-               const std::lock_guard lock(saying);  // the server has several threads
-               observer.say(printable(trouble));
-             });
+  server.run([&] { return end.is_asked_for(); }, [&](const std::string& trouble) { observer.say(printable(trouble)); });
 }
 
 }  // namespace

@@ -3,9 +3,7 @@
 #include <fmt/format.h>
 
 #include <atomic>
-#include <csignal>
 #include <memory>
-#include <mutex>
 
 #include "base/error.h"
 #include "base/graceful_end.h"
@@ -50,18 +48,12 @@ void run_view(const RegisterOptions& options, std::uint16_t port, const std::vec
   ViewScreen screen(manual, sign_ins, user);
 
   const GracefulEnd end;
-  std::signal(SIGPIPE, SIG_IGN);  // a browser may close its connection at any time
   HttpServer server({.address = serve.address, .port = port},
                     [&](const HttpRequest& request) { return screen.answer(request); });
   console.out << fmt::format("Open http://{}:{}/open/{} in a browser of this computer; it opens once.\n", serve.address,
                              server.port(), word)
               << std::flush;
-  std::mutex saying;
-  server.run([&] { return end.is_asked_for(); },
-             [&](const std::string& trouble) {
-               const std::lock_guard lock(saying);  // the server has several threads
-               observer.say(printable(trouble));
-             });
+  server.run([&] { return end.is_asked_for(); }, [&](const std::string& trouble) { observer.say(printable(trouble)); });
 }
 
 }  // namespace

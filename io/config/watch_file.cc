@@ -138,6 +138,7 @@ WatchFile read_watch_file(const fs::path& path) {
   }
   if (section.find<std::string>("signing_key", "the name of a file"))
     watch.signing_key = read.file(section, "signing_key");
+  watch.needs_second_person = section.find<bool>("second_person", "true or false").value_or(false);
   section.end();
   return watch;
 }

@@ -38,6 +38,7 @@ struct WatchFile {
   SiteFile site;                          // with its rule for sessions
   std::vector<std::string> registration;  // flags of isoshift register
   std::vector<DicomPeer> peers;
+  bool needs_second_person = false;   // who agrees before another one releases what was not accepted
   std::filesystem::path signing_key;  // of releases: Ed25519, PEM; empty: they are not signed
 
   std::vector<std::string> names_of_peers() const;

@@ -1,11 +1,14 @@
 // A study on the screen: a person moves the patient, and the DRRs follow; the same registration as everywhere begins there.
-import {bytes, element, get, make, post, signedIn, verdictCell} from "/shared.js";
+import {bytes, element, kBeingRead, get, make, post, signedIn, verdictCell} from "/shared.js";
 import {ManualView} from "/manual_view.js";
 import {anglesDeg, fromNumbers, motionOf, moved, planned, turned} from "/pose.js";
 
-const kApi = "/api/manual/";
+// Of the room's screen, "/session/NAME/by-hand"; else isoshift view serves one study.
+const [, place, session] = location.pathname.split("/");
+const isOfRoom = place === "session";
+const kApi = isOfRoom ? "/api/sessions/" + session + "/manual/" : "/api/manual/";
 const kMoving = 1, kAtRest = 0;    // detail of the DRRs: half the pixels along an edge, or all
-const kRestMs = 150, kFlickerMs = 500, kAskMs = 300;
+const kRestMs = 150, kFlickerMs = 500, kAskMs = 300, kReadMs = 1000;
 const kModes = ["blend", "side", "wipe", "flicker", "difference"];
 const kNumbers = ["x", "y", "z", "rx", "ry", "rz"];
 const kAxes = [[1, 0, 0], [0, 1, 0], [0, 0, 1]];
@@ -166,7 +169,9 @@ function showResult(now) {
   line.append(verdictCell(now.verdict), " ", report);
   const reasons = make("ul");
   for (const reason of now.reasons) reasons.append(make("li", reason));
-  element("result").replaceChildren(line, reasons, make("p", "Written to " + now.folder, {class: "dim"}));
+  element("result").replaceChildren(line, reasons);
+  if (!isOfRoom) element("result").append(make("p", "Written to " + now.folder, {class: "dim"}));
+  element("hand-over").hidden = !isOfRoom;
 }
 
 async function watchRegistration() {
@@ -190,8 +195,24 @@ async function watchRegistration() {
   }
 }
 
+// A result of the room becomes a session of its own, which is released like any other.
+async function handOver() {
+  problem("");
+  try {
+    const {session: name} = await post(kApi + "hand-over", {});
+    element("hand-over").hidden = true;
+    const link = make("a", "session " + name, {href: "/session/" + encodeURIComponent(name)});
+    const line = make("p", "The engine makes it ");
+    line.append(link);
+    element("result").replaceChildren(line);
+  } catch (error) {
+    problem(error.message);
+  }
+}
+
 async function register(searched) {
   problem("");
+  element("hand-over").hidden = true;
   element("result").replaceChildren();
   try {
     await post(kApi + "begin", {setup_error: pose, searched});
@@ -217,15 +238,35 @@ element("zoom-in").addEventListener("click", () => zoom(true));
 element("zoom-out").addEventListener("click", () => zoom(false));
 element("optimize").addEventListener("click", () => register(true));
 element("keep").addEventListener("click", () => register(false));
+element("hand-over").addEventListener("click", handOver);
 element("cancel").addEventListener("click", () => post(kApi + "cancel", {}).catch(error => problem(error.message)));
 setInterval(() => {
   isFlickered = !isFlickered;
   if (mode() === "flicker") draw();
 }, kFlickerMs);
 
+// The room's screen reads a study when somebody asks for it.
+async function read() {
+  for (;;) {
+    try {
+      return await get(kApi + "study");
+    } catch (error) {
+      if (error.status !== kBeingRead) throw error;
+      problem(error.message);
+      await new Promise(resolve => setTimeout(resolve, kReadMs));
+    }
+  }
+}
+
 try {
   await signedIn();
-  const study = await get(kApi + "study");
+  if (isOfRoom) {
+    element("back").hidden = false;
+    element("back").href = "/session/" + session;
+    element("back").textContent = "Session " + decodeURIComponent(session);
+  }
+  const study = await read();
+  problem("");
   document.title = "isoshift: " + study.patient;
   element("patient").textContent = study.patient;
   element("patient-id").textContent = study.patient_id;

@@ -31,6 +31,16 @@ function show(now) {
   element("despite-label").hidden = !needsWord || now.obstacle !== "";
   const may = me.roles.includes("release");
   element("release").disabled = now.obstacle !== "" || !may || !hasReport || (needsWord && !element("despite").checked);
+  // Whoever may release decides: with a reason, but who agrees needs none.
+  const reason = element("reason").value.trim(), decided = now.decision ? now.decision.kind : "";
+  const mayDecide = may && hasReport && now.record !== "";
+  element("agreed").disabled = !mayDecide || decided === "agreed";
+  element("rejected").disabled = !mayDecide || reason === "" || decided === "rejected";
+  element("repeat").disabled = !mayDecide || reason === "" || decided === "repeat";
+  element("reopened").disabled = !mayDecide || reason === "" || decided === "";
+  element("newest").hidden = now.newest === session;
+  element("newest").href = "/session/" + encodeURIComponent(now.newest);
+  element("newest").textContent = "Newest result of these X-rays: session " + now.newest;
   write("goes-to", now.obstacle !== "" ? now.obstacle
     : !may ? "You may look at sessions, and not release them."
     : now.peers.length ? "goes to " + now.peers.join(", ") : "The watch file names no peers: nothing is sent.");
@@ -63,9 +73,25 @@ element("release").addEventListener("click", async () => {
   await update();
 });
 
+for (const decision of ["agreed", "rejected", "repeat", "reopened"])
+  element(decision).addEventListener("click", async () => {
+    for (const other of ["agreed", "rejected", "repeat", "reopened"]) element(other).disabled = true;
+    write("problem", "");
+    try {
+      await post(address + "/decide", {decision, record: shown.record, reason: element("reason").value.trim()});
+      element("reason").value = "";
+    } catch (error) {
+      write("problem", error.message);
+    }
+    await update();
+  });
+element("reason").addEventListener("input", () => show(shown));
+
 element("name").textContent = session;
 element("pdf").href = address + "/report.pdf";
 me = await showSignedIn();
+element("by-hand").hidden = !me.roles.includes("register");
+element("by-hand").href = "/session/" + encodeURIComponent(session) + "/by-hand";
 await update();
 element("report").src = address + "/report.html";
 let version = null, isAsking = false;

@@ -10,6 +10,8 @@ export function make(tag, text, attributes = {}) {
   return made;
 }
 
+export const kBeingRead = 503;  // the status while a study is being read: ask again
+
 let token = "";
 
 async function answered(response) {
@@ -18,7 +20,11 @@ async function answered(response) {
     throw new Error("Nobody is signed in.");
   }
   const body = await response.json().catch(() => ({}));
-  if (!response.ok) throw new Error(body.error || "The server answered with status " + response.status + ".");
+  if (!response.ok) {
+    const error = new Error(body.error || "The server answered with status " + response.status + ".");
+    error.status = response.status;
+    throw error;
+  }
   return body;
 }
 

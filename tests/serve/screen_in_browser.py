@@ -15,6 +15,7 @@ import sys
 import time
 
 from selenium.webdriver.common.by import By
+from selenium.webdriver.common.keys import Keys
 
 ROOT = pathlib.Path(__file__).resolve().parents[1]
 sys.path += [str(ROOT / "io/report"), str(ROOT / "workflow/room")]
@@ -36,6 +37,50 @@ def text(browser, selector):
     return "\n".join(one.text for one in browser.find_elements(By.CSS_SELECTOR, selector))
 
 
+def decide_and_register_by_hand(doe, poe, address, results):
+    """The session that is not released yet: rejected, taken back, registered by hand, and released by another person."""
+    released = {path.stem for path in (results / "released").glob("*.json")}
+    [session] = [path.name for path in (results / "sessions").glob("[!.]*") if path.name not in released]
+    doe.get(f"{address}/session/{session}")
+    wait_for(lambda: doe.find_element(By.ID, "release").is_enabled(), 10, "a session that can be released")
+    expect(not doe.find_element(By.ID, "rejected").is_enabled(), "a result could be rejected without a reason")
+    doe.find_element(By.ID, "reason").send_keys("the patient coughed")
+    doe.find_element(By.ID, "rejected").click()
+    wait_for(lambda: "rejected by doe on" in text(doe, "#state") and "coughed" in text(doe, "#state"), 10, "the decision")
+    expect(not doe.find_element(By.ID, "release").is_enabled(), "what was rejected could be released")
+    poe.get(f"{address}/session/{session}")
+    wait_for(lambda: "rejected by doe on" in text(poe, "#state"), 10, "the decision in another browser")
+    doe.find_element(By.ID, "reason").send_keys("no, he did not")
+    doe.find_element(By.ID, "reopened").click()
+    wait_for(lambda: doe.find_element(By.ID, "release").is_enabled(), 10, "the decision taken back")
+    expect(not poe.find_element(By.ID, "by-hand").is_displayed(), "who may not register is led to registration by hand")
+
+    doe.find_element(By.ID, "by-hand").click()
+    wait_for(lambda: "rendered in" in text(doe, "#times"), 60, "the DRRs of the session")
+    doe.find_element(By.TAG_NAME, "body").send_keys(Keys.ARROW_RIGHT)
+    doe.find_element(By.ID, "keep").click()
+    wait_for(lambda: "Kept as it was set" in text(doe, "#result"), 60, "the pose kept")
+    doe.find_element(By.ID, "hand-over").click()
+    wait_for(lambda: "The engine makes it" in text(doe, "#result"), 10, "the result handed over")
+    doe.find_element(By.CSS_SELECTOR, "#result a").click()
+    wait_for(lambda: f"Session {session}-2" in text(doe, "h1"), 10, "the page of the result by hand")
+    wait_for(lambda: (results / "sessions" / f"{session}-2").exists(), 20, "the result by hand in the tree")
+    doe.refresh()
+    wait_for(lambda: doe.find_element(By.ID, "release").is_enabled(), 10, "a result by hand that can be released")
+    doe.find_element(By.ID, "release").click()
+    wait_for(lambda: "has set its pose by hand" in text(doe, "#problem"), 10, "the refusal of a release by the same person")
+    poe.get(f"{address}/session/{session}")
+    wait_for(lambda: f"session {session}-2" in text(poe, "#newest"), 10, "the way to the newest result")
+    expect(not poe.find_element(By.ID, "release").is_enabled(), "a superseded result could be released")
+    poe.find_element(By.ID, "newest").click()
+    wait_for(lambda: poe.find_element(By.ID, "agreed").is_enabled(), 10, "the result by hand")
+    poe.find_element(By.ID, "agreed").click()
+    wait_for(lambda: "agreed to by poe" in text(poe, "#state"), 10, "the agreement")
+    wait_for(lambda: "agreed to by poe" in text(doe, "#state"), 10, "the agreement in the other browser")
+    doe.find_element(By.ID, "release").click()
+    wait_for(lambda: "released by doe" in text(doe, "#state"), 10, "the release of the result by hand")
+
+
 def main(program, work):
     (work / "in").mkdir()
     secret = work / "secret"
@@ -46,7 +91,7 @@ def main(program, work):
         "watch_file": 1, "folder": "in", "results": "results", "site": "site.json", "register": ["--preset=fast"]}))
     (work / "serve.json").write_text(json.dumps({
         "serve_file": 1, "watch": "watch.json", "port": 0, "proxy": {"header": "X-Remote-User", "secret_file": "secret"},
-        "roles": {"doe": ["view", "release"], "roe": ["view"]}}))
+        "roles": {"doe": ["view", "register", "release"], "roe": ["view"], "poe": ["view", "release"]}}))
     results, log = work / "results", work / "serve.log"
 
     def bring_study(seed):
@@ -98,6 +143,10 @@ def main(program, work):
         audit = (results / "audit.jsonl").read_text()
         for event in ("viewed", "released"):
             expect(f'"event":"{event}"' in audit and '"by":"doe"' in audit, f"the audit log does not tell of {event}")
+
+        poe = browser_of("poe", address)
+        decide_and_register_by_hand(doe, poe, address, results)
+        poe.quit()
 
         watch.kill()
         watch.wait()

@@ -3,7 +3,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <chrono>
 #include <fstream>
+#include <thread>
 
 #include "base/output_folder.h"
 #include "base/sha256.h"
@@ -11,6 +13,7 @@
 #include "io/study/session_files.h"
 #include "tests/support/oblique_report.h"
 #include "tests/support/results_tree.h"
+#include "tests/support/small_study.h"
 
 namespace isoshift {
 namespace {
@@ -19,8 +22,8 @@ using testing::HasSubstr;
 using testing::Not;
 using Json = nlohmann::json;
 
-// A results tree with a session that was accepted, and two users: one may look, one may also release, one may
-// nothing.
+// A results tree with a session that was accepted, and users: one may look, one may also release, one also register,
+// and one may nothing.
 class ScreenTest : public testing::Test {
  protected:
   HttpRequest request(const std::string& user, const std::string& method, const std::string& path,
@@ -52,6 +55,15 @@ class ScreenTest : public testing::Test {
     return name;
   }
   Json session() { return Json::parse(get("/api/sessions/" + a_).body); }
+  // The answer once the study is not being read any more.
+  HttpResponse wait_until_read(const std::string& path) {
+    HttpResponse answer = get(path, "registrar");
+    while (answer.status == 503) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(20));
+      answer = get(path, "registrar");
+    }
+    return answer;
+  }
   // What a person says who has looked at the session now.
   Json word() {
     const Json seen = session();
@@ -62,12 +74,15 @@ class ScreenTest : public testing::Test {
   ResultsTree tree_{folder_ / "results"};
   ServeFile serve_{.watch = {.results = tree_.path(), .site = {.name = "Linac 3"}, .peers = {{.name = "record"}}},
                    .proxy = ServeFile::Proxy{.header = "x-remote-user", .secret = "word"},
-                   .roles = {{"viewer", {Role::kView}}, {"releaser", {Role::kView, Role::kRelease}}}};
+                   .roles = {{"viewer", {Role::kView}},
+                             {"releaser", {Role::kView, Role::kRelease}},
+                             {"registrar", {Role::kView, Role::kRegister}}}};
   const std::string a_ = register_result({"1.2.1", "1.2.2"});
   SystemClock clock_;
   Room room_{serve_.watch, clock_};
   SignIns sign_ins_{serve_, clock_, [](const std::string&, const std::string&) { return false; }};
-  Screen screen_{room_, sign_ins_, clock_, true};
+  Desk desk_{room_, clock_, [](const std::vector<std::string>&) { return RegisterOptions(); }};
+  Screen screen_{room_, desk_, sign_ins_, clock_, true};
 };
 
 TEST_F(ScreenTest, NothingIsShownToStrangers) {
@@ -151,6 +166,53 @@ TEST_F(ScreenTest, WhatOtherXraysSayMustHaveBeenOnTheScreen) {
   EXPECT_EQ(post("releaser", "/api/sessions/" + a_ + "/release", this->word()).status, 200);
 }
 
+TEST_F(ScreenTest, WhoMayReleaseDecidesWithAReason) {
+  const std::string address = "/api/sessions/" + a_ + "/decide";
+  const Json rejected = {{"decision", "rejected"}, {"record", session().at("record")}, {"reason", "he coughed"}};
+  EXPECT_EQ(post("viewer", address, rejected).status, 403);
+  Json odd = rejected;
+  odd["reason"] = "";
+  EXPECT_EQ(post("releaser", address, odd).status, 400);
+  odd["reason"] = std::string(1001, 'a');
+  EXPECT_EQ(post("releaser", address, odd).status, 400);
+  odd = rejected;
+  odd["decision"] = "maybe";
+  EXPECT_EQ(post("releaser", address, odd).status, 400);
+  odd = rejected;
+  odd["record"] = std::string(64, '0');
+  EXPECT_EQ(post("releaser", address, odd).status, 409) << "of another result";
+  EXPECT_EQ(session().at("decision"), nullptr);
+  EXPECT_EQ(post("releaser", address, rejected).status, 200);
+  EXPECT_THAT(session().at("state").get<std::string>(), HasSubstr("held; rejected by releaser on "));
+  EXPECT_EQ(session().at("decision").at("kind"), "rejected");
+  EXPECT_NE(session().at("obstacle"), "");
+  EXPECT_EQ(post("releaser", "/api/sessions/" + a_ + "/release", word()).status, 409);
+}
+
+TEST_F(ScreenTest, WhoMayRegisterDoesSoByHand) {
+  const std::string address = "/api/sessions/" + a_ + "/manual/study";
+  EXPECT_EQ(get(address, "releaser").status, 403);
+  EXPECT_EQ(get(address, "registrar").status, 409) << "nobody kept how it was registered";
+  EXPECT_EQ(get("/api/sessions/none/manual/study", "registrar").status, 404);
+  tree_.keep_order(a_, {.parts = {.study = folder_ / "nowhere"}});
+  const HttpResponse failed = wait_until_read(address);
+  EXPECT_EQ(failed.status, 409) << failed.body;
+  EXPECT_THAT(failed.body, HasSubstr("nowhere"));
+  EXPECT_EQ(wait_until_read(address).status, 409) << "read again";
+  EXPECT_THAT(text_of(tree_.path() / "audit.jsonl"), HasSubstr(R"("event":"opened by hand","by":"registrar")"));
+}
+
+TEST_F(ScreenTest, AStudyIsReadOnceForAllWhoWorkOnIt) {
+  const SmallStudy study;
+  tree_.keep_order(a_, {.parts = {.study = study.path()}});
+  const std::string address = "/api/sessions/" + a_ + "/manual/";
+  const HttpResponse read = wait_until_read(address + "study");
+  ASSERT_EQ(read.status, 200) << read.body;
+  EXPECT_EQ(Json::parse(read.body).at("views").size(), 2U);
+  EXPECT_EQ(get(address + "xrays", "registrar").status, 200) << "at once";
+  EXPECT_EQ(post("registrar", address + "hand-over", {}).status, 409) << "there is no result";
+}
+
 // Moved away and registered again, with nobody looking in between.
 TEST_F(ScreenTest, ASessionThatWasRegisteredAgainIsShownAsItIsNow) {
   const std::string record = session().at("record");
@@ -226,7 +288,8 @@ class ScreenWithPasswords : public testing::Test {
   Room room_{serve_.watch, clock_};
   SignIns sign_ins_{serve_, clock_,
                     [](const std::string&, const std::string& password) { return password == "right"; }};
-  Screen screen_{room_, sign_ins_, clock_, false};
+  Desk desk_{room_, clock_, [](const std::vector<std::string>&) { return RegisterOptions(); }};
+  Screen screen_{room_, desk_, sign_ins_, clock_, false};
 };
 
 TEST_F(ScreenWithPasswords, OpenWithACookieThatNoOtherHostCanPlant) {

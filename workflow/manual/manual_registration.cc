@@ -69,4 +69,9 @@ void ManualRegistration::cancel() {
   state_ = {};
 }
 
+void ManualRegistration::forget() {
+  const std::lock_guard lock(mutex_);
+  if (!running_) state_ = {};
+}
+
 }  // namespace isoshift

@@ -33,6 +33,9 @@ class ManualRegistration {
   // Ends what runs, without a result.
   void cancel();
 
+  // Says no more of what has ended: its result was moved away.
+  void forget();
+
  private:
   void look();
   void end_process();

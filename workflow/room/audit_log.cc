@@ -136,6 +136,7 @@ void AuditLog::Proofs::add(const Json& line) {
   if (event == "registered") registrations[session] = text_of(line, "record");
   if (event == "sent") sendings.insert({session, text_of(line, "peer"), text_of(line, "object")});
   if (event == "objection") objections[session] = text_of(line, "objection");
+  if (event == "decided") decisions[session] = text_of(line, "file");
   if (event == "not released") releases.erase(session);
   if (event != "released") return;
   releases[session] = text_of(line, "release");
@@ -207,6 +208,11 @@ std::size_t AuditLog::release_number(const std::string& session) const {
 std::string AuditLog::newest_objection(const std::string& session) const {
   const auto found = proofs().objections.find(session);
   return found == proofs().objections.end() ? "" : found->second;
+}
+
+std::string AuditLog::newest_decision(const std::string& session) const {
+  const auto found = proofs().decisions.find(session);
+  return found == proofs().decisions.end() ? "" : found->second;
 }
 
 bool AuditLog::has_sending(const std::string& session, const std::string& peer,

@@ -8,6 +8,7 @@
 #include <cerrno>
 #include <chrono>
 #include <cstring>
+#include <fstream>
 #include <iterator>
 #include <thread>
 
@@ -16,7 +17,10 @@
 #include "base/local_time.h"
 #include "base/output_folder.h"
 #include "base/sha256.h"
+#include "base/system_user.h"
 #include "io/report/result_folder.h"
+#include "workflow/room/decision_files.h"
+#include "workflow/room/signed_json.h"
 
 namespace isoshift {
 namespace {
@@ -63,23 +67,12 @@ Release release_from(const nlohmann::json& json) {
 
 constexpr const char* kObjectionsFile = "objections.json";
 
-// A label or a file's name need not be UTF-8.
-std::string text_of(const Json& json) { return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n"; }
-
 Json json_of(const Objection& objection) {
   return {{"words", objection.words}, {"newer_have_results", objection.newer_have_results}};
 }
 
 // Of its text in the file.
-std::string sha256_of(const Objection& objection) { return isoshift::sha256_of(text_of(json_of(objection))); }
-
-constexpr const char* kSignatureKey = "signature";
-
-// What is signed of a release: all of it, with its keys sorted, in as few characters as JSON allows.
-std::string signed_text(nlohmann::json release) {
-  release.erase(kSignatureKey);
-  return release.dump();
-}
+std::string sha256_of(const Objection& objection) { return isoshift::sha256_of(file_text(json_of(objection))); }
 
 // Folders of registrations under way: ".NAME.registering-PROCESS", and what isoshift register writes beside them.
 constexpr const char* kRegistering = ".registering-";
@@ -101,7 +94,7 @@ void check_is_owner(const fs::path& results) {
 }
 
 ResultsTree::ResultsTree(fs::path path) : path_(std::move(path)), audit_(path_ / "audit.jsonl") {
-  for (const char* folder : {"sessions", "registered", "released", "sent"}) {
+  for (const char* folder : {"sessions", "registered", "released", "sent", "decided", "orders", "handed_over"}) {
     std::error_code error;
     fs::create_directories(path_ / folder, error);
     if (error) throw Error(fmt::format("{}: cannot be made: {}", (path_ / folder).string(), error.message()));
@@ -110,6 +103,7 @@ ResultsTree::ResultsTree(fs::path path) : path_(std::move(path)), audit_(path_ /
 
 ResultsTree::ResultsTree(const WatchFile& watch) : ResultsTree(watch.results) {
   if (!watch.signing_key.empty()) key_.emplace(watch.signing_key);
+  needs_second_person_ = watch.needs_second_person;
 }
 
 std::optional<FileLock> ResultsTree::try_lock() const { return FileLock::try_take(path_ / ".watch.lock"); }
@@ -117,6 +111,8 @@ std::optional<FileLock> ResultsTree::try_lock() const { return FileLock::try_tak
 fs::path ResultsTree::record_file(const std::string& session) const {
   return path_ / "registered" / (session + ".json");
 }
+
+fs::path ResultsTree::order_file(const std::string& session) const { return path_ / "orders" / (session + ".json"); }
 
 fs::path ResultsTree::release_file(const std::string& session) const {
   return path_ / "released" / (session + ".json");
@@ -142,7 +138,7 @@ void ResultsTree::keep_objections(const std::map<std::string, Objection>& object
     if (const std::string sha256 = sha256_of(objection); audit_.newest_objection(session) != sha256)
       audit_.append("objection", {{"session", session}, {"objection", sha256}});
   }
-  replace_text(path_ / kObjectionsFile, text_of(json));
+  replace_text(path_ / kObjectionsFile, file_text(json));
 }
 
 Objection ResultsTree::objection(const std::string& session) const {
@@ -184,9 +180,10 @@ void ResultsTree::check_is_new(const std::string& session) const {
                     folder.string()));
 }
 
-void ResultsTree::publish(const std::string& session) {
+void ResultsTree::publish(const std::string& session) { publish(session, registering(session)); }
+
+void ResultsTree::publish(const std::string& session, const fs::path& folder) {
   check_is_new(session);
-  const fs::path folder = registering(session);
   const SessionRecord record = record_of(session, folder);
   const std::string text = json_of(record);
   replace_text(record_file(session), text);
@@ -194,6 +191,69 @@ void ResultsTree::publish(const std::string& session) {
   if (::rename(folder.c_str(), this->session(session).c_str()) != 0)
     throw WriteError(fmt::format("{}: cannot be written: {}", this->session(session).string(), std::strerror(errno)));
   flush(path_ / "sessions");
+}
+
+void ResultsTree::keep_order(const std::string& session, const RegistrationOrder& order) {
+  replace_text(order_file(session), to_line(order) + "\n");
+}
+
+RegistrationOrder ResultsTree::order(const std::string& session) const {
+  const fs::path file = order_file(name_of_xrays(session));
+  std::ifstream text(file);
+  std::string line;
+  if (!std::getline(text, line))
+    throw Error(
+        fmt::format("session {}: how it was registered is not known: {} cannot be read. An earlier version of "
+                    "isoshift watch registered it",
+                    session, file.string()));
+  return registration_order_from(line, file.string());
+}
+
+std::string ResultsTree::hand_over(const std::string& session, const fs::path& folder, const std::string& by) {
+  const FileLock lock = lock_releases();
+  const fs::path place = path_ / "handed_over" / name_of_xrays(session);
+  if (fs::exists(place))
+    throw Error(
+        fmt::format("session {}: an earlier result by hand waits for isoshift watch. Try again when it has been "
+                    "taken over",
+                    session));
+  const SessionRecord record = record_of(further_name(session), folder);
+  audit_.append("handed over", {{"session", session},
+                                {"by", by},
+                                {"user", system_user().name},
+                                {"verdict", record.verdict},
+                                {"result", record.files.at(kResultFile)}});
+  fs::rename(folder, place);
+  flush(path_ / "handed_over");
+  return record.session;
+}
+
+std::vector<std::string> ResultsTree::handed_over() const {
+  std::vector<std::string> sessions;
+  for (const auto& entry : fs::directory_iterator(path_ / "handed_over"))
+    if (fs::exists(entry.path() / kResultFile)) sessions.push_back(entry.path().filename().string());
+  return sessions;
+}
+
+std::string ResultsTree::take_over(const std::string& session) {
+  std::string name = further_name(session);
+  publish(name, path_ / "handed_over" / session);
+  return name;
+}
+
+std::string ResultsTree::further_name(const std::string& session) const {
+  int number = 2;
+  while (fs::exists(fs::symlink_status(this->session(name_of_xrays(session, number))))) ++number;
+  return name_of_xrays(session, number);
+}
+
+std::string ResultsTree::newest_of_same_xrays(const std::string& session) const {
+  std::string newest = session;
+  for (int number = 2;; ++number) {
+    std::string further = name_of_xrays(session, number);
+    if (!fs::exists(this->session(further))) return newest;
+    newest = std::move(further);
+  }
 }
 
 SessionRecord ResultsTree::registered(const std::string& session) const {
@@ -234,7 +294,11 @@ std::optional<Release> ResultsTree::release_of(const std::string& session) const
                     "file, or it was changed since, or another release followed it. Nothing of the session is sent. "
                     "Remove the file, and release the session with isoshift release",
                     path.string(), session));
-  check_signature(path, file.json);
+  if (!is_signed(file.json, key_))
+    throw Error(fmt::format(
+        "{}: is not signed by the signing_key of the watch file. Nothing of the session is sent. Remove the "
+        "file, and release the session with isoshift release",
+        path.string()));
   Release release;
   try {
     release = release_from(file.json);
@@ -249,15 +313,42 @@ std::optional<Release> ResultsTree::release_of(const std::string& session) const
   return release;
 }
 
-void ResultsTree::check_signature(const fs::path& file, const nlohmann::json& release) const {
-  if (!key_) return;
-  const nlohmann::json signature =
-      release.is_object() ? release.value(kSignatureKey, nlohmann::json()) : nlohmann::json();
-  if (!signature.is_string() || !key_->has_signed(signed_text(release), signature))
-    throw Error(fmt::format(
-        "{}: is not signed by the signing_key of the watch file. Nothing of the session is sent. Remove the "
-        "file, and release the session with isoshift release",
-        file.string()));
+void ResultsTree::decide(Decision decision) {
+  const FileLock lock = lock_releases();
+  if (!std::ranges::binary_search(sessions(), decision.session))
+    throw Error(fmt::format("{}: holds no session {}", path_.string(), decision.session));
+  if (registered(decision.session).sha256 != decision.record)
+    throw Error(fmt::format("session {}: is not what was on the screen any more. Look at it again", decision.session));
+  decision.user = system_user().name;
+  decision.on = local_time();
+  put_decision(path_ / "decided", decision, audit_, key_);
+}
+
+std::optional<Decision> ResultsTree::decision(const std::string& session) const {
+  const std::optional<Decision> newest = newest_decision(path_ / "decided", session, audit_, key_);
+  const bool stands = newest && newest->kind != DecisionKind::kReopened && newest->record == registered(session).sha256;
+  return stands ? newest : std::nullopt;
+}
+
+void ResultsTree::check_stands(const std::string& session) const {
+  if (const std::string newest = newest_of_same_xrays(session); newest != session)
+    throw Error(fmt::format("session {}: its X-rays have a newer result, session {}", session, newest));
+  if (const auto decided = decision(session); decided && decided->forbids())
+    throw Error(fmt::format("session {}: {}. Take that back first, on the screen of isoshift serve", session,
+                            in_words(*decided)));
+}
+
+void ResultsTree::check_second_person(const SessionRecord& record, const std::string& releaser) const {
+  const auto decided = decision(record.session);
+  const std::string agreed = decided && decided->kind == DecisionKind::kAgreed ? decided->by : "";
+  if (!record.pose_set_by.empty() && releaser == record.pose_set_by && (agreed.empty() || agreed == releaser))
+    throw Error(fmt::format("session {}: {} has set its pose by hand: another person must agree first, or release it",
+                            record.session, releaser));
+  if (needs_second_person_ && record.verdict != "accepted" && (agreed.empty() || agreed == releaser))
+    throw Error(
+        fmt::format("session {}: its verdict is {}: the watch file asks for a second person, who must agree "
+                    "first",
+                    record.session, record.verdict));
 }
 
 // Only one process releases at a time.
@@ -290,6 +381,8 @@ Release ResultsTree::release(const std::string& session, const Releaser& release
   const SessionRecord record = checked(session);
   if (record.verdict == "rejected")
     throw Error(fmt::format("session {}: was rejected: there is nothing to release", session));
+  check_stands(session);
+  check_second_person(record, releaser.by);
   const bool is_again = audit_.has_been_released(session);
   if (!releaser.is_person && record.verdict != "accepted")
     throw Error(fmt::format("session {}: its verdict is {}: only a person can release it", session, record.verdict));
@@ -334,8 +427,8 @@ void ResultsTree::put_release(const Release& release) {
   json.update(release_json(release));
   if (!release.despite.empty()) json["despite"] = release.despite;
   json[kAuditHeadKey] = audit_.head();
-  if (key_) json[kSignatureKey] = key_->sign(signed_text(nlohmann::json::parse(text_of(json))));
-  const std::string text = text_of(json);
+  sign(json, key_);
+  const std::string text = file_text(json);
   replace_text(aside, text);
   std::error_code ignored;
   Json line = release_json(release);
@@ -411,6 +504,7 @@ ResultsTree::Pending ResultsTree::pending() {
 fs::path ResultsTree::checked_file(const Delivery& delivery) const {
   const auto release = release_of(delivery.session);
   if (!release) throw Error(fmt::format("session {}: is not released any more", delivery.session));
+  check_stands(delivery.session);
   const Objection other_xrays = objection(delivery.session);
   if (!other_xrays.words.empty() && other_xrays.words != release->despite)
     throw Error(fmt::format(

@@ -5,9 +5,15 @@
 //   sessions/NAME/           the result of a session of X-rays
 //   registered/NAME.json     the SHA-256 of every file in that folder when it was registered
 //   released/NAME.json       who released the session, and which objects are sent to which peers
+//   decided/NAME.N.json      what a person has decided about the session
+//   orders/NAME.json         how the session was registered: what a person who registers it by hand begins with
+//   handed_over/NAME/        a result of the session's X-rays by hand that watch has yet to take over
 //   sent/NAME.PEER.FILE      the mark that this peer has confirmed this file; it counts with its line in the audit log
 //   objections.json          what other X-rays of the patient say against results
 //   audit.jsonl              the audit log, without names of patients and without UIDs
+//
+// The X-rays of a session NAME can have further results, made by hand: they are sessions of their own, NAME-2 and so
+// on. Only the newest result of the same X-rays is released or sent.
 //
 // A session is released or sent only if its folder is unchanged since its record was written, and if the audit log has
 // a line for the record and for the release, each with the SHA-256 of its file. A line is on the disk before its step
@@ -24,7 +30,9 @@
 #include "base/file_lock.h"
 #include "base/signing_key.h"
 #include "io/config/watch_file.h"
+#include "workflow/register/registration_messages.h"
 #include "workflow/room/audit_log.h"
+#include "workflow/room/decision.h"
 #include "workflow/room/session_record.h"
 
 namespace isoshift {
@@ -46,9 +54,6 @@ struct Objection {
 
   bool operator==(const Objection&) const = default;
 };
-
-// In the file of a release: the head of the audit log that the release saw.
-inline constexpr const char* kAuditHeadKey = "audit_head";
 
 struct Release {
   struct Object {
@@ -99,6 +104,22 @@ class ResultsTree {
   // so that a session without a record cannot be one that was registered here. Throws Error if one of the three steps
   // fails. The caller must hold the lock of the tree.
   void publish(const std::string& session);
+
+  // Keeps how a session is registered. The caller must hold the lock of the tree.
+  void keep_order(const std::string& session, const RegistrationOrder& order);
+  // How its X-rays were registered, from the planned pose. Throws Error if that was not kept.
+  RegistrationOrder order(const std::string& session) const;
+  // Hands a finished result of the session's X-rays to the process that registers, as a line in the audit log says, and
+  // returns the name that it will have. The folder is moved away. Throws Error, and changes nothing, if it is no result
+  // of these X-rays, or if an earlier one was not taken over yet.
+  std::string hand_over(const std::string& session, const std::filesystem::path& folder, const std::string& by);
+  std::vector<std::string> handed_over() const;  // sessions
+  // Publishes what was handed over as a session of its own, and returns its name. Throws as publish() does. The caller
+  // must hold the lock of the tree.
+  std::string take_over(const std::string& session);
+  // The newest result of the same X-rays: the session itself, or a further one.
+  std::string newest_of_same_xrays(const std::string& session) const;
+
   // The record of a session. Throws Error if there is no record, or if the audit log has no line for it.
   SessionRecord registered(const std::string& session) const;
 
@@ -113,13 +134,22 @@ class ResultsTree {
   // The caller must hold the lock of the tree.
   void keep_objections(const std::map<std::string, Objection>& objections);
 
+  // Records what a person has decided about the result that its record names; when, and by which user of the system,
+  // is added here. Throws Error if there is no such session, if its record is another one now, or if the audit log
+  // cannot be written.
+  void decide(Decision decision);
+  // The newest decision about the present result of a session; nothing if there is none, or if it was taken back.
+  // Throws Error if the files do not say what the audit log proves.
+  std::optional<Decision> decision(const std::string& session) const;
+
   bool is_released(const std::string& session) const;
   // The release of a session, if there is one. Throws Error for a release file that isoshift release did not write, or
   // that was changed.
   std::optional<Release> release_of(const std::string& session) const;
   // Releases a session with its objects. Throws Error, and releases nothing, if the session does not exist, was
-  // rejected, has been released before, or has changed since its registration, if other X-rays speak against it and the
-  // releaser does not say so, or if the audit log cannot be written.
+  // rejected, has been released before, or has changed since its registration, if its X-rays have a newer result, if a
+  // person decided against it or a second person is needed, if other X-rays speak against it and the releaser does not
+  // say so, or if the audit log cannot be written.
   // `seen`: what the person has seen; if anything of that is another one now, nothing is released.
   struct Seen {
     std::string record;     // SHA-256 of the record
@@ -154,12 +184,17 @@ class ResultsTree {
 
  private:
   std::filesystem::path record_file(const std::string& session) const;
+  std::filesystem::path order_file(const std::string& session) const;
   std::filesystem::path release_file(const std::string& session) const;
   std::vector<std::string> released() const;  // sessions
   // The record of a session. Throws Error if the session's folder has changed since its registration.
   SessionRecord checked(const std::string& session) const;
+  void publish(const std::string& session, const std::filesystem::path& folder);
+  std::string further_name(const std::string& session) const;
+  // Throws Error if a newer result or a decision forbids that the session is released or sent.
+  void check_stands(const std::string& session) const;
+  void check_second_person(const SessionRecord& record, const std::string& releaser) const;
   FileLock lock_releases() const;
-  void check_signature(const std::filesystem::path& file, const nlohmann::json& release) const;
   void check_objects_are_new(const Release& release) const;
   void put_release(const Release& release);
   std::filesystem::path sent_file(const Delivery& delivery) const;
@@ -170,7 +205,8 @@ class ResultsTree {
   std::filesystem::path path_;
   AuditLog audit_;
   std::optional<SigningKey> key_;
-  std::set<std::string> delivered_;  // sessions that all of their peers have confirmed
+  bool needs_second_person_ = false;  // for results that were not accepted
+  std::set<std::string> delivered_;   // sessions that all of their peers have confirmed
 };
 
 }  // namespace isoshift

@@ -46,7 +46,20 @@ void SessionList::add(const std::string& session, const SetupResult& report, con
                    std::move(added));
 }
 
-std::string SessionList::state_of(const ListedSession& session, const Objection& objection, bool& is_over) const {
+// What people have decided, and a newer result of the same X-rays: "; ..." for each.
+std::string SessionList::since_then(const std::string& session) const {
+  std::string words;
+  if (const std::string newest = tree_->newest_of_same_xrays(session); newest != session)
+    words += "; superseded by session " + newest;
+  try {
+    if (const auto decision = tree_->decision(session)) words += "; " + in_words(*decision);
+  } catch (const Error& error) {
+    words += fmt::format("; {}", error.what());
+  }
+  return words;
+}
+
+std::string SessionList::release_of(const ListedSession& session, const Objection& objection, bool& is_over) const {
   if (session.verdict == to_string(Verdict::kRejected)) {
     is_over = true;
     return "rejected";
@@ -70,10 +83,12 @@ std::string SessionList::state_of(const ListedSession& session, const Objection&
 bool SessionList::update(const std::map<std::string, Objection>& objections) {
   bool has_changed = false;
   for (ListedSession& session : sessions_) {
-    if (session.is_over) continue;
-    const auto objection = objections.find(session.name);
-    std::string state =
-        state_of(session, objection == objections.end() ? Objection() : objection->second, session.is_over);
+    if (!session.is_over) {
+      const auto objection = objections.find(session.name);
+      session.release =
+          release_of(session, objection == objections.end() ? Objection() : objection->second, session.is_over);
+    }
+    std::string state = session.release + since_then(session.name);
     has_changed |= std::exchange(session.state, state) != state;
   }
   return has_changed;

@@ -13,11 +13,12 @@ namespace isoshift {
 
 struct ListedSession {
   std::string name, patient, verdict, action;
-  std::string held;      // in words: the state before it is released
-  std::string state;     // in words: "held", "released by J. Doe on ...; 1 to be sent"
-  std::string first;     // when the first X-ray was acquired, "2026-03-01 10:15:00"
-  std::string times;     // of all X-rays
-  bool is_over = false;  // the state cannot change any more
+  std::string held;   // in words: the state before it is released
+  std::string state;  // in words: "held", "released by J. Doe on ...; 1 to be sent", "held; superseded by session ..."
+  std::string first;  // when the first X-ray was acquired, "2026-03-01 10:15:00"
+  std::string times;  // of all X-rays
+  std::string release;   // in words: the part of the state that tells of the release
+  bool is_over = false;  // that part cannot change any more
 
   bool operator==(const ListedSession&) const = default;
 };
@@ -42,7 +43,8 @@ class SessionList {
   const std::vector<ListedSession>& sessions() const { return sessions_; }  // the newest first
 
  private:
-  std::string state_of(const ListedSession& session, const Objection& objection, bool& is_over) const;
+  std::string since_then(const std::string& session) const;
+  std::string release_of(const ListedSession& session, const Objection& objection, bool& is_over) const;
 
   const ResultsTree* tree_;  // never null
   std::vector<ListedSession> sessions_;

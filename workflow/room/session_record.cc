@@ -33,17 +33,29 @@ std::map<std::string, std::string> hashes_in(const fs::path& folder) {
 
 }  // namespace
 
+std::string name_of_xrays(const std::string& session, int number) {
+  const std::string first = session.substr(0, session.find('-'));
+  return number == 1 ? first : fmt::format("{}-{}", first, number);
+}
+
 SessionRecord record_of(const std::string& session, const fs::path& folder) {
   const nlohmann::json result = read_json_file(folder / kResultFile).json;
-  SessionRecord record{.session = session, .verdict = "", .on = local_time(), .files = hashes_in(folder), .sha256 = ""};
+  SessionRecord record{.session = session,
+                       .verdict = "",
+                       .on = local_time(),
+                       .pose_set_by = "",
+                       .files = hashes_in(folder),
+                       .sha256 = ""};
   std::set<std::string> xrays;
   try {
     record.verdict = result.at("verdict").get<std::string>();
+    if (const nlohmann::json start = result.value("start", nlohmann::json()); !result.value("searched", true))
+      if (const nlohmann::json& who = start.at("set_by"); who.is_string()) record.pose_set_by = who;
     for (const nlohmann::json& view : result.at("views")) xrays.insert(view.at("sop_instance_uid").get<std::string>());
   } catch (const nlohmann::json::exception&) {
     throw Error(fmt::format("{}: is not a result of isoshift register", (folder / kResultFile).string()));
   }
-  if (const std::string name = session_name(xrays); name != session)
+  if (const std::string name = session_name(xrays); name != name_of_xrays(session))
     throw Error(fmt::format("{}: is the result of other X-rays: those of session {}, expected {}",
                             (folder / kResultFile).string(), name, session));
   return record;
@@ -52,11 +64,8 @@ SessionRecord record_of(const std::string& session, const fs::path& folder) {
 std::string json_of(const SessionRecord& record) {
   nlohmann::ordered_json files = nlohmann::ordered_json::array();
   for (const auto& [file, sha256] : record.files) files.push_back({{"file", file}, {"sha256", sha256}});
-  return nlohmann::ordered_json{{"schema", 1},
-                                {"session", record.session},
-                                {"verdict", record.verdict},
-                                {"on", record.on},
-                                {"files", files}}
+  return nlohmann::ordered_json{{"schema", 1},     {"session", record.session},         {"verdict", record.verdict},
+                                {"on", record.on}, {"pose_set_by", record.pose_set_by}, {"files", files}}
              .dump(2) +
          "\n";
 }
@@ -67,6 +76,7 @@ SessionRecord read_session_record(const fs::path& path) {
     SessionRecord record{.session = file.json.at("session"),
                          .verdict = file.json.at("verdict"),
                          .on = file.json.at("on"),
+                         .pose_set_by = file.json.value("pose_set_by", ""),  // older records have none
                          .files = {},
                          .sha256 = file.sha256};
     for (const nlohmann::json& entry : file.json.at("files"))

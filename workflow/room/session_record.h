@@ -9,9 +9,14 @@ namespace isoshift {
 
 struct SessionRecord {
   std::string session, verdict, on;          // `on`: local time
+  std::string pose_set_by;                   // who has set the pose by hand, without a search; empty: nobody
   std::map<std::string, std::string> files;  // SHA-256 by name, of all files of the folder, including result.json
   std::string sha256;                        // of the record's own file; empty until it is written
 };
+
+// The name of the N-th result of the same X-rays: "NAME" of the first, "NAME-2" of the second. `session`: the name of
+// any of them.
+std::string name_of_xrays(const std::string& session, int number = 1);
 
 // The record of a folder that isoshift register has just written. Throws Error if the folder holds anything but plain
 // files, or if the name of the session does not belong to the X-rays of the result.

@@ -57,6 +57,7 @@ void Watch::round() {
   const bool was_source_read = is_source_read_;
   troubles_.attempt("receiving", [&] { receive(); });
   troubles_.attempt("registering", [&] { register_complete(); });
+  troubles_.attempt("taking over results by hand", [&] { take_over_results(); });
   troubles_.attempt("comparing X-rays with results", [&] {
     look_for_objections();
     // In its first round a source may only have seen that there are files.
@@ -140,7 +141,7 @@ void Watch::take_result(const std::string& session, const std::optional<Running>
   if (report.views.empty()) throw Error(fmt::format("{}: names no views", tree_.session(session).string()));
   for (const auto& view : report.views) registered_.insert(view.sop_instance_uid);
   const std::string obstacle = obstacle_to_release(tree_, session, report.verdict);
-  const std::string reason = reason_for_person(report, made);
+  const std::string reason = reason_for_person(session, report, made);
   index_.add(session, report, obstacle, reason);
   objections_.add_result(session, report);
   if (made) parts_.observer.say(fmt::format("session {}: {}", session, to_string(report.verdict)));
@@ -150,11 +151,28 @@ void Watch::take_result(const std::string& session, const std::optional<Running>
 }
 
 // Why the site's rule does not release an accepted result. Empty: it may, or there is no such rule.
-std::string Watch::reason_for_person(const SetupResult& result, const std::optional<Running>& made) const {
+std::string Watch::reason_for_person(const std::string& session, const SetupResult& result,
+                                     const std::optional<Running>& made) const {
   if (!watch_.site.automatic_release || result.verdict != Verdict::kAccepted) return "";
   if (!result.site || result.site->sha256 != watch_.site.sha256) return "it was made under another site file";
+  if (name_of_xrays(session) != session) return "a person has made it by hand";
   if (!made) return "an earlier run of watch registered it";  // X-rays may have come and gone since
   return made->names_plan ? "" : "not all of its X-rays name their plan";
+}
+
+// Those that people have made by hand on the screen. One that cannot be taken over hides no other.
+void Watch::take_over_results() {
+  std::string trouble;
+  for (const std::string& session : tree_.handed_over()) {
+    try {
+      const std::string name = tree_.take_over(session);
+      parts_.observer.say(fmt::format("session {}: made by hand", name));
+      take_result(name);
+    } catch (const std::exception& error) {
+      trouble = error.what();
+    }
+  }
+  if (!trouble.empty()) throw Error(trouble);
 }
 
 // One at a time, those with the newest X-rays first: somebody waits for them.
@@ -221,6 +239,7 @@ void Watch::begin_registration(const Complete& complete) {
     parts.doubts = complete.session.doubts;
     if (const std::string reason = unreadable_beside(parts, parts_.source.unreadable()); !reason.empty())
       parts.doubts.push_back("a file beside the X-rays may belong to them: " + reason);
+    tree_.keep_order(session, {.parts = parts, .flags = watch_.registration, .site = watch_.site.path});
     parts_.runner.begin(parts, tree_.registering(session));
     const auto names_plan = [](const StudyFiles::Image& image) { return !image.plan_uid.empty(); };
     running_ = Running{.session = session,

@@ -90,7 +90,9 @@ class Watch {
   void take_results();
   // `made`: unset for what an earlier run has registered.
   void take_result(const std::string& session, const std::optional<Running>& made = std::nullopt);
-  std::string reason_for_person(const SetupResult& result, const std::optional<Running>& made) const;
+  std::string reason_for_person(const std::string& session, const SetupResult& result,
+                                const std::optional<Running>& made) const;
+  void take_over_results();
   void receive();
   void register_complete();
   std::vector<Complete> complete_sessions();

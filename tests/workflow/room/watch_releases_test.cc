@@ -24,6 +24,29 @@ using testing::Pair;
 using testing::SizeIs;
 using testing::UnorderedElementsAre;
 
+// A person at the screen (isoshift serve) made another result of the X-rays, from a copy of the one there was.
+TEST_F(WatchReleases, AResultByHandIsTakenOverAndSupersedesTheOneBefore) {
+  allow_automatic_release();
+  room_.start();
+  bring("P");
+  room_.pass(60s);
+  ASSERT_TRUE(is_released("P"));
+  ResultsTree tree(room_.file.results);
+  EXPECT_FALSE(tree.order(session("P")).parts.images.empty()) << "what to begin with is not known";
+  const fs::path by_hand = room_.file.results / "by_hand" / session("P") / "1";
+  fs::create_directories(by_hand.parent_path());
+  fs::copy(tree.session(session("P")), by_hand);
+  replace_text(by_hand / "report.dcm", "report of what was found by hand");
+  replace_text(by_hand / "spatial_registration.dcm", "registration by hand");
+  const std::string further = tree.hand_over(session("P"), by_hand, "jdoe");
+  room_.start();  // the watch before was killed meanwhile
+  room_.pass(2s);
+  EXPECT_THAT(ResultsTree(room_.file.results).sessions(), UnorderedElementsAre(session("P"), further));
+  EXPECT_THAT(room_.index(), HasSubstr("superseded by session " + further));
+  EXPECT_THAT(room_.index(), HasSubstr("held for a person: a person has made it by hand"));
+  EXPECT_FALSE(ResultsTree(room_.file.results).is_released(further));
+}
+
 TEST_F(WatchReleases, NothingIsSentBeforeAPersonReleasesIt) {
   room_.start();
   bring("P");
