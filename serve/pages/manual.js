@@ -34,8 +34,7 @@ function draw() {
 
 function layOut() {
   const isDouble = mode() === "side", place = element("views");
-  const top = place.getBoundingClientRect().top, caption = 30;
-  const width = place.clientWidth, height = innerHeight - top - 10;
+  const caption = 30, width = place.clientWidth, height = place.clientHeight - 10;
   const edge = isDouble ? Math.min(width / 2 - 15, height / views.length - caption)
     : Math.min(width / views.length - 15, height - caption);
   for (const view of views) view.resize(Math.max(200, Math.floor(edge)), isDouble);
@@ -278,7 +277,7 @@ try {
     views.push(new ManualView(element("views"), view, data.subarray(at, at += columns * rows), on));
   }
   pose = restingPose = study.start;
-  addEventListener("resize", layOut);
+  new ResizeObserver(layOut).observe(element("views"));
   layOut();
   showNumbers();
   ask(kAtRest);

@@ -34,7 +34,7 @@ function show(now) {
   // Whoever may release decides: with a reason, but who agrees needs none.
   const reason = element("reason").value.trim(), decided = now.decision ? now.decision.kind : "";
   const mayDecide = may && hasReport && now.record !== "";
-  element("agreed").disabled = !mayDecide || decided === "agreed";
+  element("agreed").disabled = !mayDecide || decided !== "";
   element("rejected").disabled = !mayDecide || reason === "" || decided === "rejected";
   element("repeat").disabled = !mayDecide || reason === "" || decided === "repeat";
   element("reopened").disabled = !mayDecide || reason === "" || decided === "";

@@ -319,6 +319,9 @@ void ResultsTree::decide(Decision decision) {
     throw Error(fmt::format("{}: holds no session {}", path_.string(), decision.session));
   if (registered(decision.session).sha256 != decision.record)
     throw Error(fmt::format("session {}: is not what was on the screen any more. Look at it again", decision.session));
+  if (decision.kind == DecisionKind::kAgreed)
+    if (const auto before = this->decision(decision.session); before && before->forbids())
+      throw Error(fmt::format("session {}: {}. Take that back first", decision.session, in_words(*before)));
   decision.user = system_user().name;
   decision.on = local_time();
   put_decision(path_ / "decided", decision, audit_, key_);

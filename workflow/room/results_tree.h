@@ -135,8 +135,8 @@ class ResultsTree {
   void keep_objections(const std::map<std::string, Objection>& objections);
 
   // Records what a person has decided about the result that its record names; when, and by which user of the system,
-  // is added here. Throws Error if there is no such session, if its record is another one now, or if the audit log
-  // cannot be written.
+  // is added here. Throws Error if there is no such session, if its record is another one now, if somebody agrees with
+  // what was rejected and not taken back, or if the audit log cannot be written.
   void decide(Decision decision);
   // The newest decision about the present result of a session; nothing if there is none, or if it was taken back.
   // Throws Error if the files do not say what the audit log proves.

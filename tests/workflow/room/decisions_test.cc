@@ -56,6 +56,7 @@ TEST_F(DecisionsTest, WhatWasRejectedIsNotReleasedUntilThatIsTakenBack) {
   for (const DecisionKind kind : {DecisionKind::kRejected, DecisionKind::kRepeat}) {
     decide(kind);
     EXPECT_THAT(error_of_release(a_), AllOf(HasSubstr("by jdoe on "), HasSubstr("Mrs Roe coughed")));
+    EXPECT_THROW(decide(DecisionKind::kAgreed, "rroe"), Error);
   }
   decide(DecisionKind::kReopened, "rroe", "she did not");
   EXPECT_FALSE(tree_.decision(a_));
