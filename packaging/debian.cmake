@@ -1,6 +1,6 @@
 # The Debian package: cpack --config build/release/CPackConfig.cmake
-install(FILES packaging/isoshift-watch.service DESTINATION lib/systemd/system)
-install(FILES packaging/watch.json packaging/site.json DESTINATION share/doc/isoshift/examples)
+install(FILES packaging/isoshift-watch.service packaging/isoshift-serve.service DESTINATION lib/systemd/system)
+install(FILES packaging/watch.json packaging/site.json packaging/gpu.conf DESTINATION share/doc/isoshift/examples)
 install(FILES README.md LICENSE CHANGELOG.md DESTINATION share/doc/isoshift)
 install(DIRECTORY docs/ DESTINATION share/doc/isoshift/docs FILES_MATCHING PATTERN "*.md" PATTERN "*.json")
 

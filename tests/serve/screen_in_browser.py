@@ -14,6 +14,7 @@ import subprocess
 import sys
 import time
 
+import pydicom
 from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
 
@@ -37,12 +38,16 @@ def text(browser, selector):
     return "\n".join(one.text for one in browser.find_elements(By.CSS_SELECTOR, selector))
 
 
+kHostileName = "<img src=x onerror=document.body.remove()>^Roe"
+
+
 def decide_and_register_by_hand(doe, poe, address, results):
     """The session that is not released yet: rejected, taken back, registered by hand, and released by another person."""
     released = {path.stem for path in (results / "released").glob("*.json")}
     [session] = [path.name for path in (results / "sessions").glob("[!.]*") if path.name not in released]
     doe.get(f"{address}/session/{session}")
     wait_for(lambda: doe.find_element(By.ID, "release").is_enabled(), 10, "a session that can be released")
+    expect("<img src" in text(doe, "#patient"), "a name that holds HTML: " + text(doe, "#patient"))
     expect(not doe.find_element(By.ID, "rejected").is_enabled(), "a result could be rejected without a reason")
     doe.find_element(By.ID, "reason").send_keys("the patient coughed")
     doe.find_element(By.ID, "rejected").click()
@@ -57,6 +62,7 @@ def decide_and_register_by_hand(doe, poe, address, results):
 
     doe.find_element(By.ID, "by-hand").click()
     wait_for(lambda: "rendered in" in text(doe, "#times"), 60, "the DRRs of the session")
+    expect("<img src" in text(doe, "#patient"), "a name that holds HTML, by hand: " + text(doe, "#patient"))
     doe.find_element(By.TAG_NAME, "body").send_keys(Keys.ARROW_RIGHT)
     doe.find_element(By.ID, "keep").click()
     wait_for(lambda: "Kept as it was set" in text(doe, "#result"), 60, "the pose kept")
@@ -94,9 +100,15 @@ def main(program, work):
         "roles": {"doe": ["view", "register", "release"], "roe": ["view"], "poe": ["view", "release"]}}))
     results, log = work / "results", work / "serve.log"
 
-    def bring_study(seed):
-        subprocess.run([program, "phantom", "-o", work / "in" / str(seed), "--seed", str(seed), "--voxel-mm", "4",
+    def bring_study(seed, patient_name=None):
+        study = work / f"study-{seed}"
+        subprocess.run([program, "phantom", "-o", study, "--seed", str(seed), "--voxel-mm", "4",
                         "--image-pixels", "96", "--photons", "0"], check=True, capture_output=True)
+        for path in study.rglob("*.dcm") if patient_name else []:
+            file = pydicom.dcmread(path)
+            file.PatientName = patient_name
+            file.save_as(path)
+        study.rename(work / "in" / str(seed))
 
     def result_of(count):
         wait_for(lambda: len(list((results / "sessions").glob("[!.]*/result.json"))) == count, 120, "a result")
@@ -119,11 +131,14 @@ def main(program, work):
 
         # What a person has set stays while sessions come.
         doe.find_element(By.ID, "filter").send_keys("phantom1")
-        bring_study(2)
+        bring_study(2, kHostileName)
         result_of(2)
         wait_for(lambda: "2 with a result" in text(doe, "#count"), 10, "the second session")
         expect(len(doe.find_elements(By.CSS_SELECTOR, "#sessions tr")) == 1, "the filter was lost: " + text(doe, "#sessions"))
         expect(doe.find_element(By.ID, "filter").get_attribute("value") == "phantom1", "the filter's text was lost")
+        doe.find_element(By.ID, "filter").send_keys(Keys.CONTROL, "a", Keys.DELETE)
+        wait_for(lambda: "<img src" in text(doe, "#sessions"), 10, "a name that holds HTML in the list")
+        doe.find_element(By.ID, "filter").send_keys("phantom1")
         expect("Phantom Digital (PHANTOM1)" in text(doe, "#sessions"), "names: " + text(doe, "#sessions"))
 
         link = doe.find_element(By.CSS_SELECTOR, "#sessions a")

@@ -1,0 +1,29 @@
+#!/bin/bash
+# Fails if systemd-analyze rates a unit's exposure above 2, with the drop-in for GPUs, too, or if the software bill of
+# materials lacks a package of packages.txt or has one twice. packaging.sh SOURCE_DIR PROGRAM
+set -euo pipefail
+cd "$1"
+work=$(mktemp -d)
+trap 'rm -r "$work"' EXIT
+mkdir "$work/isoshift-watch.service.d"
+cp packaging/gpu.conf "$work/isoshift-watch.service.d"
+cp packaging/isoshift-watch.service "$work"
+for unit in packaging/isoshift-watch.service packaging/isoshift-serve.service "$work/isoshift-watch.service"; do
+  systemd-analyze security --offline=true --no-pager --threshold=20 "$unit" >"$work/exposure" || {
+    cat "$work/exposure"
+    exit 1
+  }
+done
+
+packaging/sbom.sh "$2" >"$work/sbom"
+. /etc/os-release
+wanted=$(awk -v release="($VERSION_ID)" '/^\[/ {section = $1; next}
+  section != "[package]" && NF && $1 !~ /^#/ && ($2 !~ /^\(/ || $2 == release) {print $1}' packages.txt)
+for package in isoshift $wanted libdcmtk17; do
+  count=$(grep -cxF "PackageName: $package" "$work/sbom" || true)
+  [ "$package" != libdcmtk17 ] || [ "$VERSION_ID" = 12 ] || continue
+  [ "$count" = 1 ] || { echo "the software bill of materials names $package $count times"; exit 1; }
+done
+# Every element has a relationship, and nothing is related that is no element.
+diff <(sed -n 's/^SPDXID: //p' "$work/sbom" | sort -u) \
+  <(sed -n 's/^Relationship: \([^ ]*\) [A-Z_]* \([^ ]*\)$/\1\n\2/p' "$work/sbom" | sort -u)
