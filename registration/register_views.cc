@@ -131,6 +131,7 @@ RegistrationResult register_views(const RendererPyramid& renderers, std::span<co
   for (std::size_t view = 0; view < found_alone.of_views.size(); ++view)
     result.views[view].contradiction = found_alone.of_views[view];
   result.turn = std::move(found_alone.turn);
+  result.wanted_by_views = std::move(found_alone.wanted_room_from_patient);
 
   result.unobservable_room = unobservable_directions(views);
   judge(found.parameters, options, result);

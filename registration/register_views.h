@@ -46,6 +46,8 @@ struct RegistrationOptions {
 struct RegistrationResult : Registration {
   std::vector<ViewMatch> views;
   TurnBetweenViews turn;
+  std::vector<Eigen::Isometry3d> wanted_by_views;  // the pose of the whole that each view alone wants
+  std::optional<ViewsApart> apart;                 // where bodies were searched
 };
 
 // What of the X-rays is compared, by the options' rectangles and region.

@@ -252,8 +252,11 @@ void register_bodies(const BentPatient& patient, std::span<const FixedImage> ima
   result.stages.back().reached_limit = result.stages.back().reached_limit && target.left_mm > kConvergedMm;
   report_match(scene, carriers, target, patient.target.center_room_mm, at_one_pose(scene, planned_room_from_patient),
                found.poses, 2.0 * options.stages.back().pixel_mm, result);
-  if (result.turn.is_clear())
-    result.turn.share_of_bodies_gain = share_explained_by_turn(scene, result.turn, found.poses);
+  if (!result.wanted_by_views.empty()) {
+    TurnedViews turned(scene, found.poses);
+    result.apart = turned.apart(result.wanted_by_views);
+    if (result.turn.is_clear()) result.turn.share_of_bodies_gain = turned.share_explained_by(result.turn);
+  }
   result.bodies = motions_of(patient.parts.bodies, patient.fine.apart, carriers, target, planned_room_from_patient,
                              found.poses, certainty);
   result.structures =

@@ -126,6 +126,11 @@ bool TurnBetweenViews::is_clear() const {
   return !(angle_rad <= kMostRad || angle_rad <= kMostSigmas * sigma_rad);
 }
 
+bool ViewsApart::is_clear() const {
+  constexpr double kLeastGain = 10.0;
+  return !(gain <= kLeastGain || share_of_bodies_gain <= kMostShare);
+}
+
 Contradictions contradictions(const RendererPyramid& renderers, const FixedViews& views,
                               const Eigen::Isometry3d& planned_room_from_patient,
                               const Eigen::Isometry3d& room_from_patient, const Stage& last_stage, Dof dof) {
@@ -145,6 +150,7 @@ Contradictions contradictions(const RendererPyramid& renderers, const FixedViews
                      .parameters = wanted_alone(objective, renderer, room_from_patient, dof),
                      .covariance = pose_covariance(objective, room_from_patient, dof == Dof::kTranslation, kSpring)});
     const WantedAlone& wanted = alone.back();
+    result.wanted_room_from_patient.push_back(setup_error_from_parameters(wanted.parameters) * room_from_patient);
     const Eigen::MatrixXd motions = seen_motions(image.view, error, wanted.parameters.size());
     const Eigen::Map<const Eigen::VectorXd> parameters(wanted.parameters.data(),
                                                        static_cast<Eigen::Index>(wanted.parameters.size()));

@@ -28,9 +28,21 @@ struct TurnBetweenViews {
   bool is_clear() const;
 };
 
+// What the rigid patient gains in probability (in nats) at a pose of its own in every view, beside what bodies gain.
+struct ViewsApart {
+  double gain = 0.0, share_of_bodies_gain = 0.0;
+
+  // Geometry that was wrong in one view, or a patient who moved between the views, gained 25 nats and more and 0.77 and
+  // more of what bodies gained; right patients of the campaign that bodies answered for at most 0.58
+  // (docs/algorithms.md, "Contradiction").
+  static constexpr double kMostShare = 0.7;
+  bool is_clear() const;
+};
+
 struct Contradictions {
-  std::vector<Contradiction> of_views;  // empty for a single view
-  TurnBetweenViews turn;                // none if only translations are searched
+  std::vector<Contradiction> of_views;                      // empty for a single view
+  std::vector<Eigen::Isometry3d> wanted_room_from_patient;  // the pose that each of them alone wants
+  TurnBetweenViews turn;                                    // none if only translations are searched
 };
 
 // For each view: how far it alone would want anatomy from where all views together put it. The pose that the view alone

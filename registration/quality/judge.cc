@@ -25,7 +25,7 @@ constexpr double kMaxSpreadMm = 1.0, kMaxSpreadRad = rad_from_deg(1.0);
 // Root mean square over the views. Undisturbed studies reached 0.05 to 0.22 mm (plastic head and chest, four kinds of
 // views); a patient turned 2 degrees between the views, a gantry 2 or a receptor 1.5 degrees, a panel 3 mm or a
 // distance 2 % off in one of them 0.68 mm and more (docs/evaluation.md).
-constexpr double kMaxContradictionMm = 0.5, kMaxContradictionSigmas = 3.0;
+constexpr double kMaxContradictionMm = 0.5, kMaxContradictionSigmas = 2.0;
 // Right patients of the campaign whose breathing looked like a turn: turned views explained at most 0.18 of what bodies
 // did; gantry angles that were 2 or 3 degrees wrong 0.47 and more.
 constexpr double kMostByTurn = 0.3;
@@ -131,6 +131,12 @@ void judge_contradiction(RegistrationResult& result) {
                                "{:.1f} mm in the mean. The patient or anatomy may have moved between them or against "
                                "the rest, or an angle, a distance or a position in a file may be wrong",
                                std::sqrt(squares)));
+  else if (result.apart && result.apart->is_clear())
+    review(
+        result,
+        "the views contradict each other: a patient who lies elsewhere in each of them explains as much as bones that "
+        "have moved. The patient may have moved between the images, or an angle, a distance or a position in a file "
+        "may be wrong");
   else if (result.turn.is_clear() && !(result.turn.share_of_bodies_gain.value_or(1.0) <= kMostByTurn))
     review(result,
            fmt::format("the views contradict each other: each of them alone would want the patient turned, by "
