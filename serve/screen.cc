@@ -36,14 +36,8 @@ HttpResponse Screen::answer(const HttpRequest& request) {
   const bool is_automatic = request.path == kEvents || !request.header("x-isoshift-automatic").empty();
   auto who = sign_ins_.of(request, is_automatic ? SignIns::Use::kStays : SignIns::Use::kActs);
   if (who && !who->roles.contains(Role::kView)) who.reset();
-  if (is_read) {
-    if (!by_proxy_ && request.path == "/sign-in") return page_answer(Page::kSignIn);
-    if (who || (!by_proxy_ && std::ranges::find(kForAll, request.path) != kForAll.end()))
-      if (auto file = static_answer(request.path)) return *std::move(file);
-    if (who && request.path == "/") return page_answer(Page::kSessions);
-    if (who && request.path.starts_with(kSessionPage))
-      return page_answer(request.path.ends_with(kByHand) ? Page::kManual : Page::kSession);
-  }
+  if (is_read)
+    if (auto found = page(request.path, who.has_value())) return *std::move(found);
   if (!is_read && request.path == "/api/sign-in" && !by_proxy_) return sign_in(request);
   if (!who) {
     if (by_proxy_) return refusal(403, "The proxy names no user who may see this.");
@@ -60,6 +54,19 @@ HttpResponse Screen::answer(const HttpRequest& request) {
     return refusal(409, error.what());
   }
   return refusal(404, "There is nothing at this address.");
+}
+
+// Pages and what they are made of; nothing where there is none, or who asks may not see it.
+std::optional<HttpResponse> Screen::page(const std::string& path, bool is_signed_in) const {
+  if (!is_signed_in) {
+    if (by_proxy_) return std::nullopt;
+    if (path == "/sign-in") return page_answer(Page::kSignIn);
+    return std::ranges::find(kForAll, path) != kForAll.end() ? static_answer(path) : std::nullopt;
+  }
+  if (path == "/sign-in" && !by_proxy_) return page_answer(Page::kSignIn);
+  if (path == "/") return page_answer(Page::kSessions);
+  if (path.starts_with(kSessionPage)) return page_answer(path.ends_with(kByHand) ? Page::kManual : Page::kSession);
+  return static_answer(path);
 }
 
 HttpResponse Screen::sign_in(const HttpRequest& request) {

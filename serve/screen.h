@@ -1,6 +1,9 @@
 #pragma once
 // The room's screen: answers what browsers ask for. Pages are static files; what they show comes as JSON.
 
+#include <optional>
+#include <string>
+
 #include "io/config/serve_file.h"
 #include "serve/desk.h"
 #include "serve/http_message.h"
@@ -18,6 +21,7 @@ class Screen {
   HttpResponse answer(const HttpRequest& request);
 
  private:
+  std::optional<HttpResponse> page(const std::string& path, bool is_signed_in) const;
   HttpResponse sign_in(const HttpRequest& request);
   HttpResponse sign_out(const HttpRequest& request);
   HttpResponse api(const HttpRequest& request, const SignedIn& who);

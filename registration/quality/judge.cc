@@ -25,7 +25,7 @@ constexpr double kMaxSpreadMm = 1.0, kMaxSpreadRad = rad_from_deg(1.0);
 // Root mean square over the views. Undisturbed studies reached 0.05 to 0.22 mm (plastic head and chest, four kinds of
 // views); a patient turned 2 degrees between the views, a gantry 2 or a receptor 1.5 degrees, a panel 3 mm or a
 // distance 2 % off in one of them 0.68 mm and more (docs/evaluation.md).
-constexpr double kMaxContradictionMm = 0.5, kMaxContradictionSigmas = 2.0;
+constexpr double kMaxContradictionMm = 0.5, kMaxContradictionSigmas = 3.0;
 // Right patients of the campaign whose breathing looked like a turn: turned views explained at most 0.18 of what bodies
 // did; gantry angles that were 2 or 3 degrees wrong 0.47 and more.
 constexpr double kMostByTurn = 0.3;

@@ -199,22 +199,29 @@ def names_its_fault(row):
 
 def line_of(name, rows):
     refused = [row for row in rows if row["verdict"] != "accepted"]
-    return f"| {name} | {len(rows)} | {len(rows) - len(refused)} | " + campaign.share_text(
+    accepted = [row for row in rows if row["verdict"] == "accepted"]
+    largest = f"{max(float(row['box_mm']) for row in accepted):.2f}" if accepted else "-"
+    return f"| {name} | {len(rows)} | {len(accepted)} | {largest} | " + campaign.share_text(
         sum(names_its_fault(row) for row in refused), len(refused)) + " |"
 
 
 def text_of(rows):
     rows = [row for row in rows if row["words"]]
-    lines = ["| fault | studies | accepted | named, of those not accepted |", "| --- " * 4 + "|"]
+    lines = ["| fault | studies | accepted | largest error of these, mm | named, of the others |", "| --- " * 5 + "|"]
     for name in dict.fromkeys(row["fault"] for row in rows):
         lines.append(line_of(name, [row for row in rows if row["fault"] == name]))
     lines.append(line_of("all", rows))
     return "\n".join(lines) + "\n"
 
 
+def rows_from(path):
+    """What run() wrote to faults_found.csv."""
+    with path.open(newline="") as file:
+        return list(csv.DictReader(file))
+
+
 def read(options):
-    with options.found.open(newline="") as file:
-        print(text_of(list(csv.DictReader(file))), end="")
+    print(text_of(rows_from(options.found)), end="")
     return 0
 
 
