@@ -55,15 +55,13 @@ END
   esac
 }
 
-# section NAME: "PACKAGE<tab>REASON" of packages.txt, for this release of Debian.
-section() {
-  awk -v section="[$1]" -v release="($VERSION_ID)" '/^\[/ {inside = $1 == section; next}
-    inside && NF && $1 !~ /^#/ && ($2 !~ /^\(/ || $2 == release) {name = $1; sub(/^[^#]*# /, ""); print name "\t" $0}' packages.txt
+# tell_section NAME RELATIONSHIP: the packages of a section of packages.txt.
+tell_section() {
+  while IFS=$'\t' read -r package reason; do tell "$package" "$2" "$reason"; done < <(packaging/packages.sh "$VERSION_ID" "$1")
 }
-
-while IFS=$'\t' read -r package reason; do tell "$package" DEPENDS_ON "$reason"; done < <(section run)
-while IFS=$'\t' read -r package reason; do tell "$package" BUILD_DEPENDENCY_OF "$reason"; done < <(section build)
-while IFS=$'\t' read -r package reason; do tell "$package" TEST_DEPENDENCY_OF "$reason"; done < <(section test)
+tell_section run DEPENDS_ON
+tell_section build BUILD_DEPENDENCY_OF
+tell_section test TEST_DEPENDENCY_OF
 [ -x "$program" ] || { echo "sbom.sh: $program: there is no such program: what it loads is not known" >&2; exit 0; }
 ldd "$program" | awk '$2 == "=>" && $3 ~ /^\// {print $3; print "/usr" $3}' |
   { xargs dpkg-query -S 2>/dev/null || true; } | sed 's/:.*//' | sort -u |  # one of the two names is not known

@@ -58,12 +58,11 @@ HttpResponse Screen::answer(const HttpRequest& request) {
 
 // Pages and what they are made of; nothing where there is none, or who asks may not see it.
 std::optional<HttpResponse> Screen::page(const std::string& path, bool is_signed_in) const {
-  if (!is_signed_in) {
-    if (by_proxy_) return std::nullopt;
-    if (path == "/sign-in") return page_answer(Page::kSignIn);
-    return std::ranges::find(kForAll, path) != kForAll.end() ? static_answer(path) : std::nullopt;
-  }
   if (path == "/sign-in" && !by_proxy_) return page_answer(Page::kSignIn);
+  if (!is_signed_in) {
+    const bool is_for_all = !by_proxy_ && std::ranges::find(kForAll, path) != kForAll.end();
+    return is_for_all ? static_answer(path) : std::nullopt;
+  }
   if (path == "/") return page_answer(Page::kSessions);
   if (path.starts_with(kSessionPage)) return page_answer(path.ends_with(kByHand) ? Page::kManual : Page::kSession);
   return static_answer(path);

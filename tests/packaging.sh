@@ -17,8 +17,7 @@ done
 
 packaging/sbom.sh "$2" >"$work/sbom"
 . /etc/os-release
-wanted=$(awk -v release="($VERSION_ID)" '/^\[/ {section = $1; next}
-  section != "[package]" && NF && $1 !~ /^#/ && ($2 !~ /^\(/ || $2 == release) {print $1}' packages.txt)
+wanted=$(for section in run build test; do packaging/packages.sh "$VERSION_ID" "$section" | cut -f 1; done)
 for package in isoshift $wanted libdcmtk17; do
   count=$(grep -cxF "PackageName: $package" "$work/sbom" || true)
   [ "$package" != libdcmtk17 ] || [ "$VERSION_ID" = 12 ] || continue

@@ -4,8 +4,8 @@ import {ManualView} from "/manual_view.js";
 import {anglesDeg, fromNumbers, motionOf, moved, planned, turned} from "/pose.js";
 
 // Of the room's screen, "/session/NAME/by-hand"; else isoshift view serves one study.
-const [, place, session] = location.pathname.split("/");
-const isOfRoom = place === "session";
+const [, folder, session] = location.pathname.split("/");
+const isOfRoom = folder === "session";
 const kApi = isOfRoom ? "/api/sessions/" + session + "/manual/" : "/api/manual/";
 const kMoving = 1, kAtRest = 0;    // detail of the DRRs: half the pixels along an edge, or all
 const kRestMs = 150, kFlickerMs = 500, kAskMs = 300, kReadMs = 1000;

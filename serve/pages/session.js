@@ -3,6 +3,7 @@ import {element, follow, get, nameForPeople, post, showSignedIn, verdictCell} fr
 
 const session = decodeURIComponent(location.pathname.split("/").pop());
 const address = "/api/sessions/" + encodeURIComponent(session);
+const kDecisions = ["agreed", "rejected", "repeat", "reopened"];
 let shown = null, me = null, hasReport = false, engine = "runs";
 
 // Written only where it changes: it is read aloud then.
@@ -73,9 +74,9 @@ element("release").addEventListener("click", async () => {
   await update();
 });
 
-for (const decision of ["agreed", "rejected", "repeat", "reopened"])
+for (const decision of kDecisions)
   element(decision).addEventListener("click", async () => {
-    for (const other of ["agreed", "rejected", "repeat", "reopened"]) element(other).disabled = true;
+    for (const other of kDecisions) element(other).disabled = true;
     write("problem", "");
     try {
       await post(address + "/decide", {decision, record: shown.record, reason: element("reason").value.trim()});

@@ -18,7 +18,7 @@ import sys
 
 import campaign
 
-# What a fault is called, and the words of a reason that names it.
+# The words of a reason that names a fault.
 CONTRADICTION = r"the views contradict each other"
 OTHER_GEOMETRY = r"with .* the images match (better|as well)"
 OTHER_PATIENT = r"another patient's"
