@@ -23,4 +23,7 @@ class SigningKey {
   std::shared_ptr<evp_pkey_st> key_;
 };
 
+// A new private key, PEM. Throws Error if none can be made.
+std::string new_signing_key();
+
 }  // namespace isoshift

@@ -2,12 +2,8 @@
 
 #include <fmt/format.h>
 #include <openssl/crypto.h>
-#include <sys/random.h>
 
-#include <array>
-#include <cerrno>
-
-#include "base/error.h"
+#include "base/random_word.h"
 #include "base/sha256.h"
 
 namespace isoshift {
@@ -23,15 +19,6 @@ bool is_same(const std::string& a, const std::string& b) {  // takes as long for
 }
 
 }  // namespace
-
-std::string random_word() {
-  std::array<unsigned char, 32> bytes{};
-  if (::getrandom(bytes.data(), bytes.size(), 0) != static_cast<ssize_t>(bytes.size()))
-    throw Error("the system gives no random numbers");
-  std::string word;
-  for (const unsigned char byte : bytes) word += fmt::format("{:02x}", byte);
-  return word;
-}
 
 std::string sign_in_cookie_header(const HttpRequest& request, const std::string& value) {
   return fmt::format("{}={}; Path=/; HttpOnly; SameSite=Strict{}{}", sign_in_cookie(request), value,

@@ -82,7 +82,4 @@ class SignIns {
   std::map<std::string, Failures> failures_;   // by user and address
 };
 
-// 32 bytes that nobody can guess, hexadecimal.
-std::string random_word();
-
 }  // namespace isoshift

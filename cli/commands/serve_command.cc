@@ -4,11 +4,14 @@
 
 #include <memory>
 
+#include "base/error.h"
 #include "base/graceful_end.h"
+#include "base/system_user.h"
 #include "cli/commands/commands.h"
 #include "cli/commands/register_command.h"
 #include "io/config/serve_file.h"
 #include "io/report/canvas.h"
+#include "serve/example_room.h"
 #include "serve/http_server.h"
 #include "serve/pam.h"
 #include "serve/room.h"
@@ -40,18 +43,37 @@ void run_serve(const std::filesystem::path& file, Console& console) {
 }  // namespace
 
 void add_serve_command(CLI::App& app, Console& console, int& exit_status) {
-  auto file = std::make_shared<std::filesystem::path>();
+  struct Options {
+    std::filesystem::path file, example;
+  };
+  auto options = std::make_shared<Options>();
   CLI::App* command =
       app.add_subcommand("serve", "Show the sessions of a treatment room in browsers, and release them");
   command->footer(
-      "\nExample:\n  isoshift serve /etc/isoshift/serve.json\n\n"
+      "\nExamples:\n  isoshift serve /etc/isoshift/serve.json\n  isoshift serve --init room\n\n"
       "Shows what isoshift watch has registered, until it is stopped. Whoever may, releases results there.\n"
-      "docs/commands/serve.md describes the serve file.");
-  command->add_option("file", *file, "Serve file: the watch file, where to listen, who signs users in, and their roles")
-      ->required()
-      ->type_name("FILE");
-  command->callback([file, &console, &exit_status] {
-    run_serve(*file, console);
+      "docs/commands/serve.md describes the serve file; docs/treatment-room.md leads through a first room.");
+  CLI::Option* file =
+      command
+          ->add_option("file", options->file,
+                       "Serve file: the watch file, where to listen, who signs users in, and their roles")
+          ->type_name("FILE");
+  CLI::Option* example =
+      command
+          ->add_option("--init", options->example,
+                       "Instead: writes the files of a room to try into a new folder, with two Orthanc servers, "
+                       "certificates and keys. Its README.txt says how to go on")
+          ->type_name("FOLDER");
+  file->excludes(example);
+  command->callback([options, &console, &exit_status] {
+    if (options->file.empty() && options->example.empty())
+      throw UsageError("FILE or --init FOLDER: expected one of them: the serve file");
+    if (options->example.empty()) {
+      run_serve(options->file, console);
+    } else {
+      write_example_room(options->example, system_user().name);
+      console.out << fmt::format("{} says how to go on\n", (options->example / "README.txt").string());
+    }
     exit_status = kExitAccepted;
   });
 }

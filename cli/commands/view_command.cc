@@ -7,6 +7,7 @@
 
 #include "base/error.h"
 #include "base/graceful_end.h"
+#include "base/random_word.h"
 #include "base/system_user.h"
 #include "cli/commands/commands.h"
 #include "cli/commands/register_command.h"
