@@ -51,6 +51,7 @@ void add_commands(CLI::App& app, Console& console, int& exit_status) {
   add_serve_command(app, console, exit_status);
   add_view_command(app, console, exit_status);
   add_release_command(app, console, exit_status);
+  add_delete_command(app, console, exit_status);
   add_audit_command(app, console, exit_status);
   add_bench_command(app, console, exit_status);
 }

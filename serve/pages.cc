@@ -19,6 +19,8 @@
 #include "serve/pages/shared.js.h"
 #include "serve/pages/sign_in.html.h"
 #include "serve/pages/sign_in.js.h"
+#include "serve/pages/trend.html.h"
+#include "serve/pages/trend.js.h"
 
 namespace isoshift {
 namespace {
@@ -29,22 +31,20 @@ struct StaticFile {
 };
 constexpr std::string_view kScript = "text/javascript; charset=utf-8", kStyles = "text/css; charset=utf-8",
                            kSvg = "image/svg+xml";
-constexpr std::array kStaticFiles = {StaticFile{"/icon.svg", kSvg, kIconSvg},
-                                     StaticFile{"/room.css", kStyles, kRoomCss},
-                                     StaticFile{"/manual.css", kStyles, kManualCss},
-                                     StaticFile{"/shared.js", kScript, kSharedJs},
-                                     StaticFile{"/sign_in.js", kScript, kSignInJs},
-                                     StaticFile{"/room.js", kScript, kRoomJs},
-                                     StaticFile{"/session.js", kScript, kSessionJs},
-                                     StaticFile{"/manual.js", kScript, kManualJs},
-                                     StaticFile{"/manual_view.js", kScript, kManualViewJs},
-                                     StaticFile{"/pose.js", kScript, kPoseJs}};
+constexpr std::array kStaticFiles = {
+    StaticFile{"/icon.svg", kSvg, kIconSvg},        StaticFile{"/room.css", kStyles, kRoomCss},
+    StaticFile{"/manual.css", kStyles, kManualCss}, StaticFile{"/shared.js", kScript, kSharedJs},
+    StaticFile{"/sign_in.js", kScript, kSignInJs},  StaticFile{"/room.js", kScript, kRoomJs},
+    StaticFile{"/session.js", kScript, kSessionJs}, StaticFile{"/trend.js", kScript, kTrendJs},
+    StaticFile{"/manual.js", kScript, kManualJs},   StaticFile{"/manual_view.js", kScript, kManualViewJs},
+    StaticFile{"/pose.js", kScript, kPoseJs}};
 
 const char* text_of(Page page) {
   switch (page) {
     case Page::kSessions: return kRoomHtml;
     case Page::kSession: return kSessionHtml;
     case Page::kManual: return kManualHtml;
+    case Page::kTrend: return kTrendHtml;
     case Page::kSignIn: return kSignInHtml;
   }
   return "";

@@ -24,6 +24,30 @@ Json json_of(const ListedSession& session) {
           {"verdict", session.verdict}, {"action", session.action},   {"state", session.state}};
 }
 
+Json json_of(const std::optional<double>& number) { return number ? Json(*number) : Json(nullptr); }
+
+Json json_of(const Trend& trend) {
+  Json results = Json::array(), errors = nullptr;
+  for (const Trend::Result& result : trend.results) {
+    Json json = json_of(result.session);
+    json["first"] = result.session.first;
+    json["plan"] = result.plan;
+    json["components"] = Json::array();
+    for (const auto& component : result.components) json["components"].push_back(json_of(component));
+    if (result.level)
+      json["level"] = {{"translation_mm", json_of(result.level->translation_mm)},
+                       {"vector_mm", json_of(result.level->vector_mm)},
+                       {"rotation_deg", json_of(result.level->rotation_deg)}};
+    json["left_out"] = result.left_out;
+    results.push_back(std::move(json));
+  }
+  if (trend.errors)
+    errors = {{"fractions", trend.errors->fractions.size()},
+              {"systematic", trend.errors->mean},
+              {"random", trend.errors->sd ? Json(*trend.errors->sd) : Json(nullptr)}};
+  return {{"results", results}, {"errors", errors}};
+}
+
 // Without those that have a result since.
 Json waiting_json(const EngineState& engine, const std::vector<ListedSession>& sessions) {
   Json waiting = Json::array();
@@ -149,6 +173,16 @@ Json Room::session(const std::string& name) {
     json["obstacle"] = error.what();
   }
   return json;
+}
+
+Json Room::trend(const std::string& session) {
+  const std::lock_guard lock(mutex_);
+  look();
+  const ListedSession& listed = this->listed(session);
+  std::vector<ListedSession> of_patient;
+  std::ranges::copy_if(list_.sessions(), std::back_inserter(of_patient),
+                       [&](const ListedSession& one) { return one.patient_key == listed.patient_key; });
+  return json_of(trend_of(tree_, std::move(of_patient)));
 }
 
 std::string Room::registered_content(const std::string& session, const std::string& name) const {

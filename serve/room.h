@@ -18,6 +18,7 @@
 #include "workflow/room/engine_state.h"
 #include "workflow/room/results_tree.h"
 #include "workflow/room/session_list.h"
+#include "workflow/room/trend.h"
 
 namespace isoshift {
 
@@ -45,6 +46,9 @@ class Room {
   // A session for the screen, as JSON: also what speaks against its release, and `record`, the SHA-256 of the record of
   // its registration. Throws NotThere.
   nlohmann::ordered_json session(const std::string& name);
+
+  // All results of the session's patient, the oldest first, as JSON. Throws NotThere.
+  nlohmann::ordered_json trend(const std::string& session);
 
   // A file of the session, as it was registered. Throws NotThere, and Error if it was changed.
   std::string file(const std::string& session, const std::string& name);

@@ -15,7 +15,7 @@ using Json = nlohmann::ordered_json;
 
 constexpr std::chrono::seconds kBeat(4);
 constexpr std::size_t kLongestReason = 1000;
-constexpr std::string_view kSessionPage = "/session/", kByHand = "/by-hand", kApi = "/api/",
+constexpr std::string_view kSessionPage = "/session/", kByHand = "/by-hand", kTrend = "/trend", kApi = "/api/",
                            kSessionApi = "/api/sessions/", kManual = "manual/", kEvents = "/api/events";
 // What the page on which people sign in is made of.
 constexpr std::array kForAll = {"/shared.js", "/sign_in.js", "/icon.svg", "/room.css"};
@@ -64,7 +64,10 @@ std::optional<HttpResponse> Screen::page(const std::string& path, bool is_signed
     return is_for_all ? static_answer(path) : std::nullopt;
   }
   if (path == "/") return page_answer(Page::kSessions);
-  if (path.starts_with(kSessionPage)) return page_answer(path.ends_with(kByHand) ? Page::kManual : Page::kSession);
+  if (path.starts_with(kSessionPage))
+    return page_answer(path.ends_with(kByHand)  ? Page::kManual
+                       : path.ends_with(kTrend) ? Page::kTrend
+                                                : Page::kSession);
   return static_answer(path);
 }
 
@@ -129,6 +132,11 @@ HttpResponse Screen::session(const HttpRequest& request, const SignedIn& who, co
     return refusal(404, "There is nothing at this address.");
   }
   if (what.empty()) return json_answer(room_.session(name));
+  if (what == "trend") {
+    Json trend = room_.trend(name);
+    room_.audit("viewed", who.user, name);
+    return json_answer(trend);
+  }
   if (what != "report.html" && what != "report.pdf") return refusal(404, "There is nothing at this address.");
   std::string content = room_.file(name, what);
   room_.audit("viewed", who.user, name);

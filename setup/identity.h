@@ -21,4 +21,10 @@ struct Identity {
   std::string referring_physician;
 };
 
+// The patient for people and for grouping: IDs of two issuers are two patients. "7", "7 (St. Elsewhere)".
+inline std::string patient_in_words(const Identity& identity) {
+  return identity.patient_id_issuer.empty() ? identity.patient_id
+                                            : identity.patient_id + " (" + identity.patient_id_issuer + ")";
+}
+
 }  // namespace isoshift

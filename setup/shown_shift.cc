@@ -139,4 +139,18 @@ ShownShift shown_shift(const SetupResult& result) {
   return shown;
 }
 
+std::array<std::optional<double>, 6> shown_components(const ShownShift& shown) {
+  return {shown.setup_error_mm[0],  shown.setup_error_mm[1],  shown.setup_error_mm[2],
+          shown.setup_error_deg[0], shown.setup_error_deg[1], shown.setup_error_deg[2]};
+}
+
+std::optional<ErrorComponents> complete_components(const ShownShift& shown) {
+  const auto components = shown_components(shown);
+  if (!std::ranges::all_of(components, [](const auto& component) { return component.has_value(); }))
+    return std::nullopt;
+  ErrorComponents complete{};
+  std::ranges::transform(components, complete.begin(), [](const auto& component) { return *component; });
+  return complete;
+}
+
 }  // namespace isoshift

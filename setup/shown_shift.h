@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "setup/action.h"
+#include "setup/setup_errors.h"
 #include "setup/setup_result.h"
 
 namespace isoshift {
@@ -52,5 +53,10 @@ struct ShownShift {
   ActionDecision decision;   // by the site's action level
 };
 ShownShift shown_shift(const SetupResult& result);
+
+// The shown setup error as the components of kErrorComponents.
+std::array<std::optional<double>, 6> shown_components(const ShownShift& shown);
+// Nothing if one of them is absent.
+std::optional<ErrorComponents> complete_components(const ShownShift& shown);
 
 }  // namespace isoshift

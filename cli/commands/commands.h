@@ -20,6 +20,7 @@ void add_predict_command(CLI::App& app, Console& console, int& exit_status);
 void add_watch_command(CLI::App& app, Console& console, int& exit_status);
 void add_serve_command(CLI::App& app, Console& console, int& exit_status);
 void add_view_command(CLI::App& app, Console& console, int& exit_status);
+void add_delete_command(CLI::App& app, Console& console, int& exit_status);
 void add_release_command(CLI::App& app, Console& console, int& exit_status);
 void add_audit_command(CLI::App& app, Console& console, int& exit_status);
 void add_evaluate_command(CLI::App& app, Console& console, int& exit_status);

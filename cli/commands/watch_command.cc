@@ -50,6 +50,7 @@ void run_watch(const std::filesystem::path& file, Console& console) {
   const auto source = source_of(watch, server.get(), clock);
   ChildRunner runner(watch);
   DicomSender sender;
+  const FileContents contents;
   ConsoleObserver observer(console), sending(console);
   Watch room(watch, {.source = *source,
                      .runner = runner,
@@ -57,6 +58,7 @@ void run_watch(const std::filesystem::path& file, Console& console) {
                      .clock = clock,
                      .observer = observer,
                      .sending = sending,
+                     .contents = contents,
                      .takes_other_xrays = !flags.study.machine.empty()});
   observer.say(fmt::format("watching {}; results in {}", watch.orthanc ? watch.orthanc->url : watch.folder.string(),
                            watch.results.string()));

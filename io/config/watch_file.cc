@@ -138,6 +138,10 @@ WatchFile read_watch_file(const fs::path& path) {
   }
   if (section.find<std::string>("signing_key", "the name of a file"))
     watch.signing_key = read.file(section, "signing_key");
+  watch.syslog = section.find<bool>("syslog", "true or false").value_or(false);
+  constexpr const char* kDays = "a whole number of days, at least 1";
+  watch.keep_days = section.find<int>("keep_days", kDays);
+  if (watch.keep_days && *watch.keep_days < 1) section.refuse("keep_days", kDays);
   watch.needs_second_person = section.find<bool>("second_person", "true or false").value_or(false);
   section.end();
   return watch;

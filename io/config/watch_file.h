@@ -38,6 +38,8 @@ struct WatchFile {
   SiteFile site;                          // with its rule for sessions
   std::vector<std::string> registration;  // flags of isoshift register
   std::vector<DicomPeer> peers;
+  bool syslog = false;                // the audit log goes to the system's log, too
+  std::optional<int> keep_days;       // results are deleted that long after their registration; unset: never
   bool needs_second_person = false;   // who agrees before another one releases what was not accepted
   std::filesystem::path signing_key;  // of releases: Ed25519, PEM; empty: they are not signed
 

@@ -84,6 +84,11 @@ std::string RestOrthanc::file_of(const std::string& instance) const {
   return answer.status == kNotFound ? "" : std::move(answer.body);
 }
 
+std::vector<std::string> RestOrthanc::instances() const {
+  return parsed(get("/instances").body, server_.url, "a list of instances",
+                [](const nlohmann::json& json) { return json.get<std::vector<std::string>>(); });
+}
+
 std::vector<std::string> RestOrthanc::instances_beside(const std::string& instance) const {
   const Answer patient = get("/instances/" + instance + "/patient");
   if (patient.status == kNotFound) return {};

@@ -34,6 +34,9 @@ class Orthanc {
   // The file of an instance, as the server received it; empty if the instance has been deleted since.
   virtual std::string file_of(const std::string& instance) const = 0;
 
+  // All that the server holds.
+  virtual std::vector<std::string> instances() const = 0;
+
   // All instances of the patient to whom this instance belongs; none if the instance has been deleted since.
   virtual std::vector<std::string> instances_beside(const std::string& instance) const = 0;
 };
@@ -47,6 +50,7 @@ class RestOrthanc : public Orthanc {
 
   Changes changes_since(std::int64_t last, int limit) const override;
   std::string file_of(const std::string& instance) const override;
+  std::vector<std::string> instances() const override;
   std::vector<std::string> instances_beside(const std::string& instance) const override;
 
  private:

@@ -92,6 +92,7 @@ element("name").textContent = session;
 element("pdf").href = address + "/report.pdf";
 me = await showSignedIn();
 element("by-hand").hidden = !me.roles.includes("register");
+element("trend").href = "/session/" + encodeURIComponent(session) + "/trend";
 element("by-hand").href = "/session/" + encodeURIComponent(session) + "/by-hand";
 await update();
 element("report").src = address + "/report.html";

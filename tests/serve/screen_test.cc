@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <chrono>
+#include <cmath>
 #include <fstream>
 #include <thread>
 
@@ -45,7 +46,9 @@ class ScreenTest : public testing::Test {
   }
   // A result of X-rays with these UIDs, as isoshift register would leave it.
   std::string register_result(const std::vector<std::string>& xrays, Verdict verdict = Verdict::kAccepted) {
-    SetupResult result = oblique_report(verdict);
+    return register_result(oblique_report(verdict), xrays);
+  }
+  std::string register_result(SetupResult result, const std::vector<std::string>& xrays) {
     result.views.resize(xrays.size(), result.views.front());
     for (std::size_t n = 0; n < xrays.size(); ++n) result.views[n].sop_instance_uid = xrays[n];
     std::string name = session_name(std::set(xrays.begin(), xrays.end()));
@@ -187,6 +190,52 @@ TEST_F(ScreenTest, WhoMayReleaseDecidesWithAReason) {
   EXPECT_EQ(session().at("decision").at("kind"), "rejected");
   EXPECT_NE(session().at("obstacle"), "");
   EXPECT_EQ(post("releaser", "/api/sessions/" + a_ + "/release", word()).status, 409);
+}
+
+TEST_F(ScreenTest, ATrendHasAllResultsOfThePatientAndCountsTheFirstOfEveryDay) {
+  int number = 0;
+  const auto add = [&](const std::string& acquired, double x_mm, Verdict verdict, const std::string& issuer = "here") {
+    SetupResult result = oblique_report(verdict);
+    result.identity.patient_id_issuer = issuer;
+    result.setup_error = Eigen::Translation3d(x_mm, 0.0, 0.0);
+    for (auto& view : result.views) view.acquired = acquired;
+    const std::string uid = "1.2.9." + std::to_string(++number);
+    return register_result(result, {uid, uid + ".1"});
+  };
+  const std::string third = add("2026-03-03 10:00:00", 3.0, Verdict::kReview);
+  const std::string first = add("2026-03-01 10:00:00", 1.0, Verdict::kAccepted);
+  const std::string again = add("2026-03-01 10:05:00", 0.2, Verdict::kAccepted);
+  add("2026-03-02 10:00:00", 9.0, Verdict::kAccepted, "elsewhere");
+  const std::string rejected = add("2026-03-04 10:00:00", 20.0, Verdict::kRejected);
+  const auto trend = [&] { return Json::parse(get("/api/sessions/" + first + "/trend").body); };
+  Json now = trend();
+  ASSERT_EQ(now.at("results").size(), 4U);
+  std::vector<std::string> order;
+  for (const Json& result : now.at("results")) order.push_back(result.at("session"));
+  EXPECT_EQ(order, (std::vector<std::string>{first, again, third, rejected}));
+  EXPECT_EQ(now.at("results")[0].at("left_out"), "");
+  EXPECT_EQ(now.at("results")[1].at("left_out"), "an earlier result of this day counts");
+  EXPECT_THAT(now.at("results")[2].at("left_out").get<std::string>(), HasSubstr("nobody has released it"));
+  EXPECT_EQ(now.at("results")[3].at("left_out"), "it was rejected");
+  EXPECT_EQ(now.at("errors").at("fractions"), 1);
+  EXPECT_EQ(now.at("errors").at("random"), nullptr);
+  tree_.release(third, kDoe, {"record"});
+  now = trend();
+  EXPECT_EQ(now.at("results")[2].at("left_out"), "");
+  EXPECT_EQ(now.at("errors").at("fractions"), 2);
+  EXPECT_NEAR(now.at("errors").at("systematic")[0], 2.0, 1e-9);
+  EXPECT_NEAR(now.at("errors").at("random")[0], std::sqrt(2.0), 1e-9);
+  tree_.decide({.kind = DecisionKind::kRejected,
+                .session = first,
+                .record = tree_.registered(first).sha256,
+                .reason = "wrong patient",
+                .by = "jdoe"});
+  now = trend();
+  EXPECT_EQ(now.at("results")[0].at("left_out"), "a person has decided against it");
+  EXPECT_EQ(now.at("results")[1].at("left_out"), "") << "the first that stands";
+  std::ofstream(tree_.session(third) / "result.json", std::ios::app) << " ";
+  EXPECT_THAT(trend().at("results")[2].at("left_out").get<std::string>(), HasSubstr("result.json"));
+  EXPECT_EQ(get("/api/sessions/none/trend").status, 404);
 }
 
 TEST_F(ScreenTest, WhoMayRegisterDoesSoByHand) {

@@ -96,9 +96,9 @@ void FakeSource::update(Notes& /*notes*/) {
   }
 }
 
-void FakeSource::forget_before(std::filesystem::file_time_type time) {
+void FakeSource::forget_before(std::filesystem::file_time_type time, const std::set<std::string>& but) {
   for (const auto& [patient_id, last] : last_) {
-    if (last >= time || patients_.erase(patient_id) == 0) continue;
+    if (last >= time || but.contains(patient_id) || patients_.erase(patient_id) == 0) continue;
     for (const auto& [uid, object] : everything_[patient_id]) here_.erase(uid);
   }
 }
@@ -165,7 +165,8 @@ void TreatmentRoom::start() {
                                                      .sender = sender,
                                                      .clock = clock,
                                                      .observer = observer,
-                                                     .sending = sending});
+                                                     .sending = sending,
+                                                     .contents = contents});
 }
 
 void TreatmentRoom::pass(std::chrono::seconds length, std::chrono::seconds step) {

@@ -18,6 +18,7 @@
 #include "workflow/room/clock.h"
 #include "workflow/room/runner.h"
 #include "workflow/room/sender.h"
+#include "workflow/room/session_inputs.h"
 #include "workflow/room/source.h"
 #include "workflow/room/watch.h"
 
@@ -66,7 +67,7 @@ class FakeSource : public Source {
   std::vector<std::string> unreadable() const override { return broken; }
   bool is_coming(const std::string& /*patient_id*/) const override { return is_coming_; }
   void ask_for_rest(const std::string& patient_id) override { asked_.insert(patient_id); }
-  void forget_before(std::filesystem::file_time_type time) override;
+  void forget_before(std::filesystem::file_time_type time, const std::set<std::string>& but) override;
 
  private:
   void take(const std::string& patient_id, const std::string& uid, const StudyFiles& object);
@@ -135,6 +136,18 @@ class FakeSender : public Sender {
   std::map<std::string, int> stored_;
 };
 
+// Files that are not there: a file holds its path, until a test writes something else.
+class FakeContents : public FileContents {
+ public:
+  std::map<std::filesystem::path, std::string> written;
+
+  std::string version(const std::filesystem::path& file) const override { return sha256(file); }
+  std::string sha256(const std::filesystem::path& file) const override {
+    const auto found = written.find(file);
+    return found == written.end() ? file.string() : found->second;
+  }
+};
+
 class SayingsObserver : public Observer {
  public:
   void say(std::string_view line) override { lines.emplace_back(line); }
@@ -158,6 +171,7 @@ struct TreatmentRoom {
   FakeSource source{clock};
   FakeRunner runner{clock, source};
   FakeSender sender{clock};
+  FakeContents contents;
   SayingsObserver observer, sending;
   std::unique_ptr<Watch> watch;
 };

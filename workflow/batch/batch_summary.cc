@@ -27,13 +27,6 @@ std::string status_of(const CaseEnd& end) {
   return end.error.empty() ? "open" : "failed";
 }
 
-// IDs of two issuers are two patients.
-std::string patient_of(const SetupResult& report) {
-  const Identity& identity = report.identity;
-  return identity.patient_id_issuer.empty() ? identity.patient_id
-                                            : fmt::format("{} ({})", identity.patient_id, identity.patient_id_issuer);
-}
-
 std::string acquired(const CaseEnd& end) {
   return end.report && !end.report->views.empty() ? end.report->views.front().acquired : "";
 }
@@ -46,11 +39,6 @@ std::string reason_of(const CaseEnd& end) {
 }
 
 using Components = std::array<std::optional<double>, 6>;
-Components shown_components(const SetupResult& report) {
-  const ShownShift shown = shown_shift(report);
-  return {shown.setup_error_mm[0],  shown.setup_error_mm[1],  shown.setup_error_mm[2],
-          shown.setup_error_deg[0], shown.setup_error_deg[1], shown.setup_error_deg[2]};
-}
 
 std::string summary_csv(const BatchSummary& summary) {
   std::string csv = fmt::format("case,patient_id,acquired,verdict,action,{},reason,seconds,report\n",
@@ -59,7 +47,7 @@ std::string summary_csv(const BatchSummary& summary) {
     std::string components(5, ',');
     if (end.report) {
       std::vector<std::string> texts;
-      for (const auto& component : shown_components(*end.report))
+      for (const auto& component : shown_components(shown_shift(*end.report)))
         texts.push_back(component ? fmt::format("{:.4f}", *component) : "");
       components = fmt::format("{}", fmt::join(texts, ","));
     }
@@ -118,7 +106,7 @@ std::string index_html(const BatchSummary& summary) {
             {.text = acquired(end)},
             {.text = status_of(end)},
             {.text = end.report ? std::string(to_string(shown_shift(*end.report).decision.action)) : ""}}};
-    const Components components = end.report ? shown_components(*end.report) : Components();
+    const Components components = end.report ? shown_components(shown_shift(*end.report)) : Components();
     for (std::size_t n = 0; n < components.size(); ++n) row.cells.push_back(number_cell(components[n], n < 3 ? 1 : 2));
     row.cells.push_back({.text = reason_of(end)});
     page.rows.push_back(std::move(row));
@@ -188,11 +176,8 @@ BatchSummary summary_of(const BatchFolder& folder, const std::vector<BatchCase>&
     summary.cases.push_back(end_of(folder, one.name));
     const CaseEnd& end = summary.cases.back();
     if (!end.report || end.report->verdict != Verdict::kAccepted) continue;
-    ErrorComponents all{};
-    const Components shown = shown_components(*end.report);
-    if (!std::ranges::all_of(shown, [](const auto& component) { return component.has_value(); })) continue;
-    std::ranges::transform(shown, all.begin(), [](const auto& component) { return *component; });
-    by_patient[patient_of(*end.report)].emplace(acquired(end), all);
+    const auto components = complete_components(shown_shift(*end.report));
+    if (components) by_patient[patient_in_words(end.report->identity)].emplace(acquired(end), *components);
   }
   for (auto& [patient, fractions] : by_patient) {
     std::vector<ErrorComponents> in_order;
@@ -212,7 +197,7 @@ std::string summary_json(const BatchSummary& summary) {
       json["acquired"] = acquired(end);
       json["action"] = to_string(shown_shift(*end.report).decision.action);
       Json components = Json::object();
-      const Components shown = shown_components(*end.report);
+      const Components shown = shown_components(shown_shift(*end.report));
       for (std::size_t n = 0; n < 6; ++n) components[kErrorComponents[n]] = shown[n] ? Json(*shown[n]) : Json(nullptr);
       json["setup_error"] = components;
       json["reasons"] = end.report->reasons;

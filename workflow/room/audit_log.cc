@@ -122,6 +122,7 @@ void AuditLog::write(const std::vector<Json>& lines) const {
   [[maybe_unused]] const int undone = failure != 0 ? ::ftruncate(descriptor, before) : 0;
   if (failure != 0) throw Error(fmt::format("{}: cannot be written: {}", path_.string(), std::strerror(failure)));
   if (before == 0) flush(path_.parent_path());
+  if (mirror_) std::ranges::for_each(lines, mirror_);
 }
 
 void AuditLog::Proofs::add_lines(const std::string& text) {

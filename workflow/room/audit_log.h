@@ -8,6 +8,7 @@
 #include <array>
 #include <ctime>
 #include <filesystem>
+#include <functional>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -24,6 +25,10 @@ inline constexpr const char* kAuditHeadKey = "audit_head";
 class AuditLog {
  public:
   explicit AuditLog(std::filesystem::path path) : path_(std::move(path)) {}
+
+  // Hears of every line that was written. Must not throw.
+  using Mirror = std::function<void(const nlohmann::ordered_json& line)>;
+  void set_mirror(Mirror mirror) { mirror_ = std::move(mirror); }
 
   // Adds a line for a step that is about to take effect. On return the line is on the disk. Throws Error if the line
   // cannot be written: then the step must not be taken.
@@ -80,6 +85,7 @@ class AuditLog {
   [[noreturn]] void refuse_another_log() const;
 
   std::filesystem::path path_;
+  Mirror mirror_;
   std::vector<nlohmann::ordered_json> kept_;  // lines that could not be written yet
   mutable Version read_version_;
   mutable std::string read_lines_;  // the whole lines that were read: a log only grows

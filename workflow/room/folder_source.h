@@ -23,8 +23,9 @@ class FolderSource : public Source {
   // True while a file of this patient grows. A file whose patient is not known yet counts for every patient, for a
   // minute.
   bool is_coming(const std::string& patient_id) const override;
-  void ask_for_rest(const std::string& /*patient_id*/) override {}          // the folder has no other files
-  void forget_before(std::filesystem::file_time_type /*time*/) override {}  // the folder is not ours
+  void ask_for_rest(const std::string& /*patient_id*/) override {}  // the folder has no other files
+  void forget_before(std::filesystem::file_time_type /*time*/, const std::set<std::string>& /*but*/) override {
+  }  // the folder is not ours
 
  private:
   struct Version {

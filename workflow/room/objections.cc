@@ -8,6 +8,7 @@
 #include <sstream>
 
 #include "io/study/session_files.h"
+#include "workflow/room/session_record.h"
 
 namespace isoshift {
 namespace {
@@ -33,6 +34,19 @@ void Objections::add_result(const std::string& session, const SetupResult& resul
     patient.xrays.try_emplace(Xray(view.sop_instance_uid, view.acquired),
                               Seen{.label = view.label, .moment = {.local_s = seconds_of(view.acquired)}});
   }
+}
+
+void Objections::add(const std::string& session, const std::string& words) {
+  added_[session] = words;
+  for (auto& [patient_id, patient] : patients_)
+    if (patient.results.contains(session)) patient.is_news = true;
+}
+
+void Objections::remove(const std::string& first_session) {
+  const auto is_of = [&](const auto& one) { return name_of_xrays(one.first) == first_session; };
+  std::erase_if(by_session_, is_of);
+  std::erase_if(added_, is_of);
+  for (auto& [patient_id, patient] : patients_) std::erase_if(patient.results, is_of);
 }
 
 void Objections::see(const std::string& patient_id, const StudyFiles& files) {
@@ -76,6 +90,8 @@ void Objections::update(const std::map<std::string, Patient>& patients, const st
     if (!std::exchange(patient.is_news, false)) continue;
     for (const auto& [session, own] : patient.results) {
       Objection found = objection(patient, own, registered);
+      if (const auto added = added_.find(session); added != added_.end())
+        found = {.words = found.words + (found.words.empty() ? "" : "; ") + added->second};
       const auto earlier = by_session_.find(session);
       const bool is_final =  // of an earlier run, which has seen more
           earlier != by_session_.end() && !earlier->second.newer_have_results && !are_seen(patient, own);

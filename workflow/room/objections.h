@@ -23,6 +23,12 @@ class Objections {
 
   void add_result(const std::string& session, const SetupResult& result);
 
+  // That the files of a result are others now, in words. It counts with the next update().
+  void add(const std::string& session, const std::string& words);
+
+  // Forgets all results of these X-rays. The X-rays count on.
+  void remove(const std::string& first_session);
+
   // Looks at the X-rays that have arrived, by PatientID. `registered`: the SOPInstanceUIDs of those that have a result.
   void update(const std::map<std::string, Patient>& patients, const std::set<std::string>& registered);
 
@@ -63,6 +69,7 @@ class Objections {
                       const std::set<std::string>& registered) const;
 
   std::map<std::string, Objection> by_session_;
+  std::map<std::string, std::string> added_;  // by session
   bool takes_other_xrays_;
   std::map<std::string, OfPatient> patients_;          // by PatientID
   std::map<std::string, std::string> patient_of_uid_;  // PatientID, by the SOPInstanceUID of an X-ray that has a result

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
+#include <utility>
 #include <vector>
 
 #include "base/error.h"
@@ -55,6 +56,7 @@ void OrthancSource::update(Notes& notes) {
   const Orthanc::Changes changes = server_.changes_since(last_change_, kChangesAtOnce);
   if (changes.last < last_change_) {  // another database
     last_change_ = 0;
+    is_listed_ = false;
     return;
   }
   for (const std::string& instance : changes.instances) unfetched_[instance] = {.since = clock_.now()};
@@ -65,14 +67,27 @@ void OrthancSource::update(Notes& notes) {
   has_all_changes_ = changes.done;
   last_change_ = changes.last;
   if (!changes.mark.empty()) last_mark_ = changes.mark;
+  if (changes.done && !std::exchange(is_listed_, true)) compare_with_list();
   save_state();
 }
 
-// Another database under the same address has another change of that number, or none.
+// A list of changes that somebody has cleared tells of nothing that came before.
+void OrthancSource::compare_with_list() {
+  for (const std::string& instance : server_.instances())
+    if (!useless_.contains(instance) && !fs::exists(object_of(instance)))
+      unfetched_.emplace(instance, Attempts{.since = clock_.now()});
+}
+
+// Another database under the same address has another change of that number, or none; so has a list of changes that was
+// cleared.
 void OrthancSource::check_server(Notes& notes) {
-  if (last_change_ == 0 || server_.changes_since(last_change_ - 1, 1).mark == last_mark_) return;
+  const std::string mark = last_change_ == 0 ? "" : server_.changes_since(last_change_ - 1, 1).mark;
+  is_listed_ = !mark.empty() && mark == last_mark_;
+  if (mark == last_mark_) return;
   notes.warnings.push_back(
-      fmt::format("Orthanc at {}: holds another database than before; all of it is read again", url_));
+      fmt::format("Orthanc at {}: holds another database than before, or its list of changes was cleared; all of it is "
+                  "read again",
+                  url_));
   last_change_ = 0;
 }
 
@@ -146,7 +161,7 @@ void OrthancSource::find_rest(const std::string& patient_id, Notes& notes) {
   }
 }
 
-void OrthancSource::forget_before(fs::file_time_type time) {
+void OrthancSource::forget_before(fs::file_time_type time, const std::set<std::string>& but) {
   std::map<std::string, std::vector<fs::path>> old;  // by patient
   std::set<std::string> others;
   for (const auto& [file, known] : files_.known()) {
@@ -157,7 +172,7 @@ void OrthancSource::forget_before(fs::file_time_type time) {
       old[known.patient_id].push_back(file);
   }
   for (const auto& [patient_id, files] : old) {
-    if (others.contains(patient_id)) continue;
+    if (others.contains(patient_id) || but.contains(patient_id)) continue;
     for (const fs::path& file : files) {
       fs::remove(file);
       files_.forget(file);

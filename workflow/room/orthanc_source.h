@@ -28,7 +28,7 @@ class OrthancSource : public Source {
   bool is_coming(const std::string& patient_id) const override;
   // The next update asks the server once which other objects it has of a patient, and again after each new object.
   void ask_for_rest(const std::string& patient_id) override { rest_.emplace(patient_id, Clock::Time()); }
-  void forget_before(std::filesystem::file_time_type time) override;
+  void forget_before(std::filesystem::file_time_type time, const std::set<std::string>& but) override;
 
  private:
   struct Attempts {
@@ -38,6 +38,7 @@ class OrthancSource : public Source {
   };
   void read_objects(Notes& notes);
   void check_server(Notes& notes);
+  void compare_with_list();
   void fetch(const std::string& instance, Notes& notes);
   void put_off(const std::string& instance, const Error& error, Notes& notes);
   void find_rest(const std::string& patient_id, Notes& notes);
@@ -57,6 +58,7 @@ class OrthancSource : public Source {
   std::map<std::string, Clock::Time> rest_;    // patients whose other objects are asked for, and when
   std::set<std::string> useless_;              // instances that belong to no study
   bool has_all_changes_ = true, has_read_objects_ = false, has_checked_server_ = false;
+  bool is_listed_ = false;  // all instances that the server held were compared with those that are kept
   std::string saved_state_;
 };
 

@@ -19,6 +19,7 @@
 #include "base/sha256.h"
 #include "base/system_user.h"
 #include "io/report/result_folder.h"
+#include "workflow/room/audit_to_syslog.h"
 #include "workflow/room/decision_files.h"
 #include "workflow/room/signed_json.h"
 
@@ -94,7 +95,8 @@ void check_is_owner(const fs::path& results) {
 }
 
 ResultsTree::ResultsTree(fs::path path) : path_(std::move(path)), audit_(path_ / "audit.jsonl") {
-  for (const char* folder : {"sessions", "registered", "released", "sent", "decided", "orders", "handed_over"}) {
+  for (const char* folder :
+       {"sessions", "registered", "released", "sent", "decided", "orders", "inputs", "handed_over", "deleted"}) {
     std::error_code error;
     fs::create_directories(path_ / folder, error);
     if (error) throw Error(fmt::format("{}: cannot be made: {}", (path_ / folder).string(), error.message()));
@@ -104,6 +106,7 @@ ResultsTree::ResultsTree(fs::path path) : path_(std::move(path)), audit_(path_ /
 ResultsTree::ResultsTree(const WatchFile& watch) : ResultsTree(watch.results) {
   if (!watch.signing_key.empty()) key_.emplace(watch.signing_key);
   needs_second_person_ = watch.needs_second_person;
+  if (watch.syslog) audit_.set_mirror(audit_to_syslog(watch));
 }
 
 std::optional<FileLock> ResultsTree::try_lock() const { return FileLock::try_take(path_ / ".watch.lock"); }
@@ -184,6 +187,7 @@ void ResultsTree::publish(const std::string& session) { publish(session, registe
 
 void ResultsTree::publish(const std::string& session, const fs::path& folder) {
   check_is_new(session);
+  check_is_not_deleted(session);
   const SessionRecord record = record_of(session, folder);
   const std::string text = json_of(record);
   replace_text(record_file(session), text);
@@ -194,7 +198,27 @@ void ResultsTree::publish(const std::string& session, const fs::path& folder) {
 }
 
 void ResultsTree::keep_order(const std::string& session, const RegistrationOrder& order) {
-  replace_text(order_file(session), to_line(order) + "\n");
+  replace_text(order_file(name_of_xrays(session)), to_line(order) + "\n");
+}
+
+void ResultsTree::keep_inputs(const std::string& session, const SessionInputs& inputs) {
+  replace_text(path_ / "inputs" / (session + ".json"), file_text(json_of(inputs)));
+}
+
+std::optional<SessionInputs> ResultsTree::inputs(const std::string& session) const {
+  std::optional<SessionInputs> newest;
+  for (int number = 1;; ++number) {
+    const std::string name = name_of_xrays(session, number);
+    if (!fs::exists(this->session(name))) return newest;
+    const fs::path file = path_ / "inputs" / (name + ".json");
+    if (!fs::exists(file)) continue;
+    try {
+      newest = session_inputs_from(read_json_file(file).json);
+    } catch (const nlohmann::json::exception& error) {
+      throw Error(
+          fmt::format("{}: does not tell from what session {} was registered: {}", file.string(), name, error.what()));
+    }
+  }
 }
 
 RegistrationOrder ResultsTree::order(const std::string& session) const {
@@ -211,6 +235,7 @@ RegistrationOrder ResultsTree::order(const std::string& session) const {
 
 std::string ResultsTree::hand_over(const std::string& session, const fs::path& folder, const std::string& by) {
   const FileLock lock = lock_releases();
+  check_is_not_deleted(session);
   const fs::path place = path_ / "handed_over" / name_of_xrays(session);
   if (fs::exists(place))
     throw Error(
@@ -353,6 +378,56 @@ void ResultsTree::check_second_person(const SessionRecord& record, const std::st
                     "first",
                     record.session, record.verdict));
 }
+
+void ResultsTree::check_is_not_deleted(const std::string& session) const {
+  if (is_deleted(path_, session)) throw Error(fmt::format("session {}: was deleted", session));
+}
+
+// Nothing of a damaged session is sent.
+bool ResultsTree::is_to_be_sent(const std::string& session) const {
+  try {
+    const auto release = release_of(session);
+    if (!release || pending_of(*release).empty()) return false;
+    check_stands(session);
+    return true;
+  } catch (const Error&) {
+    return false;
+  }
+}
+
+// First the line in the audit log, then the file, then the results: finish_deletions() continues after the second.
+void ResultsTree::remove(const std::string& session, const std::string& by) {
+  const FileLock lock = lock_releases();
+  if (!std::ranges::binary_search(sessions(), session))
+    throw Error(fmt::format("{}: holds no session {}", path_.string(), session));
+  Deletion deletion{
+      .session = name_of_xrays(session), .by = by, .user = system_user().name, .on = local_time(), .xrays = {}};
+  for (int number = 1;; ++number) {
+    const std::string name = name_of_xrays(session, number);
+    if (!fs::exists(this->session(name))) break;
+    if (is_to_be_sent(name))
+      throw Error(
+          fmt::format("session {}: was released and is still to be sent. Wait until it is sent, or reject it on the "
+                      "screen of isoshift serve",
+                      name));
+    try {
+      for (const std::string& uid : xrays_of(this->session(name))) deletion.xrays.insert(isoshift::sha256_of(uid));
+    } catch (const Error&) {  // a damaged result names no X-rays
+      continue;
+    }
+  }
+  audit_.append("deleted", {{"session", deletion.session}, {"by", by}, {"user", deletion.user}});
+  put_deletion(path_, deletion);
+  remove_deleted(path_, {deletion});
+}
+
+std::vector<Deletion> ResultsTree::finish_deletions() const {
+  std::vector<Deletion> all = deletions(path_);
+  remove_deleted(path_, all);
+  return all;
+}
+
+fs::file_time_type ResultsTree::newest_deletion() const { return fs::last_write_time(path_ / "deleted"); }
 
 // Only one process releases at a time.
 FileLock ResultsTree::lock_releases() const {

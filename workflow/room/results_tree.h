@@ -7,13 +7,15 @@
 //   released/NAME.json       who released the session, and which objects are sent to which peers
 //   decided/NAME.N.json      what a person has decided about the session
 //   orders/NAME.json         how the session was registered: what a person who registers it by hand begins with
+//   inputs/NAME.json         the SHA-256 of the files from which it was registered
 //   handed_over/NAME/        a result of the session's X-rays by hand that watch has yet to take over
 //   sent/NAME.PEER.FILE      the mark that this peer has confirmed this file; it counts with its line in the audit log
+//   deleted/NAME.json        that the results of these X-rays were deleted
 //   objections.json          what other X-rays of the patient say against results
 //   audit.jsonl              the audit log, without names of patients and without UIDs
 //
-// The X-rays of a session NAME can have further results, made by hand: they are sessions of their own, NAME-2 and so
-// on. Only the newest result of the same X-rays is released or sent.
+// The X-rays of a session NAME can have further results, made by hand or because the files of the first are others
+// now: they are sessions of their own, NAME-2 and so on. Only the newest result of the same X-rays is released or sent.
 //
 // A session is released or sent only if its folder is unchanged since its record was written, and if the audit log has
 // a line for the record and for the release, each with the SHA-256 of its file. A line is on the disk before its step
@@ -33,6 +35,8 @@
 #include "workflow/register/registration_messages.h"
 #include "workflow/room/audit_log.h"
 #include "workflow/room/decision.h"
+#include "workflow/room/deletion.h"
+#include "workflow/room/session_inputs.h"
 #include "workflow/room/session_record.h"
 
 namespace isoshift {
@@ -105,8 +109,12 @@ class ResultsTree {
   // fails. The caller must hold the lock of the tree.
   void publish(const std::string& session);
 
-  // Keeps how a session is registered. The caller must hold the lock of the tree.
+  // Keeps how a session is registered, and from what. The caller must hold the lock of the tree.
   void keep_order(const std::string& session, const RegistrationOrder& order);
+  void keep_inputs(const std::string& session, const SessionInputs& inputs);
+  // From what the newest result of the session's X-rays was registered; nothing if that was not kept. A result by hand
+  // was made from what the result before it was made from.
+  std::optional<SessionInputs> inputs(const std::string& session) const;
   // How its X-rays were registered, from the planned pose. Throws Error if that was not kept.
   RegistrationOrder order(const std::string& session) const;
   // Hands a finished result of the session's X-rays to the process that registers, as a line in the audit log says, and
@@ -119,6 +127,8 @@ class ResultsTree {
   std::string take_over(const std::string& session);
   // The newest result of the same X-rays: the session itself, or a further one.
   std::string newest_of_same_xrays(const std::string& session) const;
+  // The name of the next result of the session's X-rays.
+  std::string further_name(const std::string& session) const;
 
   // The record of a session. Throws Error if there is no record, or if the audit log has no line for it.
   SessionRecord registered(const std::string& session) const;
@@ -141,6 +151,17 @@ class ResultsTree {
   // The newest decision about the present result of a session; nothing if there is none, or if it was taken back.
   // Throws Error if the files do not say what the audit log proves.
   std::optional<Decision> decision(const std::string& session) const;
+
+  // Whether it was released, and a peer has yet to confirm an object.
+  bool is_to_be_sent(const std::string& session) const;
+  // Deletes all results of the session's X-rays and what is kept of them; the audit log, and a file in deleted/, say
+  // so. Throws Error, and deletes nothing, if there is no such session, if what was released of it is still to be sent,
+  // or if the audit log cannot be written. `by`: the person, or the rule of the watch file.
+  void remove(const std::string& session, const std::string& by);
+  // All deletions. Removes what a killed process has left of results that it was deleting.
+  std::vector<Deletion> finish_deletions() const;
+  // When the newest deletion took place.
+  std::filesystem::file_time_type newest_deletion() const;
 
   bool is_released(const std::string& session) const;
   // The release of a session, if there is one. Throws Error for a release file that isoshift release did not write, or
@@ -190,7 +211,7 @@ class ResultsTree {
   // The record of a session. Throws Error if the session's folder has changed since its registration.
   SessionRecord checked(const std::string& session) const;
   void publish(const std::string& session, const std::filesystem::path& folder);
-  std::string further_name(const std::string& session) const;
+  void check_is_not_deleted(const std::string& session) const;
   // Throws Error if a newer result or a decision forbids that the session is released or sent.
   void check_stands(const std::string& session) const;
   void check_second_person(const SessionRecord& record, const std::string& releaser) const;

@@ -44,11 +44,29 @@ void SessionIndex::add(const std::string& session, const SetupResult& report, co
   is_written_ = false;
 }
 
+void SessionIndex::remove(const std::string& first_session) {
+  if (list_.remove(first_session)) is_written_ = false;
+}
+
 void SessionIndex::write(const std::string& page, const std::string& html) {
   std::string content = sha256_of(html);
   if (written_[page] == content) return;
   replace_text(tree_.path() / page, html);
   written_[page] = std::move(content);
+}
+
+// Pages of months of which all results were deleted name patients.
+void SessionIndex::remove_pages_but(const std::set<std::string>& pages) {
+  static const std::regex pattern("sessions-.*[.]html");
+  std::vector<std::filesystem::path> others;
+  for (const auto& entry : std::filesystem::directory_iterator(tree_.path()))
+    if (const std::string page = entry.path().filename().string();
+        std::regex_match(page, pattern) && !pages.contains(page))
+      others.push_back(entry.path());
+  for (const std::filesystem::path& page : others) {
+    std::filesystem::remove(page);
+    written_.erase(page.filename().string());
+  }
 }
 
 void SessionIndex::update(const std::vector<WaitingSession>& waiting, const std::vector<std::string>& troubles,
@@ -87,7 +105,12 @@ void SessionIndex::update(const std::vector<WaitingSession>& waiting, const std:
     }
     page.rows.push_back(std::move(row));
   }
-  for (const auto& [month, page] : months) write(page_of_month(month), results_html(page));
+  std::set<std::string> pages;
+  for (const auto& [month, page] : months) {
+    pages.insert(page_of_month(month));
+    write(page_of_month(month), results_html(page));
+  }
+  remove_pages_but(pages);
   write("index.html", results_html(newest));
   is_written_ = true;
 }

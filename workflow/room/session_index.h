@@ -3,6 +3,7 @@
 // and a page per month with all sessions of that month.
 
 #include <map>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -21,6 +22,8 @@ class SessionIndex {
   // Either is empty if nothing is in the way.
   void add(const std::string& session, const SetupResult& report, const std::string& obstacle,
            const std::string& reason_for_person = "");
+  // All results of these X-rays.
+  void remove(const std::string& first_session);
   std::size_t size() const { return list_.sessions().size(); }
 
   // Finds out which sessions have been released and sent, and writes the pages that have changed. `troubles`: the
@@ -30,6 +33,7 @@ class SessionIndex {
 
  private:
   void write(const std::string& page, const std::string& html);
+  void remove_pages_but(const std::set<std::string>& pages);
 
   const ResultsTree& tree_;
   std::string site_;

@@ -38,12 +38,18 @@ void SessionList::add(const std::string& session, const SetupResult& report, con
                       .patient = fmt::format("{} ({})", report.identity.patient_name, report.identity.patient_id),
                       .verdict = std::string(to_string(report.verdict)),
                       .action = std::string(to_string(shown_shift(report).decision.action)),
+                      .patient_key = patient_in_words(report.identity),
                       .held = std::move(held),
                       .state = "",
                       .first = report.views.front().acquired,
                       .times = times_of(report.views)};
   sessions_.insert(std::ranges::upper_bound(sessions_, added.first, std::ranges::greater(), &ListedSession::first),
                    std::move(added));
+}
+
+bool SessionList::remove(const std::string& first_session) {
+  return std::erase_if(sessions_,
+                       [&](const ListedSession& session) { return name_of_xrays(session.name) == first_session; }) > 0;
 }
 
 // What people have decided, and a newer result of the same X-rays: "; ..." for each.

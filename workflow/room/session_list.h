@@ -13,7 +13,8 @@ namespace isoshift {
 
 struct ListedSession {
   std::string name, patient, verdict, action;
-  std::string held;   // in words: the state before it is released
+  std::string patient_key;  // patient_in_words()
+  std::string held;         // in words: the state before it is released
   std::string state;  // in words: "held", "released by J. Doe on ...; 1 to be sent", "held; superseded by session ..."
   std::string first;  // when the first X-ray was acquired, "2026-03-01 10:15:00"
   std::string times;  // of all X-rays
@@ -35,6 +36,9 @@ class SessionList {
   // Either is empty if nothing is in the way.
   void add(const std::string& session, const SetupResult& report, const std::string& obstacle,
            const std::string& reason_for_person = "");
+
+  // Takes all results of these X-rays out. Returns whether there were any.
+  bool remove(const std::string& first_session);
 
   // Finds out which sessions have been released and sent. Returns whether the state of any has changed. `objections`:
   // what other X-rays say against results, by session.

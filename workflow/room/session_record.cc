@@ -38,6 +38,17 @@ std::string name_of_xrays(const std::string& session, int number) {
   return number == 1 ? first : fmt::format("{}-{}", first, number);
 }
 
+std::set<std::string> xrays_of(const fs::path& folder) {
+  const nlohmann::json result = read_json_file(folder / kResultFile).json;
+  std::set<std::string> xrays;
+  try {
+    for (const nlohmann::json& view : result.at("views")) xrays.insert(view.at("sop_instance_uid").get<std::string>());
+  } catch (const nlohmann::json::exception&) {
+    throw Error(fmt::format("{}: is not a result of isoshift register", (folder / kResultFile).string()));
+  }
+  return xrays;
+}
+
 SessionRecord record_of(const std::string& session, const fs::path& folder) {
   const nlohmann::json result = read_json_file(folder / kResultFile).json;
   SessionRecord record{.session = session,
@@ -46,16 +57,14 @@ SessionRecord record_of(const std::string& session, const fs::path& folder) {
                        .pose_set_by = "",
                        .files = hashes_in(folder),
                        .sha256 = ""};
-  std::set<std::string> xrays;
   try {
     record.verdict = result.at("verdict").get<std::string>();
     if (const nlohmann::json start = result.value("start", nlohmann::json()); !result.value("searched", true))
       if (const nlohmann::json& who = start.at("set_by"); who.is_string()) record.pose_set_by = who;
-    for (const nlohmann::json& view : result.at("views")) xrays.insert(view.at("sop_instance_uid").get<std::string>());
   } catch (const nlohmann::json::exception&) {
     throw Error(fmt::format("{}: is not a result of isoshift register", (folder / kResultFile).string()));
   }
-  if (const std::string name = session_name(xrays); name != name_of_xrays(session))
+  if (const std::string name = session_name(xrays_of(folder)); name != name_of_xrays(session))
     throw Error(fmt::format("{}: is the result of other X-rays: those of session {}, expected {}",
                             (folder / kResultFile).string(), name, session));
   return record;

@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <map>
+#include <set>
 #include <string>
 
 namespace isoshift {
@@ -17,6 +18,9 @@ struct SessionRecord {
 // The name of the N-th result of the same X-rays: "NAME" of the first, "NAME-2" of the second. `session`: the name of
 // any of them.
 std::string name_of_xrays(const std::string& session, int number = 1);
+
+// The SOPInstanceUIDs of the X-rays of a result. Throws Error for a folder that holds none.
+std::set<std::string> xrays_of(const std::filesystem::path& folder);
 
 // The record of a folder that isoshift register has just written. Throws Error if the folder holds anything but plain
 // files, or if the name of the session does not belong to the X-rays of the result.

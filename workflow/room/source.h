@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <map>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -37,9 +38,9 @@ class Source {
   // Says that files of this patient are missing: the next update() fetches files that were forgotten.
   virtual void ask_for_rest(const std::string& patient_id) = 0;
 
-  // Removes the kept files of every patient of whom no file has arrived since `time`. Files of other programs are not
-  // touched.
-  virtual void forget_before(std::filesystem::file_time_type time) = 0;
+  // Removes the kept files of every patient of whom no file has arrived since `time`, but for the patients `but`, by
+  // PatientID. Files of other programs are not touched.
+  virtual void forget_before(std::filesystem::file_time_type time, const std::set<std::string>& but) = 0;
 };
 
 }  // namespace isoshift

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "base/error.h"
+#include "base/sha256.h"
 #include "io/report/result_folder.h"
 
 namespace isoshift {
@@ -41,7 +42,8 @@ Watch::Watch(const WatchFile& watch, const Parts& parts)
       sending_troubles_(parts.sending),
       seen_at_(parts.clock.now()),
       quiet_from_(seen_at_),
-      next_forgetting_(seen_at_) {
+      next_forgetting_(seen_at_),
+      next_deletion_(seen_at_) {
   tree_.clean();
   take_results();
   tree_.audit("started", {{"sessions", index_.size()}});
@@ -56,6 +58,9 @@ void Watch::round() {
   set_sendable({});
   const bool was_source_read = is_source_read_;
   troubles_.attempt("receiving", [&] { receive(); });
+  troubles_.attempt("deleting old results", [&] { delete_old_results(); });
+  troubles_.attempt("deleting results", [&] { take_deletions(); });
+  troubles_.attempt("comparing files with results", [&] { look_for_changes(); });
   troubles_.attempt("registering", [&] { register_complete(); });
   troubles_.attempt("taking over results by hand", [&] { take_over_results(); });
   troubles_.attempt("comparing X-rays with results", [&] {
@@ -119,8 +124,46 @@ void Watch::receive() {
   seen_at_ = begin;
   is_source_read_ = true;
   if (parts_.clock.now() < next_forgetting_) return;
-  parts_.source.forget_before(parts_.clock.file_time() - kKeptFor);
+  std::set<std::string> unregistered;  // patients of whom an X-ray has no result
+  for (const auto& [patient_id, patient] : parts_.source.patients())
+    if (!std::ranges::all_of(patient.files.images, [&](const StudyFiles::Image& image) {
+          return registered_.contains(image.sop_instance_uid);
+        }))
+      unregistered.insert(patient_id);
+  parts_.source.forget_before(parts_.clock.file_time() - kKeptFor, unregistered);
   next_forgetting_ = parts_.clock.now() + std::chrono::days(1);
+}
+
+// Once a day. What is still to be sent stays until it is sent.
+void Watch::delete_old_results() {
+  if (!watch_.keep_days || parts_.clock.now() < next_deletion_) return;
+  const auto oldest = parts_.clock.file_time() - std::chrono::days(*watch_.keep_days);
+  for (const std::string& session : tree_.sessions()) {
+    const std::string newest = tree_.newest_of_same_xrays(session);
+    const auto registered_at = tree_.registered_at(newest);  // nothing: deleted with an earlier result
+    if (!registered_at || *registered_at >= oldest || tree_.is_to_be_sent(newest)) continue;
+    tree_.remove(session, fmt::format("keep_days {} of the watch file", *watch_.keep_days));
+    parts_.observer.say(fmt::format("session {}: deleted, {} days after its registration", session, *watch_.keep_days));
+  }
+  next_deletion_ = parts_.clock.now() + std::chrono::days(1);
+}
+
+// Results that this watch or isoshift delete has deleted are not listed any more, and their X-rays not registered.
+void Watch::take_deletions() {
+  const auto newest = tree_.newest_deletion();
+  if (deletions_read_ != newest) {
+    for (const Deletion& deletion : tree_.finish_deletions()) {
+      index_.remove(deletion.session);
+      objections_.remove(deletion.session);
+      deleted_xrays_.insert(deletion.xrays.begin(), deletion.xrays.end());
+    }
+    deletions_read_ = newest;
+  }
+  if (deleted_xrays_.empty()) return;
+  for (const auto& [patient_id, patient] : parts_.source.patients())
+    for (const auto* images : {&patient.files.images, &patient.files.other_xrays})
+      for (const StudyFiles::Image& image : *images)
+        if (deleted_xrays_.contains(sha256_of(image.sop_instance_uid))) registered_.insert(image.sop_instance_uid);
 }
 
 // A result that cannot be read hides no other.
@@ -139,7 +182,10 @@ void Watch::take_results() {
 void Watch::take_result(const std::string& session, const std::optional<Running>& made) {
   const SetupResult report = read_report(tree_.session(session));
   if (report.views.empty()) throw Error(fmt::format("{}: names no views", tree_.session(session).string()));
-  for (const auto& view : report.views) registered_.insert(view.sop_instance_uid);
+  for (const auto& view : report.views) {
+    registered_.insert(view.sop_instance_uid);
+    first_of_[view.sop_instance_uid] = name_of_xrays(session);
+  }
   const std::string obstacle = obstacle_to_release(tree_, session, report.verdict);
   const std::string reason = reason_for_person(session, report, made);
   index_.add(session, report, obstacle, reason);
@@ -155,7 +201,8 @@ std::string Watch::reason_for_person(const std::string& session, const SetupResu
                                      const std::optional<Running>& made) const {
   if (!watch_.site.automatic_release || result.verdict != Verdict::kAccepted) return "";
   if (!result.site || result.site->sha256 != watch_.site.sha256) return "it was made under another site file";
-  if (name_of_xrays(session) != session) return "a person has made it by hand";
+  if (name_of_xrays(session) != session)
+    return made ? "its X-rays were registered before, from other files" : "a person has made it by hand";
   if (!made) return "an earlier run of watch registered it";  // X-rays may have come and gone since
   return made->names_plan ? "" : "not all of its X-rays name their plan";
 }
@@ -191,7 +238,15 @@ std::vector<Watch::Complete> Watch::complete_sessions() {
   std::vector<Complete> complete;
   std::set<std::string> found;
   for (const auto& [patient_id, patient] : parts_.source.patients()) {
-    for (SessionFiles& session : sessions_of(patient.files, parts_.takes_other_xrays, registered_)) {
+    std::vector<SessionFiles> sessions = sessions_of(patient.files, parts_.takes_other_xrays, registered_);
+    for (const auto& [first, changed] : changed_)
+      if (changed.patient_id == patient_id)
+        if (auto again = registered_session(first, patient)) {
+          again->name = tree_.further_name(first);
+          again->remarks.push_back(fmt::format("is registered again: {}", changed.what));
+          sessions.push_back(*std::move(again));
+        }
+    for (SessionFiles& session : sessions) {
       found.insert(session.name);
       StudyFiles own = files_for(session, patient.files);
       const bool is_running = running_ && running_->session == session.name;
@@ -221,12 +276,70 @@ std::string Watch::reason_to_wait(const SessionFiles& session, const StudyFiles&
     parts_.source.ask_for_rest(patient_id);
     return "waits for " + missing.front();
   }
-  const std::chrono::duration<double> quiet = seen_at_ - std::max(last, quiet_from_);
-  if (parts_.source.is_coming(patient_id) || quiet.count() < rule.quiet_s) return "more files may arrive";
+  if (!is_quiet(patient_id, last)) return "more files may arrive";
   const auto failure = failures_.find(session.name);
   if (failure == failures_.end() || last != failure->second.news) return "";
   const auto& [why, news, again] = failure->second;
   return again && again->is_due(parts_.clock.now()) ? "" : why;
+}
+
+bool Watch::is_quiet(const std::string& patient_id, Clock::Time last) const {
+  const std::chrono::duration<double> quiet = seen_at_ - std::max(last, quiet_from_);
+  return !parts_.source.is_coming(patient_id) && quiet.count() >= watch_.site.sessions->quiet_s;
+}
+
+// Once after all news of a patient have come. A result whose files are others now is objected to, and its X-rays are
+// registered again.
+void Watch::look_for_changes() {
+  for (const auto& [patient_id, patient] : parts_.source.patients()) {
+    if (compared_[patient_id] == patient.last || !is_quiet(patient_id, patient.last)) continue;
+    std::set<std::string> sessions;
+    for (const auto* images : {&patient.files.images, &patient.files.other_xrays})
+      for (const StudyFiles::Image& image : *images)
+        if (const auto found = first_of_.find(image.sop_instance_uid); found != first_of_.end())
+          sessions.insert(found->second);
+    for (const std::string& session : sessions) look_for_change(session, patient_id, patient);
+    compared_[patient_id] = patient.last;
+  }
+}
+
+// Files that have left the source tell nothing.
+void Watch::look_for_change(const std::string& session, const std::string& patient_id, const Patient& patient) {
+  const std::optional<SessionInputs> before = tree_.inputs(session);
+  const std::optional<SessionFiles> xrays = registered_session(session, patient);
+  if (!before || !xrays) return;
+  const StudyFiles own = files_for(*xrays, patient.files);
+  if (!missing_parts(own).empty()) return;
+  std::string what;
+  bool can_be_registered = true;
+  try {
+    const SessionInputs now = inputs_of(choose_parts(own), parts_.contents, *before);
+    const std::string parts = what_changed(*before, now);
+    if (parts.empty()) {
+      if (now != *before) tree_.keep_inputs(tree_.newest_of_same_xrays(session), now);
+      return;
+    }
+    what = fmt::format("{} changed after the registration", parts);
+  } catch (const Error& error) {  // several plans, for one
+    what = fmt::format("files came after the registration: {}", error.what());
+    can_be_registered = false;
+  }
+  const std::string newest = tree_.newest_of_same_xrays(session);
+  parts_.observer.say(fmt::format("session {}: {}", newest, what));
+  objections_.add(newest, what);
+  if (can_be_registered) changed_[session] = {.patient_id = patient_id, .what = what};
+}
+
+// The X-rays of a result as one session; nothing if they would be grouped in another way now.
+std::optional<SessionFiles> Watch::registered_session(const std::string& session, const Patient& patient) const {
+  std::set<std::string> others = registered_;
+  std::erase_if(others, [&](const std::string& uid) {
+    const auto first = first_of_.find(uid);
+    return first != first_of_.end() && first->second == session;
+  });
+  for (SessionFiles& found : sessions_of(patient.files, parts_.takes_other_xrays, others))
+    if (found.name == session) return std::move(found);
+  return std::nullopt;
 }
 
 void Watch::begin_registration(const Complete& complete) {
@@ -239,13 +352,15 @@ void Watch::begin_registration(const Complete& complete) {
     parts.doubts = complete.session.doubts;
     if (const std::string reason = unreadable_beside(parts, parts_.source.unreadable()); !reason.empty())
       parts.doubts.push_back("a file beside the X-rays may belong to them: " + reason);
+    const SessionInputs inputs = inputs_of(parts, parts_.contents);
     tree_.keep_order(session, {.parts = parts, .flags = watch_.registration, .site = watch_.site.path});
     parts_.runner.begin(parts, tree_.registering(session));
     const auto names_plan = [](const StudyFiles::Image& image) { return !image.plan_uid.empty(); };
     running_ = Running{.session = session,
                        .news = complete.last,
                        .patient_id = patient_id_of(complete.session.patient),
-                       .names_plan = std::ranges::all_of(complete.session.images, names_plan)};
+                       .names_plan = std::ranges::all_of(complete.session.images, names_plan),
+                       .inputs = inputs};
   } catch (const std::exception& error) {
     fail(session, complete.last, {.why = error.what()});
   }
@@ -261,7 +376,9 @@ void Watch::end_registration() {
     if (end->failure) {
       fail(session, news, *end->failure);
     } else {
+      tree_.keep_inputs(session, made->inputs);
       tree_.publish(session);
+      changed_.erase(name_of_xrays(session));
       take_result(session, made);
     }
   } catch (const std::exception& error) {

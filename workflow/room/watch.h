@@ -27,6 +27,7 @@
 #include "workflow/room/runner.h"
 #include "workflow/room/sender.h"
 #include "workflow/room/session_index.h"
+#include "workflow/room/session_inputs.h"
 #include "workflow/room/source.h"
 #include "workflow/room/troubles.h"
 
@@ -46,6 +47,7 @@ class Watch {
     Clock& clock;
     Observer& observer;
     Observer& sending;               // receives the messages of deliver()
+    const FileContents& contents;    // of the source's files
     bool takes_other_xrays = false;  // a machine profile supplies the geometry of X-rays that are not RT Images
   };
 
@@ -69,6 +71,7 @@ class Watch {
     Clock::Time news;         // when the patient's last file had arrived, as the registration began
     std::string patient_id;   // in the source
     bool names_plan = false;  // all X-rays do
+    SessionInputs inputs;
   };
   // What may be sent. Not known: the source does not answer, or its X-rays were not compared with the results yet.
   struct Sendable {
@@ -85,6 +88,11 @@ class Watch {
     StudyFiles files;
     Clock::Time last;
   };
+  // X-rays that have a result, whose files are others now.
+  struct Changed {
+    std::string patient_id;  // in the source
+    std::string what;        // in words
+  };
 
   std::vector<std::string> troubles() const;  // also files that cannot be read
   void take_results();
@@ -94,8 +102,14 @@ class Watch {
                                 const std::optional<Running>& made) const;
   void take_over_results();
   void receive();
+  void take_deletions();
+  void delete_old_results();
   void register_complete();
   std::vector<Complete> complete_sessions();
+  bool is_quiet(const std::string& patient_id, Clock::Time last) const;
+  void look_for_changes();
+  void look_for_change(const std::string& session, const std::string& patient_id, const Patient& patient);
+  std::optional<SessionFiles> registered_session(const std::string& session, const Patient& patient) const;
   std::string reason_to_wait(const SessionFiles& session, const StudyFiles& own, const std::string& patient_id,
                              Clock::Time last);
   void begin_registration(const Complete& complete);
@@ -119,6 +133,11 @@ class Watch {
   std::mutex sendable_mutex_;  // deliver() reads, round() writes
   Sendable sendable_;
   std::set<std::string> registered_;             // SOPInstanceUIDs of X-rays that have a result
+  std::map<std::string, std::string> first_of_;  // the first session of an X-ray, by its SOPInstanceUID
+  std::set<std::string> deleted_xrays_;          // SHA-256 of the SOPInstanceUIDs of X-rays whose results were deleted
+  std::optional<std::filesystem::file_time_type> deletions_read_;
+  std::map<std::string, Changed> changed_;       // by the first session of the X-rays
+  std::map<std::string, Clock::Time> compared_;  // Patient::last at that time, by PatientID in the source
   std::map<std::string, std::string> accepted_;  // released without a person: PatientID in the source, by session
   bool is_source_read_ = false;                  // in this round
   std::vector<WaitingSession> waiting_;
@@ -127,7 +146,7 @@ class Watch {
   Troubles troubles_, sending_troubles_;
   Clock::Time seen_at_;     // all files that had arrived by then have been read
   Clock::Time quiet_from_;  // until then the source did not answer
-  Clock::Time next_forgetting_;
+  Clock::Time next_forgetting_, next_deletion_;
   const SystemUser user_ = system_user();
 };
 

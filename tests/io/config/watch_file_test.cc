@@ -56,6 +56,12 @@ TEST_F(WatchFileTest, SaysWhatIsFollowedAndWhereItGoes) {
   EXPECT_EQ(watch.peers[0].tls->key, folder_ / "k.pem");
   EXPECT_EQ(watch.peers[0].tls->fingerprint, "");
   EXPECT_FALSE(read(with(", \"peers\": [" + peer("false") + "]")).peers[0].tls);
+  EXPECT_FALSE(watch.syslog);
+  EXPECT_TRUE(read(with(R"(, "syslog": true)")).syslog);
+  EXPECT_FALSE(watch.keep_days);
+  EXPECT_EQ(read(with(R"(, "keep_days": 400)")).keep_days, 400);
+  for (const char* days : {"0", "-1", "1.5", "\"1\""})
+    EXPECT_THAT(error_of(with(fmt::format(R"(, "keep_days": {})", days))), HasSubstr("a whole number of days"));
 }
 
 TEST_F(WatchFileTest, ACertificateIsPinnedByItsFingerprintAsOpensslPrintsIt) {

@@ -26,26 +26,28 @@ using testing::SizeIs;
 // A server of one patient.
 class FakeOrthanc : public Orthanc {
  public:
-  std::vector<std::pair<std::string, std::string>> instances;  // identifiers and files, in the order of their coming
-  std::map<std::string, int> refusals;                         // how often an instance is not given yet
+  std::vector<std::pair<std::string, std::string>> held;  // identifiers and files, in the order of their coming
+  std::map<std::string, int> refusals;                    // how often an instance is not given yet
   std::string database = "one";
   bool is_down = false;
   int changes_at_once = 1000;
+  std::size_t cleared = 0;                   // instances whose changes somebody has cleared
   mutable std::map<std::string, int> asked;  // how often for an instance
 
   std::string add(const fs::path& path) {
     std::ifstream file(path, std::ios::binary);
-    instances.emplace_back(fmt::format("{:08x}", instances.size() + 1),
-                           std::string{std::istreambuf_iterator<char>(file), {}});
-    return instances.back().first;
+    held.emplace_back(fmt::format("{:08x}", held.size() + 1), std::string{std::istreambuf_iterator<char>(file), {}});
+    return held.back().first;
   }
 
   Changes changes_since(std::int64_t last, int limit) const override {
     if (is_down) throw ServerError("the server is down");
-    const auto size = static_cast<std::int64_t>(instances.size());
+    const auto size = static_cast<std::int64_t>(held.size());
     Changes changes{.instances = {}, .mark = "", .last = std::min(last, size), .done = true};
     for (int n = 0; n < std::min(limit, changes_at_once) && changes.last < size; ++n) {
-      changes.instances.push_back(instances[static_cast<std::size_t>(changes.last++)].first);
+      const auto number = static_cast<std::size_t>(changes.last++);
+      if (number < cleared) continue;
+      changes.instances.push_back(held[number].first);
       changes.mark = database + changes.instances.back();
     }
     changes.done = changes.last == size;
@@ -58,13 +60,14 @@ class FakeOrthanc : public Orthanc {
       throw Error("instance " + instance + ": answered 500");
     }
     ++asked[instance];
-    return std::ranges::find(instances, instance, &std::pair<std::string, std::string>::first)->second;
+    return std::ranges::find(held, instance, &std::pair<std::string, std::string>::first)->second;
   }
-  std::vector<std::string> instances_beside(const std::string& /*instance*/) const override {
+  std::vector<std::string> instances() const override {
     std::vector<std::string> all;
-    for (const auto& [instance, content] : instances) all.push_back(instance);
+    for (const auto& [instance, content] : held) all.push_back(instance);
     return all;
   }
+  std::vector<std::string> instances_beside(const std::string& /*instance*/) const override { return instances(); }
 };
 
 class OrthancSourceTest : public testing::Test {
@@ -98,7 +101,7 @@ class OrthancSourceTest : public testing::Test {
 TEST_F(OrthancSourceTest, FetchesEveryInstanceOnceOverRestartsToo) {
   update();
   ASSERT_THAT(source_->patients(), SizeIs(1));
-  EXPECT_EQ(kept(), server_.instances.size());
+  EXPECT_EQ(kept(), server_.held.size());
   start();
   update();
   EXPECT_THAT(files().plans, SizeIs(1));
@@ -116,7 +119,7 @@ TEST_F(OrthancSourceTest, ChangesThatTheServerHasNotToldAreComing) {
   EXPECT_EQ(kept(), 3U);
   EXPECT_TRUE(source_->is_coming(patient_id()));
   while (source_->is_coming(patient_id())) update();
-  EXPECT_EQ(kept(), server_.instances.size());
+  EXPECT_EQ(kept(), server_.held.size());
 }
 
 TEST_F(OrthancSourceTest, AnInstanceThatIsNotGivenIsAskedForAgainAndHoldsUpNoOther) {
@@ -146,7 +149,7 @@ TEST_F(OrthancSourceTest, AServerThatIsDownLosesNothing) {
   EXPECT_TRUE(source_->is_coming("anybody"));
   server_.is_down = false;
   update();
-  EXPECT_EQ(kept(), server_.instances.size());
+  EXPECT_EQ(kept(), server_.held.size());
 }
 
 TEST_F(OrthancSourceTest, AFullDiskLosesNothing) {
@@ -154,30 +157,30 @@ TEST_F(OrthancSourceTest, AFullDiskLosesNothing) {
     const FileSizeLimit full_disk(100);
     EXPECT_THROW(update(), Error);
   }
-  while (kept() < server_.instances.size()) update();
+  while (kept() < server_.held.size()) update();
   EXPECT_FALSE(source_->is_coming(patient_id()));
   EXPECT_THAT(notes_.warnings, IsEmpty());
 }
 
 TEST_F(OrthancSourceTest, ADamagedObjectIsFetchedAgain) {
   update();
-  const fs::path object = objects_ / (server_.instances[0].first + ".dcm");
+  const fs::path object = objects_ / (server_.held[0].first + ".dcm");
   fs::resize_file(object, 200);
   start();
   update();
-  EXPECT_EQ(fs::file_size(object), server_.instances[0].second.size());
-  EXPECT_EQ(server_.asked[server_.instances[0].first], 2);
-  EXPECT_EQ(server_.asked[server_.instances[1].first], 1);
+  EXPECT_EQ(fs::file_size(object), server_.held[0].second.size());
+  EXPECT_EQ(server_.asked[server_.held[0].first], 2);
+  EXPECT_EQ(server_.asked[server_.held[1].first], 1);
 }
 
 TEST_F(OrthancSourceTest, AnotherDatabaseIsReadFromItsBeginning) {
   update();
-  const auto first = std::exchange(server_.instances, {});
+  const auto first = std::exchange(server_.held, {});
   server_.database = "other";
-  for (const auto& [instance, content] : first) server_.instances.emplace_back("f" + instance, content);
-  server_.instances.erase(server_.instances.begin() + 1, server_.instances.end() - 1);
+  for (const auto& [instance, content] : first) server_.held.emplace_back("f" + instance, content);
+  server_.held.erase(server_.held.begin() + 1, server_.held.end() - 1);
   server_.add(study_.image(0));
-  while (server_.instances.size() <= first.size()) server_.add(study_.image(1));
+  while (server_.held.size() <= first.size()) server_.add(study_.image(1));
   start();
   update();
   update();
@@ -185,13 +188,30 @@ TEST_F(OrthancSourceTest, AnotherDatabaseIsReadFromItsBeginning) {
   EXPECT_THAT(notes_.warnings, testing::Contains(HasSubstr("holds another database than before")));
 }
 
+TEST_F(OrthancSourceTest, AListOfChangesThatWasClearedHidesNothing) {
+  server_.add(study_.image(0));
+  server_.cleared = server_.held.size();
+  update();
+  update();
+  EXPECT_EQ(kept(), server_.held.size()) << "at the first start";
+  start();
+  server_.add(study_.image(1));
+  server_.cleared = server_.held.size();  // while nobody watched
+  update();
+  update();
+  EXPECT_THAT(files().images, SizeIs(2));
+  for (const auto& [instance, times] : server_.asked) EXPECT_EQ(times, 1) << instance;
+}
+
 TEST_F(OrthancSourceTest, WhatWasForgottenIsFetchedAgainWhenItIsAskedFor) {
   update();
   const std::string patient = patient_id();
-  source_->forget_before(clock_.file_time() - 24h);
-  EXPECT_EQ(kept(), server_.instances.size()) << "forgotten too soon";
+  source_->forget_before(clock_.file_time() - 24h, {});
+  EXPECT_EQ(kept(), server_.held.size()) << "forgotten too soon";
   clock_.pass(48h);
-  source_->forget_before(clock_.file_time() - 24h);
+  source_->forget_before(clock_.file_time() - 24h, {patient});
+  EXPECT_EQ(kept(), server_.held.size()) << "the patient has X-rays without a result";
+  source_->forget_before(clock_.file_time() - 24h, {});
   EXPECT_EQ(kept(), 0U);
   EXPECT_THAT(source_->patients(), IsEmpty());
   server_.add(study_.image(0));

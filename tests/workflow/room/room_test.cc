@@ -43,6 +43,16 @@ TEST(Watch, SendsNothingThatWasExchangedCopiedOrReleasedByNobody) {
   EXPECT_EQ(checked.exit_status, 0) << checked.out << std::string(std::istreambuf_iterator<char>(log), {});
 }
 
+// 100 kills were seen once (docs/commands/watch.md); a few in every run.
+TEST(Watch, KillsOfEngineServerAndBrowsersLoseAndDoubleNothing) {
+  if (!fs::exists("/usr/sbin/Orthanc")) GTEST_SKIP() << "Orthanc is not installed";
+  const TemporaryFolder work;
+  const CommandOutcome checked = run_shell(fmt::format("/usr/bin/python3 {}/tests/workflow/room/kills.py {} {} 6 3",
+                                                       ISOSHIFT_SOURCE_DIR, ISOSHIFT_PROGRAM, (work / "").string()));
+  std::ifstream log(work / "watch.log");
+  EXPECT_EQ(checked.exit_status, 0) << checked.out << std::string(std::istreambuf_iterator<char>(log), {});
+}
+
 TEST(Watch, FollowsAFolder) {
   const TemporaryFolder work;
   const SmallStudy study;

@@ -218,7 +218,8 @@ TEST_F(WatchTest, OneWatchAtATimeWorksOnAResultsTree) {
                                     .sender = room_.sender,
                                     .clock = room_.clock,
                                     .observer = room_.observer,
-                                    .sending = room_.sending});
+                                    .sending = room_.sending,
+                                    .contents = room_.contents});
     FAIL() << "a second watch began";
   } catch (const Error& error) {
     EXPECT_THAT(error.what(), HasSubstr("another isoshift watch is working here"));

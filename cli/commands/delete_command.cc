@@ -1,0 +1,90 @@
+// isoshift delete: deletes the results of a session, or of a patient, that watch has kept.
+
+#include <fmt/format.h>
+
+#include <memory>
+#include <set>
+
+#include "base/error.h"
+#include "cli/commands/commands.h"
+#include "cli/switches/text_on_one_line.h"
+#include "io/config/watch_file.h"
+#include "io/report/result_folder.h"
+#include "workflow/room/results_tree.h"
+
+namespace isoshift {
+namespace {
+
+struct DeleteOptions {
+  std::filesystem::path watch = "/etc/isoshift/watch.json";
+  std::string session, patient, by;
+};
+
+// The first sessions of all X-rays of a patient. A result that cannot be read may be of that patient: it is said.
+std::set<std::string> sessions_of_patient(const ResultsTree& tree, const std::string& patient, Console& console) {
+  std::set<std::string> found;
+  for (const std::string& session : tree.sessions()) {
+    try {
+      const Identity identity = read_report(tree.session(session)).identity;
+      if (identity.patient_id == patient || patient_in_words(identity) == patient) found.insert(name_of_xrays(session));
+    } catch (const Error& error) {
+      console.err << fmt::format("warning: session {} is not deleted, and may be of this patient: {}\n", session,
+                                 error.what());
+    }
+  }
+  return found;
+}
+
+void run_delete(const DeleteOptions& options, Console& console) {
+  check_text_on_one_line("--by", options.by, "the name of the person who deletes the results");
+  const WatchFile watch = read_watch_file(options.watch);
+  check_is_owner(watch.results);
+  ResultsTree tree(watch);
+  std::set<std::string> sessions{options.session};
+  if (!options.patient.empty()) {
+    sessions = sessions_of_patient(tree, options.patient, console);
+    if (sessions.empty())
+      throw Error(fmt::format("{}: holds no result of patient {}", watch.results.string(), options.patient));
+  }
+  for (const std::string& session : sessions) {
+    tree.remove(session, options.by);
+    console.out << fmt::format("session {}: deleted\n", session);
+  }
+  if (tree.try_lock())
+    console.err
+        << "warning: isoshift watch is not running: until it runs, its index.html and the pages of months still "
+           "name the patient\n";
+  console.out << "The source still holds the X-rays, CT and plan; isoshift watch does not register the X-rays again.\n";
+}
+
+}  // namespace
+
+void add_delete_command(CLI::App& app, Console& console, int& exit_status) {
+  auto options = std::make_shared<DeleteOptions>();
+  CLI::App* command = app.add_subcommand("delete", "Delete results that watch has kept, and record that");
+  command->footer(
+      "\nExamples:\n  isoshift delete 3fa94c1e02b7 --by \"J. Doe\"\n"
+      "  isoshift delete --patient 1234567 --by \"J. Doe\"\n\n"
+      "Deletes all results of the session's X-rays, with records, releases, decisions and marks of what was sent.\n"
+      "The audit log, which names no patient, keeps its lines and has one more. What is released and still to be\n"
+      "sent is not deleted. X-rays, CT and plan in the source are not touched, and not registered again.");
+  CLI::Option* session = command->add_option("session", options->session, "Name of the session, as index.html shows it")
+                             ->type_name("SESSION");
+  CLI::Option* patient =
+      command
+          ->add_option("--patient", options->patient,
+                       "PatientID instead of a session, for all of the patient's results: 1234567 of any issuer, "
+                       "\"1234567 (ISSUER)\" of one")
+          ->type_name("ID");
+  session->excludes(patient);
+  command->add_option("--by", options->by, "Name of the person who deletes the results")->required()->type_name("NAME");
+  command->add_option("--watch", options->watch, "The watch file")->type_name("FILE")->capture_default_str();
+  command->callback([options, &console, &exit_status] {
+    if (options->session.empty() && options->patient.empty())
+      throw UsageError("SESSION or --patient: expected one of them: whose results are to be deleted");
+    run_delete(*options, console);
+    exit_status = kExitAccepted;
+  });
+}
+
+}  // namespace isoshift

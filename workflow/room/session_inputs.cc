@@ -1,0 +1,86 @@
+#include "workflow/room/session_inputs.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <functional>
+#include <system_error>
+#include <vector>
+
+#include "base/error.h"
+#include "base/sha256.h"
+
+namespace isoshift {
+namespace {
+
+namespace fs = std::filesystem;
+
+using Files = std::vector<fs::path>;
+
+std::array<Files, SessionInputs::kParts.size()> files_of(const StudyParts& parts) {
+  const auto one = [](const fs::path& file) { return file.empty() ? Files() : Files{file}; };
+  return {parts.ct, one(parts.plan), one(parts.structures), parts.images};
+}
+
+std::string sha256_of_all(const Files& files, const std::function<std::string(const fs::path&)>& of_file) {
+  std::vector<std::string> all;
+  all.reserve(files.size());
+  for (const fs::path& file : files) all.push_back(of_file(file));
+  std::ranges::sort(all);
+  return isoshift::sha256_of(fmt::format("{}", fmt::join(all, "\n")));
+}
+
+}  // namespace
+
+std::string FileContents::version(const fs::path& file) const {
+  std::error_code error;
+  const auto size = fs::file_size(file, error);
+  const auto written = error ? fs::file_time_type() : fs::last_write_time(file, error);
+  if (error) throw Error(fmt::format("{}: cannot be read: {}", file.string(), error.message()));
+  return fmt::format("{} {} {}", file.string(), size, written.time_since_epoch().count());
+}
+
+std::string FileContents::sha256(const fs::path& file) const { return sha256_of_file(file); }
+
+SessionInputs inputs_of(const StudyParts& parts, const FileContents& contents) {
+  return inputs_of(parts, contents, {});
+}
+
+SessionInputs inputs_of(const StudyParts& parts, const FileContents& contents, const SessionInputs& before) {
+  const auto files = files_of(parts);
+  SessionInputs inputs;
+  for (std::size_t n = 0; n < files.size(); ++n) {
+    SessionInputs::Part& part = inputs.parts[n];
+    part.versions = sha256_of_all(files[n], [&](const fs::path& file) { return contents.version(file); });
+    part.contents = part.versions == before.parts[n].versions
+                        ? before.parts[n].contents
+                        : sha256_of_all(files[n], [&](const fs::path& file) { return contents.sha256(file); });
+  }
+  return inputs;
+}
+
+std::string what_changed(const SessionInputs& before, const SessionInputs& now) {
+  std::vector<std::string> changed;
+  for (std::size_t n = 0; n < before.parts.size(); ++n)
+    if (before.parts[n].contents != now.parts[n].contents) changed.emplace_back(SessionInputs::kParts[n]);
+  return fmt::format("{}", fmt::join(changed, " and "));
+}
+
+nlohmann::ordered_json json_of(const SessionInputs& inputs) {
+  nlohmann::ordered_json json = nlohmann::ordered_json::object();
+  for (std::size_t n = 0; n < inputs.parts.size(); ++n)
+    json[SessionInputs::kParts[n]] = {{"versions", inputs.parts[n].versions}, {"contents", inputs.parts[n].contents}};
+  return json;
+}
+
+SessionInputs session_inputs_from(const nlohmann::json& json) {
+  SessionInputs inputs;
+  for (std::size_t n = 0; n < inputs.parts.size(); ++n) {
+    const nlohmann::json& part = json.at(SessionInputs::kParts[n]);
+    inputs.parts[n] = {.versions = part.at("versions"), .contents = part.at("contents")};
+  }
+  return inputs;
+}
+
+}  // namespace isoshift
