@@ -20,7 +20,7 @@ function rowOf(one) {
   const row = make("tr", undefined, {"data-session": one.session});
   row.dataset.shows = text;
   for (const [column] of kColumns) {
-    const cell = make("td");
+    const cell = make("td", undefined, {class: "column-" + column});
     if (column === "verdict") cell.append(verdictCell(one.verdict));
     else if (column === "session" && one.has_result)
       cell.append(make("a", one.session, {href: "/session/" + encodeURIComponent(one.session)}));

@@ -5,6 +5,7 @@ const session = decodeURIComponent(location.pathname.split("/").at(-2));
 const address = "/api/sessions/" + encodeURIComponent(session) + "/trend";
 const kComponents = [["x", "mm"], ["y", "mm"], ["z", "mm"], ["about x", "°"], ["about y", "°"], ["about z", "°"]];
 const kWidth = 360, kHeight = 190, kLeft = 46, kRight = 10, kTop = 24, kBottom = 26;
+const kLong = 30;  // texts that may be broken anywhere
 
 const shown = (value, n) => value === null ? "–" : (Math.round(value * (n < 3 ? 10 : 100)) / (n < 3 ? 10 : 100) || 0).toFixed(n < 3 ? 1 : 2);
 const levelOf = (result, n) => result.level ? result.level[n < 3 ? "translation_mm" : "rotation_deg"] : null;
@@ -27,7 +28,7 @@ function mark(result, x, y) {
 
 function chartOf(results, errors, n) {
   const [name, unit] = kComponents[n];
-  const chart = svg("svg", {viewBox: `0 0 ${kWidth} ${kHeight}`, width: kWidth, role: "img", "aria-label": `Setup error ${name} in ${unit}, by result`});
+  const chart = svg("svg", {viewBox: `0 0 ${kWidth} ${kHeight}`, role: "img", "aria-label": `Setup error ${name} in ${unit}, by result`});
   const values = results.map(result => result.components[n]).filter(value => value !== null);
   const levels = results.map(result => levelOf(result, n)).filter(level => level !== null);
   const largest = Math.max(n < 3 ? 2 : 1, ...values.map(Math.abs), ...levels) * 1.1;
@@ -65,7 +66,7 @@ function chartOf(results, errors, n) {
 function rowOf(cells) {
   const row = make("tr");
   for (const cell of cells) {
-    const made = make("td");
+    const made = make("td", undefined, typeof cell === "string" && cell.length > kLong ? {class: "column-state"} : {});
     made.append(cell);
     row.append(made);
   }
