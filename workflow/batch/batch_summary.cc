@@ -63,7 +63,7 @@ std::string summary_csv(const BatchSummary& summary) {
 ResultsPage::Cell number_cell(const std::optional<double>& value, int decimals) {
   if (!value) return {.text = ""};
   const double unit = std::pow(10.0, decimals), rounded = std::round(*value * unit) / unit;
-  return {.text = fmt::format("{:.{}f}", rounded == 0.0 ? 0.0 : rounded, decimals), .number = *value};
+  return {.text = fmt::format("{:.{}f}", rounded == 0.0 ? 0.0 : rounded, decimals), .number = value};
 }
 
 std::vector<std::string> component_titles() {
