@@ -1,16 +1,15 @@
 #include "base/certificate_authority.h"
 
 #include <fmt/format.h>
-#include <openssl/bio.h>
 #include <openssl/ec.h>
 #include <openssl/evp.h>
-#include <openssl/pem.h>
 #include <openssl/rand.h>
 #include <openssl/x509v3.h>
 
 #include <array>
 
 #include "base/error.h"
+#include "base/pem.h"
 
 namespace isoshift {
 namespace {
@@ -57,24 +56,6 @@ Certificate new_certificate(const std::string& name, const Key& key, int days, c
   return certificate;
 }
 
-std::string text_of(const std::unique_ptr<BIO, int (*)(BIO*)>& bio) {
-  char* text = nullptr;
-  const auto size = BIO_get_mem_data(bio.get(), &text);
-  return {text, static_cast<std::size_t>(size)};
-}
-
-std::string pem_of(const Certificate& certificate) {
-  const std::unique_ptr<BIO, int (*)(BIO*)> bio(BIO_new(BIO_s_mem()), BIO_free);
-  require(bio && PEM_write_bio_X509(bio.get(), certificate.get()) == 1);
-  return text_of(bio);
-}
-
-std::string pem_of(const Key& key) {
-  const std::unique_ptr<BIO, int (*)(BIO*)> bio(BIO_new(BIO_s_mem()), BIO_free);
-  require(bio && PEM_write_bio_PKCS8PrivateKey(bio.get(), key.get(), nullptr, nullptr, 0, nullptr, nullptr) == 1);
-  return text_of(bio);
-}
-
 // "DNS:localhost,IP:127.0.0.1".
 std::string alternative_names(const std::vector<std::string>& hosts) {
   std::string names;
@@ -102,9 +83,9 @@ CertificatePem CertificateAuthority::issue(const std::string& name, const std::v
   add_extension(certificate, certificate_, NID_authority_key_identifier, "keyid");
   add_extension(certificate, certificate_, NID_subject_alt_name, alternative_names(hosts));
   require(X509_sign(certificate.get(), key_.get(), EVP_sha256()) != 0);
-  return {.certificate = pem_of(certificate), .key = pem_of(key)};
+  return {.certificate = pem_of(certificate.get()), .key = pem_of(key.get())};
 }
 
-std::string CertificateAuthority::certificate() const { return pem_of(certificate_); }
+std::string CertificateAuthority::certificate() const { return pem_of(certificate_.get()); }
 
 }  // namespace isoshift

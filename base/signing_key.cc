@@ -7,6 +7,7 @@
 #include <array>
 
 #include "base/error.h"
+#include "base/pem.h"
 #include "base/secret_file.h"
 
 namespace isoshift {
@@ -54,12 +55,8 @@ bool SigningKey::has_signed(std::string_view text, const std::string& signature)
 std::string new_signing_key() {
   const std::unique_ptr<EVP_PKEY, void (*)(EVP_PKEY*)> key(EVP_PKEY_Q_keygen(nullptr, nullptr, "ED25519"),
                                                            EVP_PKEY_free);
-  const std::unique_ptr<BIO, int (*)(BIO*)> pem(BIO_new(BIO_s_mem()), BIO_free);
-  if (!key || !pem || PEM_write_bio_PKCS8PrivateKey(pem.get(), key.get(), nullptr, nullptr, 0, nullptr, nullptr) != 1)
-    throw Error("OpenSSL cannot make a key");
-  char* text = nullptr;
-  const auto size = BIO_get_mem_data(pem.get(), &text);
-  return {text, static_cast<std::size_t>(size)};
+  if (!key) throw Error("OpenSSL cannot make a key");
+  return pem_of(key.get());
 }
 
 }  // namespace isoshift

@@ -36,7 +36,6 @@ Json json_of(const Trend& trend) {
     for (const auto& component : result.components) json["components"].push_back(json_of(component));
     if (result.level)
       json["level"] = {{"translation_mm", json_of(result.level->translation_mm)},
-                       {"vector_mm", json_of(result.level->vector_mm)},
                        {"rotation_deg", json_of(result.level->rotation_deg)}};
     json["left_out"] = result.left_out;
     results.push_back(std::move(json));

@@ -19,11 +19,10 @@ function svg(tag, attributes, text) {
 
 // The shape says the verdict, the filling whether the result counts.
 function mark(result, x, y) {
-  const style = {class: "mark " + result.verdict, fill: result.left_out ? "#fff" : "currentColor", stroke: "currentColor", "stroke-width": 2};
-  const made = result.verdict === "accepted" ? svg("circle", {...style, cx: x, cy: y, r: 5})
+  const style = {class: result.verdict, fill: result.left_out ? "#fff" : "currentColor", stroke: "currentColor", "stroke-width": 2};
+  return result.verdict === "accepted" ? svg("circle", {...style, cx: x, cy: y, r: 5})
     : result.verdict === "review" ? svg("path", {...style, d: `M${x},${y - 6}l6,11h-12z`})
     : svg("path", {...style, fill: "none", d: `M${x - 5},${y - 5}l10,10m0,-10l-10,10`});
-  return made;
 }
 
 function chartOf(results, errors, n) {
@@ -31,15 +30,15 @@ function chartOf(results, errors, n) {
   const chart = svg("svg", {viewBox: `0 0 ${kWidth} ${kHeight}`, role: "img", "aria-label": `Setup error ${name} in ${unit}, by result`});
   const values = results.map(result => result.components[n]).filter(value => value !== null);
   const levels = results.map(result => levelOf(result, n)).filter(level => level !== null);
-  const largest = Math.max(n < 3 ? 2 : 1, ...values.map(Math.abs), ...levels) * 1.1;
+  const largest = Math.max(n < 3 ? 2 : 1, ...values.map(Math.abs), ...levels), top = 1.1 * largest;
   const x = k => kLeft + (k + 0.5) * (kWidth - kLeft - kRight) / results.length;
-  const y = value => kTop + (1 - value / largest) * (kHeight - kTop - kBottom) / 2;
+  const y = value => kTop + (1 - value / top) * (kHeight - kTop - kBottom) / 2;
   chart.append(svg("text", {x: kLeft, y: 16, class: "title"}, `${name}, ${unit}`));
   if (errors && errors.random) {
     const [mean, sd] = [errors.systematic[n], errors.random[n]];
     chart.append(svg("rect", {x: kLeft, width: kWidth - kLeft - kRight, y: y(mean + sd), height: y(mean - sd) - y(mean + sd), fill: "#ddd"}));
   }
-  for (const value of [-largest / 1.1, 0, largest / 1.1]) {
+  for (const value of [-largest, 0, largest]) {
     chart.append(svg("line", {x1: kLeft, x2: kWidth - kRight, y1: y(value), y2: y(value), stroke: value === 0 ? "#111" : "#ccc"}));
     chart.append(svg("text", {x: kLeft - 6, y: y(value) + 4, "text-anchor": "end"}, shown(value, n)));
   }

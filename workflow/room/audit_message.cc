@@ -65,6 +65,8 @@ std::string text_of(const Json& line, const char* key) {
   return found != line.end() && found->is_string() ? found->get<std::string>() : "";
 }
 
+const Event* event_of(const Json& line) { return std::ranges::find(kEvents, text_of(line, "event"), &Event::name); }
+
 std::string participants(const Event& event, const Json& line, const AuditContext& context) {
   constexpr const char* kProgram = "isoshift";
   const std::string person = text_of(line, "by");
@@ -100,8 +102,10 @@ std::string date_time(std::string on) {
 
 }  // namespace
 
+bool has_audit_message(const Json& line) { return event_of(line) != kEvents.end(); }
+
 std::optional<std::string> audit_message(const Json& line, const AuditContext& context) {
-  const auto* event = std::ranges::find(kEvents, text_of(line, "event"), &Event::name);
+  const auto* event = event_of(line);
   if (event == kEvents.end()) return std::nullopt;
   std::string text = fmt::format(
       R"(<?xml version="1.0" encoding="UTF-8"?><AuditMessage><EventIdentification EventActionCode="{}" EventDateTime={} EventOutcomeIndicator="{}">)",

@@ -16,6 +16,9 @@ struct AuditContext {
   std::string called_aet, host;  // of the peer that received an object
 };
 
+// Whether A.5.3 defines a message for the line's event.
+bool has_audit_message(const nlohmann::ordered_json& line);
+
 // One line of XML; nothing for an event that A.5.3 does not define:
 //
 //   started, stopped              Application Activity (A.5.3.1)

@@ -33,6 +33,7 @@ AuditContext context_of(const nlohmann::ordered_json& line, const std::filesyste
 
 AuditLog::Mirror audit_to_syslog(const WatchFile& watch) {
   return [results = watch.results, site = watch.site.name, peers = watch.peers](const nlohmann::ordered_json& line) {
+    if (!has_audit_message(line)) return;  // a result need not be read
     if (const auto message = audit_message(line, context_of(line, results, site, peers)))
       ::syslog(LOG_AUTHPRIV | LOG_NOTICE, "%s", message->c_str());  // NOLINT(cppcoreguidelines-pro-type-vararg)
   };

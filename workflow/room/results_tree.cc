@@ -75,6 +75,17 @@ Json json_of(const Objection& objection) {
 // Of its text in the file.
 std::string sha256_of(const Objection& objection) { return isoshift::sha256_of(file_text(json_of(objection))); }
 
+// The results of the session's X-rays, the oldest first. The first may have been moved away by hand.
+std::vector<std::string> of_same_xrays(const fs::path& results, const std::string& session) {
+  std::vector<std::string> names;
+  for (int number = 1;; ++number) {
+    std::string name = name_of_xrays(session, number);
+    const bool is_there = fs::exists(results / "sessions" / name);
+    if (is_there) names.push_back(std::move(name));
+    if (!is_there && number > 1) return names;
+  }
+}
+
 // Folders of registrations under way: ".NAME.registering-PROCESS", and what isoshift register writes beside them.
 constexpr const char* kRegistering = ".registering-";
 
@@ -207,9 +218,7 @@ void ResultsTree::keep_inputs(const std::string& session, const SessionInputs& i
 
 std::optional<SessionInputs> ResultsTree::inputs(const std::string& session) const {
   std::optional<SessionInputs> newest;
-  for (int number = 1;; ++number) {
-    const std::string name = name_of_xrays(session, number);
-    if (!fs::exists(this->session(name))) return newest;
+  for (const std::string& name : of_same_xrays(path_, session)) {
     const fs::path file = path_ / "inputs" / (name + ".json");
     if (!fs::exists(file)) continue;
     try {
@@ -219,6 +228,7 @@ std::optional<SessionInputs> ResultsTree::inputs(const std::string& session) con
           fmt::format("{}: does not tell from what session {} was registered: {}", file.string(), name, error.what()));
     }
   }
+  return newest;
 }
 
 RegistrationOrder ResultsTree::order(const std::string& session) const {
@@ -273,12 +283,8 @@ std::string ResultsTree::further_name(const std::string& session) const {
 }
 
 std::string ResultsTree::newest_of_same_xrays(const std::string& session) const {
-  std::string newest = session;
-  for (int number = 2;; ++number) {
-    std::string further = name_of_xrays(session, number);
-    if (!fs::exists(this->session(further))) return newest;
-    newest = std::move(further);
-  }
+  const std::vector<std::string> all = of_same_xrays(path_, session);
+  return all.empty() ? session : all.back();
 }
 
 SessionRecord ResultsTree::registered(const std::string& session) const {
@@ -402,9 +408,7 @@ void ResultsTree::remove(const std::string& session, const std::string& by) {
     throw Error(fmt::format("{}: holds no session {}", path_.string(), session));
   Deletion deletion{
       .session = name_of_xrays(session), .by = by, .user = system_user().name, .on = local_time(), .xrays = {}};
-  for (int number = 1;; ++number) {
-    const std::string name = name_of_xrays(session, number);
-    if (!fs::exists(this->session(name))) break;
+  for (const std::string& name : of_same_xrays(path_, session)) {
     if (is_to_be_sent(name))
       throw Error(
           fmt::format("session {}: was released and is still to be sent. Wait until it is sent, or reject it on the "

@@ -163,7 +163,8 @@ void Watch::take_deletions() {
   for (const auto& [patient_id, patient] : parts_.source.patients())
     for (const auto* images : {&patient.files.images, &patient.files.other_xrays})
       for (const StudyFiles::Image& image : *images)
-        if (deleted_xrays_.contains(sha256_of(image.sop_instance_uid))) registered_.insert(image.sop_instance_uid);
+        if (!registered_.contains(image.sop_instance_uid) && deleted_xrays_.contains(sha256_of(image.sop_instance_uid)))
+          registered_.insert(image.sop_instance_uid);
 }
 
 // A result that cannot be read hides no other.
