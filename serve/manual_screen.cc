@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <chrono>
 #include <fstream>
@@ -12,6 +13,7 @@
 #include "io/report/report_page.h"
 #include "io/report/result_folder.h"
 #include "serve/answers.h"
+#include "workflow/manual/landmarks.h"
 #include "workflow/register/setup_error_json.h"
 
 namespace isoshift {
@@ -58,6 +60,16 @@ Json view_json(const LiveStudy::View& view) {
           {"directions", array_of(view.directions)}};
 }
 
+// By view: [column, row] or null.
+std::vector<std::optional<Eigen::Vector2d>> marks_from(const Json& json) {
+  std::vector<std::optional<Eigen::Vector2d>> marks;
+  for (const Json& one : json) {
+    auto& mark = marks.emplace_back();
+    if (!one.is_null()) mark = Eigen::Vector2d(one.at(0).get<double>(), one.at(1).get<double>());
+  }
+  return marks;
+}
+
 void append(std::string& bytes, const Image<std::uint8_t>& image) {
   bytes.append(reinterpret_cast<const char*>(image.pixels.data()), image.pixels.size());
 }
@@ -77,9 +89,13 @@ HttpResponse ManualScreen::answer(const HttpRequest& request, const SignedIn& wh
   if (!has_type_json(request)) return refusal(415, "JSON is expected.");
   try {
     if (what == "drrs") return drrs(request);
+    if (what == "outlines") return outlines(request);
+    if (what == "landmarks") return landmarks(request);
     if (what == "begin") return begin(request, who);
   } catch (const Json::exception&) {
-    return refusal(400, "setup_error with translation_mm and rotation_matrix is expected, and detail or searched.");
+    return refusal(400,
+                   "setup_error with translation_mm and rotation_matrix is expected, and detail, part, landmarks, or "
+                   "searched and region.");
   }
   if (what != "cancel") return refusal(404, "There is nothing at this address.");
   registration_.cancel();
@@ -90,11 +106,14 @@ HttpResponse ManualScreen::study() const {
   const Study& study = study_.study();
   Json views = Json::array();
   for (const LiveStudy::View& view : study_.views()) views.push_back(view_json(view));
+  Json parts = Json::array();
+  for (const LiveStudy::Part& part : study_.parts()) parts.push_back(part.words);
   const Identity& patient = study.ct->identity;
   return json_answer({{"patient", name_for_people(patient.patient_name)},
                       {"patient_id", patient.patient_id},
                       {"plan", study.plan ? study.plan->label : ""},
                       {"start", json_of_setup_error(start_)},
+                      {"parts", std::move(parts)},
                       {"views", std::move(views)}});
 }
 
@@ -118,10 +137,52 @@ HttpResponse ManualScreen::drrs(const HttpRequest& request) const {
   return response;
 }
 
+HttpResponse ManualScreen::outlines(const HttpRequest& request) const {
+  const Json body = Json::parse(request.body);
+  const auto part = body.at("part").get<std::size_t>();
+  if (part >= study_.parts().size()) return refusal(400, "part is not one of those of the study.");
+  Json views = Json::array();
+  for (const std::vector<Polygon>& view : study_.outlines_of(part, pose_from(body.at("setup_error"))))
+    views.push_back(polygons_json(view));
+  return json_answer({{"views", std::move(views)}});
+}
+
+HttpResponse ManualScreen::landmarks(const HttpRequest& request) const {
+  const Json body = Json::parse(request.body);
+  std::vector<Landmark> landmarks;
+  for (const Json& one : body.at("landmarks"))
+    landmarks.push_back({.in_xrays = marks_from(one.at("xrays")), .in_drrs = marks_from(one.at("drrs"))});
+  const LandmarkFit fit = fit_landmarks(study_.cameras(), landmarks, pose_from(body.at("setup_error")));
+  return json_answer(
+      {{"setup_error", json_of_setup_error(fit.setup_error)}, {"left_mm", fit.left_mm}, {"apart_mm", fit.apart_mm}});
+}
+
+// What a person wants compared: {"part": number or null, "boxes": by view, null or first column, first row, last
+// column, last row on the picture}.
+std::vector<std::string> ManualScreen::region_from(const Json& region) const {
+  std::vector<std::string> flags;
+  if (!region.at("part").is_null()) {
+    const auto part = region.at("part").get<std::size_t>();
+    if (part >= study_.parts().size()) throw Error("part is not one of those of the study.");
+    flags = study_.parts()[part].flags;
+  }
+  const std::vector<LiveStudy::View>& views = study_.views();
+  const Json& boxes = region.at("boxes");
+  for (std::size_t n = 0; n < std::min(views.size(), boxes.size()); ++n) {
+    if (boxes[n].is_null()) continue;
+    const auto box = boxes[n].get<std::array<int, 4>>();
+    const int block = views[n].block;
+    flags.insert(flags.end(),
+                 {"--rectangle", fmt::format("{}={},{},{},{}", views[n].label, box[0] * block, box[1] * block,
+                                             (box[2] + 1) * block - 1, (box[3] + 1) * block - 1)});
+  }
+  return flags;
+}
+
 HttpResponse ManualScreen::begin(const HttpRequest& request, const SignedIn& who) {
   if (!who.roles.contains(Role::kRegister)) return refusal(403, fmt::format("{} may not register.", who.user));
   const Json body = Json::parse(request.body);
-  registration_.begin(pose_from(body.at("setup_error")), who.user, body.at("searched"));
+  registration_.begin(pose_from(body.at("setup_error")), who.user, body.at("searched"), region_from(body.at("region")));
   return state();
 }
 

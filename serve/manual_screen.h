@@ -1,6 +1,10 @@
 #pragma once
 // Registration by hand in a browser: what the page "manual" asks for.
 
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
 #include "serve/http_message.h"
 #include "serve/sign_ins.h"
 #include "workflow/manual/live_study.h"
@@ -21,6 +25,8 @@ class ManualScreen {
   //   GET study         the patient and the views, as JSON
   //   GET xrays         the X-rays: a byte per pixel, view by view
   //   POST drrs         the DRRs at a pose, likewise; with how long rendering took
+  //   POST outlines     those of a part at a pose, view by view
+  //   POST landmarks    the pose at which landmarks of the DRRs lie where they are in the X-rays
   //   GET state         what registers, or its result
   //   POST begin        registers from a pose, or keeps it
   //   POST cancel
@@ -31,6 +37,9 @@ class ManualScreen {
   HttpResponse study() const;
   HttpResponse xrays() const;
   HttpResponse drrs(const HttpRequest& request) const;
+  HttpResponse outlines(const HttpRequest& request) const;
+  HttpResponse landmarks(const HttpRequest& request) const;
+  std::vector<std::string> region_from(const nlohmann::ordered_json& region) const;
   HttpResponse begin(const HttpRequest& request, const SignedIn& who);
   HttpResponse state();
   HttpResponse report();

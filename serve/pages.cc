@@ -5,6 +5,8 @@
 #include <string_view>
 
 #include "serve/answers.h"
+#include "serve/pages/choose.html.h"
+#include "serve/pages/choose.js.h"
 #include "serve/pages/icon.svg.h"
 #include "serve/pages/manual.css.h"
 #include "serve/pages/manual.html.h"
@@ -37,7 +39,7 @@ constexpr std::array kStaticFiles = {
     StaticFile{"/sign_in.js", kScript, kSignInJs},  StaticFile{"/room.js", kScript, kRoomJs},
     StaticFile{"/session.js", kScript, kSessionJs}, StaticFile{"/trend.js", kScript, kTrendJs},
     StaticFile{"/manual.js", kScript, kManualJs},   StaticFile{"/manual_view.js", kScript, kManualViewJs},
-    StaticFile{"/pose.js", kScript, kPoseJs}};
+    StaticFile{"/pose.js", kScript, kPoseJs},       StaticFile{"/choose.js", kScript, kChooseJs}};
 
 const char* text_of(Page page) {
   switch (page) {
@@ -45,6 +47,7 @@ const char* text_of(Page page) {
     case Page::kSession: return kSessionHtml;
     case Page::kManual: return kManualHtml;
     case Page::kTrend: return kTrendHtml;
+    case Page::kChoose: return kChooseHtml;
     case Page::kSignIn: return kSignInHtml;
   }
   return "";

@@ -9,7 +9,7 @@
 namespace isoshift {
 
 // A page that more than one address shows.
-enum class Page { kSessions, kSession, kManual, kTrend, kSignIn };
+enum class Page { kSessions, kSession, kManual, kTrend, kChoose, kSignIn };
 HttpResponse page_answer(Page page);
 
 // Scripts, styles and pictures: an answer for their addresses, nothing for others. They tell nothing of patients.

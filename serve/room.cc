@@ -57,7 +57,8 @@ Json waiting_json(const EngineState& engine, const std::vector<ListedSession>& s
                          {"acquired", one.acquired},
                          {"verdict", one.has_failed ? "failed" : "waiting"},
                          {"action", ""},
-                         {"state", one.why}});
+                         {"state", one.why},
+                         {"has_options", one.options.is_anything()}});
   return waiting;
 }
 
@@ -214,6 +215,34 @@ void Room::decide(const Decision& decision) {
   const std::lock_guard lock(mutex_);
   tree_.decide(decision);
   seen_.reset();
+}
+
+WaitingSession Room::waiting(const std::string& session) const {
+  const std::optional<EngineSeen> engine = read_engine_state(tree_.path(), clock_.file_time());
+  if (engine)
+    for (const WaitingSession& one : engine->state.waiting)
+      if (one.name == session) return one;
+  throw NotThere(fmt::format("no session {} waits: it may have a result by now, or other X-rays have come", session));
+}
+
+Json Room::options(const std::string& session) {
+  const std::lock_guard lock(mutex_);
+  const WaitingSession waits = waiting(session);
+  Json json = json_of(waits.options);
+  json["patient"] = waits.patient_id;
+  json["acquired"] = waits.acquired;
+  json["state"] = waits.why;
+  return json;
+}
+
+std::string Room::choose(const std::string& session, const ChosenIds& ids, const std::string& reason,
+                         const std::string& user) {
+  const std::lock_guard lock(mutex_);
+  Choice choice = chosen_from(waiting(session).options, ids);
+  choice.reason = reason;
+  choice.by = user;
+  tree_.choose(choice);
+  return choice.session;
 }
 
 RegistrationOrder Room::order(const std::string& session) {

@@ -60,6 +60,13 @@ class Room {
   // Records what a user has decided. Throws Error where ResultsTree::decide() does.
   void decide(const Decision& decision);
 
+  // What a user may choose for a session that waits, as JSON. Throws NotThere.
+  nlohmann::ordered_json options(const std::string& session);
+  // Records what a user has chosen for it, and returns the name of the session that the engine will make of the X-rays.
+  // Throws Error for what is not among the options, and where ResultsTree::choose() does.
+  std::string choose(const std::string& session, const ChosenIds& ids, const std::string& reason,
+                     const std::string& user);
+
   // What a person who registers a session by hand begins with: how its X-rays are registered, the setup error that was
   // found, and the folder for results. Throws NotThere, and Error if nobody kept how.
   RegistrationOrder order(const std::string& session);
@@ -78,6 +85,7 @@ class Room {
   void look_for_sessions(std::vector<std::string>& troubles);
   std::string registered_content(const std::string& session, const std::string& name) const;
   const ListedSession& listed(const std::string& session) const;
+  WaitingSession waiting(const std::string& session) const;
 
   const WatchFile& watch_;
   const Clock& clock_;

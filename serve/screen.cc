@@ -15,8 +15,8 @@ using Json = nlohmann::ordered_json;
 
 constexpr std::chrono::seconds kBeat(4);
 constexpr std::size_t kLongestReason = 1000;
-constexpr std::string_view kSessionPage = "/session/", kByHand = "/by-hand", kTrend = "/trend", kApi = "/api/",
-                           kSessionApi = "/api/sessions/", kManual = "manual/", kEvents = "/api/events";
+constexpr std::string_view kSessionPage = "/session/", kByHand = "/by-hand", kTrend = "/trend", kChoose = "/choose",
+                           kApi = "/api/", kSessionApi = "/api/sessions/", kManual = "manual/", kEvents = "/api/events";
 // What the page on which people sign in is made of.
 constexpr std::array kForAll = {"/shared.js", "/sign_in.js", "/icon.svg", "/room.css"};
 
@@ -65,9 +65,10 @@ std::optional<HttpResponse> Screen::page(const std::string& path, bool is_signed
   }
   if (path == "/") return page_answer(Page::kSessions);
   if (path.starts_with(kSessionPage))
-    return page_answer(path.ends_with(kByHand)  ? Page::kManual
-                       : path.ends_with(kTrend) ? Page::kTrend
-                                                : Page::kSession);
+    return page_answer(path.ends_with(kByHand)   ? Page::kManual
+                       : path.ends_with(kTrend)  ? Page::kTrend
+                       : path.ends_with(kChoose) ? Page::kChoose
+                                                 : Page::kSession);
   return static_answer(path);
 }
 
@@ -127,11 +128,13 @@ HttpResponse Screen::session(const HttpRequest& request, const SignedIn& who, co
                              const std::string& what) {
   if (what.starts_with(kManual)) return desk_.answer(request, who, name, what.substr(kManual.size()));
   if (request.method == "POST") {
+    if (what == "choose") return choose(request, who, name);
     if (what == "decide") return decide(request, who, name);
     if (what == "release") return release(request, who, name);
     return refusal(404, "There is nothing at this address.");
   }
   if (what.empty()) return json_answer(room_.session(name));
+  if (what == "options") return json_answer(room_.options(name));
   if (what == "trend") {
     Json trend = room_.trend(name);
     room_.audit("viewed", who.user, name);
@@ -142,6 +145,23 @@ HttpResponse Screen::session(const HttpRequest& request, const SignedIn& who, co
   room_.audit("viewed", who.user, name);
   if (what == "report.html") return report_answer(std::move(content));
   return {.type = "application/pdf", .body = std::move(content)};
+}
+
+HttpResponse Screen::choose(const HttpRequest& request, const SignedIn& who, const std::string& name) {
+  if (!who.roles.contains(Role::kRegister)) return refusal(403, fmt::format("{} may not choose.", who.user));
+  if (!has_type_json(request)) return refusal(415, "JSON is expected.");
+  ChosenIds ids;
+  std::string reason;
+  try {
+    const Json body = Json::parse(request.body);
+    ids = {.xrays = body.at("xrays"), .patient = body.at("patient"), .plan = body.at("plan"), .ct = body.at("ct")};
+    reason = body.at("reason");
+  } catch (const Json::exception&) {
+    return refusal(400, "xrays, patient, plan, ct and reason are expected.");
+  }
+  if (reason.size() > kLongestReason) return refusal(400, "The reason is too long.");
+  if (reason.empty()) return refusal(400, "A reason is missing.");
+  return json_answer({{"session", room_.choose(name, ids, reason, who.user)}});
 }
 
 HttpResponse Screen::decide(const HttpRequest& request, const SignedIn& who, const std::string& name) {

@@ -7,11 +7,9 @@
 #include <array>
 #include <cmath>
 #include <numbers>
-#include <regex>
 #include <utility>
 
 #include "base/error.h"
-#include "io/dicom/structure_mask.h"
 #include "io/report/canvas.h"
 
 namespace isoshift {
@@ -54,21 +52,6 @@ Image<Rgb> seen_along(const Volume<std::uint8_t>& labels, int axis, bool from_en
 }
 
 }  // namespace
-
-std::vector<DrawnBone> drawn_bones(const RtStructures& structures, const CtSeries& ct) {
-  static const std::regex bone(
-      "([CTL](\\d|1[0-2])|vert(ebra)?[ _-]?[CTL]?\\d+|skull|cranium|mandible|jaw|sacrum|sternum|"
-      "(femur|femoral[ _]?head|humerus|scapula|clavicle|pelvis|ilium|hip)([ _-].*)?)",
-      std::regex::icase);
-  std::vector<DrawnBone> result;
-  for (const Structure& structure : structures.structures) {
-    const bool is_here =
-        !structure.frame_of_reference_uid || *structure.frame_of_reference_uid == ct.frame_of_reference_uid;
-    if (is_here && !structure.contours.empty() && std::regex_match(structure.name, bone))
-      result.push_back({structure.name, mask_of(structure, ct.hu.size, ct.hu.patient_from_voxel)});
-  }
-  return result;
-}
 
 std::string bodies_table(const BodyMap& map) {
   std::string text = fmt::format("  {:>4}  {:<9} {:<14} {:>26}  {:>9}  joints (s: stiff)\n", "body", "kind", "name",

@@ -9,6 +9,7 @@
 #include "cli/commands/inspect_bodies.h"
 #include "drr/gl/context.h"
 #include "io/study/study.h"
+#include "workflow/register/study_bodies.h"
 
 namespace isoshift {
 namespace {

@@ -48,7 +48,7 @@ void run_watch(const std::filesystem::path& file, Console& console) {
   SystemClock clock;
   const auto server = watch.orthanc ? std::make_unique<RestOrthanc>(*watch.orthanc) : nullptr;
   const auto source = source_of(watch, server.get(), clock);
-  ChildRunner runner(watch);
+  ChildRunner runner;
   DicomSender sender;
   const FileContents contents;
   ConsoleObserver observer(console), sending(console);

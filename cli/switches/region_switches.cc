@@ -10,6 +10,11 @@ void add_region_switches(CLI::App& command, RegionOptions& options) {
       ->type_name("NAME")
       ->group(group);
   command
+      .add_option("--body", options.bodies,
+                  "Register only this bone, by its number in isoshift inspect --bodies; may be repeated")
+      ->type_name("NUMBER")
+      ->group(group);
+  command
       .add_option("--around-isocenter", options.around_isocenter_mm,
                   "Register only what lies within this distance of the isocenter")
       ->type_name("MM")

@@ -75,6 +75,7 @@ SiteFile::Sessions sessions_from(JsonSection section) {
   if (!quiet_s) section.refuse_missing("quiet_s", "seconds");
   sessions.quiet_s = *quiet_s;
   sessions.max_span_s = section.number("max_span_s", 0.0, kMaxTimeSpanS).value_or(sessions.max_span_s);
+  sessions.max_clock_offset_s = section.number("max_clock_offset_s", 1.0, kLongestS);
   section.end();
   return sessions;
 }

@@ -19,9 +19,10 @@ using NameByAnatomy = std::map<std::string, std::string, std::less<>>;
 struct SiteFile {
   // When a session of X-rays is complete.
   struct Sessions {
-    int views = 2;                            // this number of X-rays has arrived,
-    double quiet_s = 0.0;                     // and nothing of the patient has arrived for this time
-    double max_span_s = kDefaultUntoldSpanS;  // between X-rays without table read-outs, or the result needs a review
+    int views = 2;                             // this number of X-rays has arrived,
+    double quiet_s = 0.0;                      // and nothing of the patient has arrived for this time
+    double max_span_s = kDefaultUntoldSpanS;   // between X-rays without table read-outs, or the result needs a review
+    std::optional<double> max_clock_offset_s;  // of imagers from this computer, or watch says so
   };
 
   std::filesystem::path path;

@@ -53,6 +53,13 @@ std::string patient_of(const DicomItem& dataset) {
   return dataset.text(DCM_PatientID).value_or("") + "\\" + dataset.text(DCM_IssuerOfPatientID).value_or("");
 }
 
+// "Prostate 20260301": what tells one of several objects from the others.
+std::string label_of(const DicomItem& dataset, const DcmTagKey& name, const DcmTagKey& date) {
+  std::string label = dataset.text(name).value_or("");
+  if (const auto on = dataset.text(date)) label += (label.empty() ? "" : " ") + *on;
+  return label;
+}
+
 // A read-out of the dataset, else of its first exposure that has it.
 std::optional<double> read_out(const DicomItem& dataset, const DcmTagKey& tag) {
   if (const auto value = dataset.number(tag)) return value;
@@ -85,6 +92,7 @@ void add_ct_slice(const fs::path& path, const DicomItem& dataset, StudyFiles& fi
   }
   files.cts.push_back({.patient = patient_of(dataset),
                        .series_instance_uid = dataset.required_text(DCM_SeriesInstanceUID),
+                       .label = label_of(dataset, DCM_SeriesDescription, DCM_SeriesDate),
                        .frame_of_reference_uid = dataset.text(DCM_FrameOfReferenceUID).value_or(""),
                        .files = {path},
                        .sop_instance_uids = {dataset.required_text(DCM_SOPInstanceUID)}});
@@ -335,7 +343,8 @@ StudyFiles scan_file(const fs::path& path) {
                            .patient = patient_of(dataset),
                            .sop_instance_uid = dataset.required_text(DCM_SOPInstanceUID),
                            .frame_of_reference_uid = dataset.text(DCM_FrameOfReferenceUID).value_or(""),
-                           .structure_set_uid = first_reference(dataset, DCM_ReferencedStructureSetSequence)});
+                           .structure_set_uid = first_reference(dataset, DCM_ReferencedStructureSetSequence),
+                           .label = label_of(dataset, DCM_RTPlanLabel, DCM_RTPlanDate)});
   } else if (sop_class == UID_RTStructureSetStorage) {
     DrawnOn drawn = drawn_on(dataset);
     files.structures.push_back({.file = path,

@@ -19,6 +19,7 @@ struct StudyFiles {
   struct Ct {
     std::string patient;  // PatientID\issuer
     std::string series_instance_uid;
+    std::string label;  // SeriesDescription and SeriesDate, for people; empty: neither
     std::string frame_of_reference_uid;
     std::vector<std::filesystem::path> files;
     std::set<std::string> sop_instance_uids;
@@ -29,6 +30,7 @@ struct StudyFiles {
     std::string sop_instance_uid;
     std::string frame_of_reference_uid;
     std::string structure_set_uid;  // ReferencedStructureSetSequence
+    std::string label;              // RTPlanLabel and RTPlanDate, for people; empty: neither
   };
   static constexpr double kLargestUtcOffsetS = 14 * 3600.0;
   struct Image {

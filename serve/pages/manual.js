@@ -18,6 +18,8 @@ const history = [];
 let wanted = null, isAsking = false, resting = null;
 let isFlickered = false;
 const views = [];
+let tool = "move";      // what the mouse does: "move", "box" or "mark"
+const landmarks = [];   // {xrays, drrs}: pixels by view, or null
 
 // What is drawn.
 
@@ -62,7 +64,10 @@ async function follow() {
       headers.get("X-Isoshift-Milliseconds") + " ms, painted in " + painted.toFixed(0) + " ms, " +
       (performance.now() - begin).toFixed(0) + " ms in all";
     element("times").dataset.pose = JSON.stringify(asked.pose);  // of what is on the screen
-    if (asked.detail === kAtRest) problem("");
+    if (asked.detail === kAtRest) {
+      problem("");
+      await showOutline(asked.pose);
+    }
   } catch (error) {
     problem(error.message);
   }
@@ -82,9 +87,20 @@ function showNumbers() {
   });
 }
 
-// The patient is moved; `rest` comes when that has ended.
+// The outlines of the chosen part at a pose.
+async function showOutline(at) {
+  const part = element("part").value;
+  const {views: outlines} = part === "" ? {views: []} : await post(kApi + "outlines", {setup_error: at, part: +part});
+  if (at !== pose) return;  // moved on since
+  views.forEach((view, n) => { view.outline = outlines[n] || []; });
+  draw();
+}
+
+// The patient is moved; `rest` comes when that has ended. What belongs to the pose before is taken off.
 function set(next) {
   pose = next;
+  for (const view of views) view.outline = [];
+  forgetMarksInDrrs();
   showNumbers();
   ask(kMoving);
   clearTimeout(resting);
@@ -104,6 +120,7 @@ function rest() {
 function undo() {
   if (history.length === 0) return;
   pose = restingPose = history.pop();
+  forgetMarksInDrrs();
   element("undo").disabled = history.length === 0;
   showNumbers();
   ask(kAtRest);
@@ -113,6 +130,12 @@ function undo() {
 
 const step = () => +element("step").value;
 const on = {
+  tool: () => tool,
+  mark,
+  boxed: () => {
+    element("no-boxes").disabled = views.every(view => !view.box);
+    draw();
+  },
   drag: (view, pixels) => set(moved(pose, motionOf(view.px_per_mm, pixels))),
   turn: (view, deg) => set(turned(pose, view.from_source, deg)),
   wheel: (view, sign) => set(turned(pose, view.from_source, sign * step())),
@@ -155,7 +178,71 @@ function zoom(isLarger) {
   for (const view of views) view.zoomBy(isLarger ? 1.2 : 1 / 1.2);
 }
 
+// Tools for the mouse.
+
+function use(next) {
+  tool = tool === next ? "move" : next;
+  for (const name of ["box", "mark"]) element(name).setAttribute("aria-pressed", tool === name);
+  document.body.classList.toggle("points", tool !== "move");
+  if (tool === "mark" && mode() !== "side") document.querySelector("input[value=side]").click();
+}
+
+// Landmarks: a click in the X-ray and in the DRR of every view. The next one begins when all are there.
+
+const isWhole = landmark => [...landmark.xrays, ...landmark.drrs].every(mark => mark);
+const canFit = landmark => [landmark.xrays, landmark.drrs].every(marks => marks.filter(mark => mark).length >= 2);
+
+function mark(view, isDrr, pixel) {
+  if (landmarks.length === 0 || isWhole(landmarks.at(-1)))
+    landmarks.push({xrays: views.map(() => null), drrs: views.map(() => null)});
+  const kind = isDrr ? "drrs" : "xrays", n = views.indexOf(view);
+  (landmarks.find(one => !one[kind][n]) || landmarks.at(-1))[kind][n] = pixel;
+  showLandmarks();
+}
+
+function showLandmarks() {
+  views.forEach((view, n) => {
+    view.marks = ["xrays", "drrs"].map(kind =>
+      landmarks.flatMap((one, number) => one[kind][n] ? [{pixel: one[kind][n], number: number + 1}] : []));
+  });
+  const missing = landmarks.flatMap((one, n) => views.flatMap((view, v) =>
+    [["xrays", "X-ray"], ["drrs", "DRR"]].filter(([kind]) => !one[kind][v])
+      .map(([, name]) => `${n + 1} in the ${name} of ${view.label}`)));
+  element("landmarks").textContent = landmarks.length === 0 ? ""
+    : missing.length ? "Still to mark: landmark " + missing.join(", ") : landmarks.length + " marked in all views";
+  element("fit").disabled = landmarks.length === 0 || !landmarks.every(canFit);
+  element("clear-marks").disabled = landmarks.length === 0;
+  draw();
+}
+
+// Marks in DRRs belong to their pose.
+function forgetMarksInDrrs() {
+  if (!landmarks.some(one => one.drrs.some(mark => mark))) return;
+  for (const one of landmarks) one.drrs = views.map(() => null);
+  showLandmarks();
+}
+
+async function fit() {
+  problem("");
+  try {
+    const count = landmarks.length;
+    const found = await post(kApi + "landmarks", {setup_error: pose, landmarks});
+    landmarks.length = 0;
+    showLandmarks();
+    set(found.setup_error);
+    rest();
+    element("landmarks").textContent = `Moved by ${count} landmark${count > 1 ? "s" : ""}: ` +
+      (count > 1 ? `${found.left_mm.toFixed(1)} mm are left between them (root mean square), ` : "") +
+      `the marks of one lie up to ${found.apart_mm.toFixed(1)} mm apart`;
+  } catch (error) {
+    problem(error.message);
+  }
+}
+
 // Registration.
+
+// What is compared: one part, and boxes by view.
+const region = () => ({part: element("only").checked ? +element("part").value : null, boxes: views.map(view => view.box)});
 
 function problem(text) {
   if (element("problem").textContent !== text) element("problem").textContent = text;
@@ -214,7 +301,7 @@ async function register(searched) {
   element("hand-over").hidden = true;
   element("result").replaceChildren();
   try {
-    await post(kApi + "begin", {setup_error: pose, searched});
+    await post(kApi + "begin", {setup_error: pose, searched, region: region()});
     await watchRegistration();
   } catch (error) {
     problem(error.message);
@@ -232,6 +319,22 @@ for (const id of kNumbers)
     if (numbers.every(Number.isFinite)) set(fromNumbers(numbers.slice(0, 3), numbers.slice(3)));
   });
 element("undo").addEventListener("click", undo);
+element("part").addEventListener("input", () => {
+  element("only").disabled = element("part").value === "";
+  if (element("only").disabled) element("only").checked = false;
+  showOutline(pose).catch(error => problem(error.message));
+});
+element("box").addEventListener("click", () => use("box"));
+element("mark").addEventListener("click", () => use("mark"));
+element("no-boxes").addEventListener("click", () => {
+  for (const view of views) view.box = null;
+  on.boxed();
+});
+element("fit").addEventListener("click", fit);
+element("clear-marks").addEventListener("click", () => {
+  landmarks.length = 0;
+  showLandmarks();
+});
 element("as-planned").addEventListener("click", () => { set(planned); rest(); });
 element("zoom-in").addEventListener("click", () => zoom(true));
 element("zoom-out").addEventListener("click", () => zoom(false));
@@ -276,6 +379,7 @@ try {
     const [columns, rows] = view.sizes[0];
     views.push(new ManualView(element("views"), view, data.subarray(at, at += columns * rows), on));
   }
+  study.parts.forEach((words, n) => element("part").append(make("option", words, {value: n})));
   pose = restingPose = study.start;
   new ResizeObserver(layOut).observe(element("views"));
   layOut();

@@ -1,7 +1,7 @@
 // One view on the screen: its X-ray and its DRR, compared in several ways; and what a person does there with the mouse.
 import {make} from "/shared.js";
 
-const kColors = {field: "#56b4e9", cross: "#e69f00", letters: "#ffffff"};
+const kColors = {field: "#56b4e9", cross: "#e69f00", letters: "#ffffff", part: "#e69f00", box: "#f0e442", mark: "#f0e442"};
 
 // Brightness and contrast of 256 grays, both from -100 to 100.
 const table = ({brightness, contrast}) => Uint8ClampedArray.from({length: 256}, (_, gray) =>
@@ -9,6 +9,7 @@ const table = ({brightness, contrast}) => Uint8ClampedArray.from({length: 256}, 
 
 export class ManualView {
   // `on.drag(view, pixels)` and `on.turn(view, degrees)` are called while the patient is moved, `on.rest()` after that.
+  // While `on.tool()` is "box" or "mark", the mouse draws a box or calls `on.mark(view, isDrr, pixel)` instead.
   constructor(place, view, xray, on) {
     Object.assign(this, view);
     [this.columns, this.rows] = view.sizes[0];
@@ -18,6 +19,9 @@ export class ManualView {
     this.zoom = 1;
     this.center = [this.columns / 2, this.rows / 2];  // pixel in the middle
     this.on = on;
+    this.outline = [];      // of the part that is shown
+    this.box = null;        // what is compared: first column, first row, last column, last row
+    this.marks = [[], []];  // of landmarks, in the X-ray and in the DRR: {pixel, number}
     this.panel = make("figure", undefined, {class: "view"});
     this.panel.append(make("figcaption", view.label));
     const canvas = name => this.panel.appendChild(
@@ -44,14 +48,21 @@ export class ManualView {
   }
 
   listen(canvas) {
-    let from = null;
+    let from = null, corner = null;
     canvas.addEventListener("pointerdown", event => {
       canvas.setPointerCapture(event.pointerId);
       canvas.focus();
-      from = [event.clientX, event.clientY];
       event.preventDefault();
+      const at = this.pixelAt(canvas, event);
+      if (this.on.tool() === "mark") this.on.mark(this, canvas === this.canvases[1], at);
+      else if (this.on.tool() === "box") corner = at;
+      else from = [event.clientX, event.clientY];
     });
     canvas.addEventListener("pointermove", event => {
+      if (corner) {
+        this.box = this.boxBetween(corner, this.pixelAt(canvas, event));
+        this.on.look();
+      }
       if (!from) return;
       const by = [(event.clientX - from[0]) / this.scale, (event.clientY - from[1]) / this.scale];
       if (event.altKey || event.buttons === 4) {
@@ -64,7 +75,10 @@ export class ManualView {
       }
       from = [event.clientX, event.clientY];
     });
-    const end = () => { if (from) { from = null; this.on.rest(); } };
+    const end = () => {
+      if (corner) { corner = null; this.on.boxed(); }
+      if (from) { from = null; this.on.rest(); }
+    };
     canvas.addEventListener("pointerup", end);
     canvas.addEventListener("pointercancel", end);
     canvas.addEventListener("wheel", event => {
@@ -78,6 +92,20 @@ export class ManualView {
     this.zoom = Math.max(1, Math.min(16, this.zoom * factor));
     if (this.zoom === 1) this.center = [this.columns / 2, this.rows / 2];
     this.on.look();
+  }
+
+  // Column and row under the mouse; centers of pixels are whole numbers.
+  pixelAt(canvas, {clientX, clientY}) {
+    const box = canvas.getBoundingClientRect();
+    return [clientX - box.left, clientY - box.top].map((at, n) => (at - this.edge / 2) / this.scale + this.center[n] - 0.5);
+  }
+
+  // Nothing for a box that is hardly there.
+  boxBetween(a, b) {
+    const kLeast = 8, most = [this.columns - 1, this.rows - 1];
+    const whole = pick => a.map((value, n) => Math.max(0, Math.min(most[n], Math.round(pick(value, b[n])))));
+    const first = whole(Math.min), last = whole(Math.max);
+    return last.every((value, n) => value - first[n] >= kLeast) ? [...first, ...last] : null;
   }
 
   // How far the mouse has turned about the isocenter on the canvas, degrees, clockwise.
@@ -137,7 +165,10 @@ export class ManualView {
     context.imageSmoothingEnabled = this.scale * devicePixelRatio < 3;
     context.drawImage(this.buffer, 0, 0);
     if (look.marks.field) this.drawField(context);
+    this.drawLines(context, this.outline, kColors.part);
+    if (this.box) this.drawBox(context, this.box);
     if (look.marks.cross) this.drawCross(context);
+    for (const mark of this.marks[this.canvases.indexOf(canvas)]) this.drawMark(context, mark);
     context.setTransform(1, 0, 0, 1, 0, 0);
     if (look.marks.letters) this.drawLetters(context, canvas.width);
   }
@@ -154,17 +185,36 @@ export class ManualView {
     return context;
   }
 
-  drawField(context) {
-    context.strokeStyle = kColors.field;
-    const dash = 6 / this.scale;
-    context.setLineDash([dash, dash]);
-    for (const polygon of this.field) {
+  drawLines(context, polygons, color) {
+    context.strokeStyle = color;
+    for (const polygon of polygons) {
       context.beginPath();
       for (const [x, y] of polygon) context.lineTo(x + 0.5, y + 0.5);
       context.closePath();
       context.stroke();
     }
+  }
+
+  drawField(context) {
+    const dash = 6 / this.scale;
+    context.setLineDash([dash, dash]);
+    this.drawLines(context, this.field, kColors.field);
     context.setLineDash([]);
+  }
+
+  drawBox(context, [c0, r0, c1, r1]) {
+    context.strokeStyle = kColors.box;
+    context.strokeRect(c0, r0, c1 + 1 - c0, r1 + 1 - r0);
+  }
+
+  drawMark(context, {pixel: [x, y], number}) {
+    const radius = 6 / this.scale;
+    context.strokeStyle = context.fillStyle = kColors.mark;
+    context.beginPath();
+    context.arc(x + 0.5, y + 0.5, radius, 0, 2 * Math.PI);
+    context.stroke();
+    context.font = "bold " + 14 / this.scale + "px \"DejaVu Sans\", Arial, sans-serif";
+    context.fillText(number, x + 0.5 + 1.3 * radius, y + 0.5 - radius);
   }
 
   drawCross(context) {

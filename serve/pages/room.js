@@ -24,6 +24,8 @@ function rowOf(one) {
     if (column === "verdict") cell.append(verdictCell(one.verdict));
     else if (column === "session" && one.has_result)
       cell.append(make("a", one.session, {href: "/session/" + encodeURIComponent(one.session)}));
+    else if (column === "state" && one.has_options)
+      cell.append(one.state + " ", make("a", "Choose…", {href: "/session/" + encodeURIComponent(one.session) + "/choose"}));
     else cell.textContent = column === "patient" ? nameForPeople(one.patient) : one[column];
     row.append(cell);
   }

@@ -1,5 +1,5 @@
 // A session: its report, what speaks against it, and the release of what is on the screen.
-import {element, follow, get, nameForPeople, post, showSignedIn, verdictCell} from "/shared.js";
+import {bytes, element, follow, get, nameForPeople, post, showSignedIn, verdictCell} from "/shared.js";
 
 const session = decodeURIComponent(location.pathname.split("/").pop());
 const address = "/api/sessions/" + encodeURIComponent(session);
@@ -89,13 +89,17 @@ for (const decision of kDecisions)
 element("reason").addEventListener("input", () => show(shown));
 
 element("name").textContent = session;
-element("pdf").href = address + "/report.pdf";
 me = await showSignedIn();
 element("by-hand").hidden = !me.roles.includes("register");
 element("trend").href = "/session/" + encodeURIComponent(session) + "/trend";
 element("by-hand").href = "/session/" + encodeURIComponent(session) + "/by-hand";
 await update();
 element("report").src = address + "/report.html";
+// Kept in the page, so that it can be printed while the network is down.
+bytes(address + "/report.pdf").then(({data}) => {
+  element("pdf").href = URL.createObjectURL(new Blob([data], {type: "application/pdf"}));
+  element("pdf").download = "session-" + session + ".pdf";
+}).catch(error => write("problem", error.message));
 let version = null, isAsking = false;
 follow(async now => {
   if (engine !== now.engine && shown) {

@@ -71,21 +71,27 @@ export async function showSignedIn() {
 
 const kSilenceMs = 12000;  // the server speaks every 4 s
 
+// "2026-03-01 10:15:00", local time.
+const timeInWords = () => new Date().toLocaleString("sv-SE");
+
 // Calls `changed` with what the server tells: the version of the list, and whether the engine runs. The heartbeat is red
 // when the engine gives no sign of life, or when the server has not been heard for some seconds. A page that nobody sees
-// does not follow: browsers allow few connections.
+// does not follow: browsers allow few connections. On paper the page tells of when it is.
 export function follow(changed) {
   const heart = element("heartbeat");
-  let events = null, silence = null;
+  let events = null, silence = null, heardOn = timeInWords();
+  const asOf = document.body.appendChild(make("p", "", {class: "printed"}));
   const show = (state, words) => {
     heart.className = state;
     if (heart.textContent !== words) heart.textContent = words;
   };
-  const lost = () => show("stopped", "✖ no connection to the server");
+  const lost = () => show("stopped", "✖ no connection to the server since " + heardOn);
   const hear = event => {
     clearTimeout(silence);
     silence = setTimeout(lost, kSilenceMs);
     const now = JSON.parse(event.data);
+    heardOn = timeInWords();
+    asOf.textContent = "As the server told it on " + heardOn;
     if (now.engine === "runs") show("runs", "♥ engine runs");
     else show("stopped", "✖ no sign of life from the engine: nothing new is registered or sent");
     changed(now);

@@ -6,6 +6,8 @@ heartbeat tells when the engine is killed.
 WORK is an empty folder. Prints what went wrong and exits with 1, or ends with 0.
 """
 
+import base64
+import datetime
 import json
 import pathlib
 import re
@@ -87,6 +89,43 @@ def decide_and_register_by_hand(doe, poe, address, results):
     wait_for(lambda: "released by doe" in text(doe, "#state"), 10, "the release of the result by hand")
 
 
+def choose_views_an_hour_apart(doe, address, results):
+    """Two X-rays that wait for each other are chosen as one session, which is registered and needs a review."""
+    doe.get(address)
+    wait_for(lambda: len(doe.find_elements(By.LINK_TEXT, "Choose…")) == 2, 30, "two X-rays to choose for")
+    before = {path.name for path in (results / "sessions").glob("[!.]*")}
+    doe.find_element(By.LINK_TEXT, "Choose…").click()
+    wait_for(lambda: len(doe.find_elements(By.NAME, "xrays")) == 2, 10, "the X-rays of the patient")
+    own, other = doe.find_elements(By.NAME, "xrays")
+    expect(own.is_selected() and not other.is_selected(), "the session's X-ray is not the one that is chosen")
+    expect(not doe.find_element(By.ID, "plans").is_displayed(), "a plan is asked for that the X-rays name")
+    other.click()
+    expect(not doe.find_element(By.ID, "choose").is_enabled(), "a choice without a reason")
+    doe.find_element(By.ID, "reason").send_keys("the panel had failed")
+    doe.find_element(By.ID, "choose").click()
+    wait_for(lambda: "Recorded" in text(doe, "#chosen"), 10, "the choice")
+    wait_for(lambda: len({path.name for path in (results / "sessions").glob("[!.]*")} - before) == 1, 60, "its result")
+    [made] = {path.name for path in (results / "sessions").glob("[!.]*")} - before
+    result = json.loads((results / "sessions" / made / "result.json").read_text())
+    reasons = " ".join(result["reasons"])
+    expect(result["verdict"] == "review" and "doe chose on" in reasons and "the panel had failed" in reasons,
+           f"{result['verdict']}: {reasons}")
+    expect('"event":"chosen"' in (results / "audit.jsonl").read_text(), "the audit log does not tell of the choice")
+
+
+def look_without_a_server(doe, roe, work):
+    """What pages show stays, can be printed, and says of when it is."""
+    pdf = work / "list.pdf"
+    pdf.write_bytes(base64.b64decode(roe.execute_cdp_cmd("Page.printToPDF", {})["data"]))
+    printed = subprocess.run(["pdftotext", "-layout", pdf, "-"], check=True, capture_output=True, text=True).stdout
+    for words in ("Phantom Digital", "no connection to the server since", "As the server told it on"):
+        expect(words in printed, f"the list on paper lacks: {words}\n{printed}")
+    doe.execute_cdp_cmd("Browser.setDownloadBehavior", {"behavior": "allow", "downloadPath": str(work)})
+    doe.find_element(By.ID, "pdf").click()
+    wait_for(lambda: any(path.read_bytes().startswith(b"%PDF") for path in work.glob("session-*.pdf")), 10,
+             "the report, from the page itself")
+
+
 def main(program, work):
     (work / "in").mkdir()
     secret = work / "secret"
@@ -100,13 +139,20 @@ def main(program, work):
         "roles": {"doe": ["view", "register", "release"], "roe": ["view"], "poe": ["view", "release"]}}))
     results, log = work / "results", work / "serve.log"
 
-    def bring_study(seed, patient_name=None):
+    def bring_study(seed, patient_name=None, minutes_between=0):
         study = work / f"study-{seed}"
         subprocess.run([program, "phantom", "-o", study, "--seed", str(seed), "--voxel-mm", "4",
                         "--image-pixels", "96", "--photons", "0"], check=True, capture_output=True)
         for path in study.rglob("*.dcm") if patient_name else []:
             file = pydicom.dcmread(path)
             file.PatientName = patient_name
+            file.save_as(path)
+        if minutes_between:
+            path = sorted((study / "RTIMAGE").glob("*.dcm"))[-1]
+            file = pydicom.dcmread(path)
+            taken = datetime.datetime.strptime(file.AcquisitionDate + file.AcquisitionTime[:6], "%Y%m%d%H%M%S")
+            later = taken + datetime.timedelta(minutes=minutes_between)
+            file.AcquisitionDate, file.AcquisitionTime = later.strftime("%Y%m%d %H%M%S").split()
             file.save_as(path)
         study.rename(work / "in" / str(seed))
 
@@ -129,7 +175,7 @@ def main(program, work):
         wait_for(lambda: "held" in text(doe, "#sessions"), 10, "the session on the screen")
         print(f"a session appeared {time.time() - began:.1f} s after its result")
 
-        # What a person has set stays while sessions come.
+#What a person has set stays while sessions come.
         doe.find_element(By.ID, "filter").send_keys("phantom1")
         bring_study(2, kHostileName)
         result_of(2)
@@ -162,6 +208,13 @@ def main(program, work):
         poe = browser_of("poe", address)
         decide_and_register_by_hand(doe, poe, address, results)
         poe.quit()
+        released = doe.current_url
+        bring_study(3, minutes_between=65)
+        choose_views_an_hour_apart(doe, address, results)
+        doe.get(released)
+        wait_for(lambda: doe.find_element(By.ID, "pdf").get_attribute("href").startswith("blob:"), 10, "the report in the page")
+        roe.get(address)
+        wait_for(lambda: "4 with a result" in text(roe, "#count"), 10, "all sessions")
 
         watch.kill()
         watch.wait()
@@ -171,6 +224,7 @@ def main(program, work):
         serve.kill()
         serve.wait()
         wait_for(lambda: "no connection" in text(roe, "#heartbeat"), 20, "the heartbeat of a lost server")
+        look_without_a_server(doe, roe, work)
         for browser in (doe, roe):
             seen = [one for one in problems(browser) if "ERR_CONNECTION_REFUSED" not in one and "api/" not in one]
             expect(not seen, f"the browser complains: {seen}")

@@ -238,6 +238,43 @@ TEST_F(ScreenTest, ATrendHasAllResultsOfThePatientAndCountsTheFirstOfEveryDay) {
   EXPECT_EQ(get("/api/sessions/none/trend").status, 404);
 }
 
+TEST_F(ScreenTest, WhoMayRegisterChoosesWhereTheFilesDoNotTell) {
+  EngineFile(tree_.path(), clock_)
+      .update({.waiting = {{.name = "b",
+                            .patient_id = "8",
+                            .why = "2 RT Plans found",
+                            .options = {.own_xrays = {{"1.2.7", "AP 10:15:00"}, {"1.2.8", "LAT 10:15:10"}},
+                                        .other_xrays = {},
+                                        .patients = {},
+                                        .plans = {{"1.3.1", "the RT Plan A"}, {"1.3.2", "the RT Plan B"}},
+                                        .cts = {}}},
+                           {.name = "c", .patient_id = "9", .why = "waits for the CT", .options = {}}},
+               .troubles = {}});
+  const Json list = Json::parse(get("/api/room").body);
+  EXPECT_EQ(list.at("waiting")[0].at("has_options"), true);
+  EXPECT_EQ(list.at("waiting")[1].at("has_options"), false);
+  EXPECT_EQ(get("/session/b/choose").status, 200);
+  EXPECT_EQ(Json::parse(get("/api/sessions/b/options").body).at("plans")[1].at("words"), "the RT Plan B");
+  EXPECT_EQ(get("/api/sessions/" + a_ + "/options").status, 404) << "it has a result";
+  Json chosen = {
+      {"xrays", {"1.2.7", "1.2.8"}}, {"patient", ""}, {"plan", "1.3.2"}, {"ct", ""}, {"reason", "asked the clinic"}};
+  EXPECT_EQ(post("releaser", "/api/sessions/b/choose", chosen).status, 403);
+  const HttpResponse answer = post("registrar", "/api/sessions/b/choose", chosen);
+  ASSERT_EQ(answer.status, 200) << answer.body;
+  const std::string name = session_name({"1.2.7", "1.2.8"});
+  EXPECT_EQ(Json::parse(answer.body).at("session"), name);
+  EXPECT_EQ(tree_.choice(name)->plan.words, "the RT Plan B");
+  EXPECT_EQ(tree_.choice(name)->by, "registrar");
+  EXPECT_THAT(text_of(tree_.path() / "audit.jsonl"), HasSubstr(R"("event":"chosen")"));
+  EXPECT_THAT(text_of(tree_.path() / "audit.jsonl"), Not(HasSubstr("1.2.7"))) << "no UIDs";
+  chosen["plan"] = "1.3.3";
+  EXPECT_EQ(post("registrar", "/api/sessions/b/choose", chosen).status, 409) << "nobody offered it";
+  chosen["plan"] = "1.3.1";
+  chosen["reason"] = "";
+  EXPECT_EQ(post("registrar", "/api/sessions/b/choose", chosen).status, 400);
+  EXPECT_EQ(post("registrar", "/api/sessions/b/choose", {{"xrays", "1.2.7"}}).status, 400);
+}
+
 TEST_F(ScreenTest, WhoMayRegisterDoesSoByHand) {
   const std::string address = "/api/sessions/" + a_ + "/manual/study";
   EXPECT_EQ(get(address, "releaser").status, 403);

@@ -14,8 +14,10 @@ import time
 import urllib.error
 import urllib.request
 
+from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
+from selenium.webdriver.support.ui import Select
 
 ROOT = pathlib.Path(__file__).resolve().parents[1]
 sys.path += [str(ROOT / "io/report"), str(ROOT / "workflow/room")]
@@ -32,6 +34,17 @@ def answer_to(address):
         return urllib.request.urlopen(address).status
     except urllib.error.HTTPError as error:
         return error.code
+
+
+def colored(browser, color):
+    """How many pixels of the first view have nearly this color."""
+    return browser.execute_script("""
+        const canvas = document.querySelector("figure.view canvas");
+        const data = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height).data;
+        let count = 0;
+        for (let at = 0; at < data.length; at += 4)
+          if (arguments[0].every((value, n) => Math.abs(data[at + n] - value) < 40)) ++count;
+        return count;""", color)
 
 
 def main(program, work):
@@ -81,7 +94,33 @@ def main(program, work):
         wait_for(lambda: abs(float(one("#x").get_attribute("value")) - 15) < 0.2, 10, "the pose that was found")
         browser.save_screenshot(str(work / "found.png"))
 
-        # Another registration can be given up, and leaves nothing; a pose can be kept as it is.
+#Landmarks bring the patient near, and outlines are drawn.
+        one("#as-planned").click()
+        wait_for(lambda: shown() == [0, 0, 0], 10, "the DRRs as planned")
+        wait_for(lambda: "256 x 256" in one("#times").text, 10, "the DRRs at rest")
+        select = Select(one("#part"))
+        before = colored(browser, (230, 159, 0))
+        select.select_by_index(1)
+        wait_for(lambda: colored(browser, (230, 159, 0)) > before + 100, 10, "the outline")
+        one("#mark").click()
+        views = browser.execute_async_script("fetch('/api/manual/study').then(r => r.json()).then(arguments[0])")["views"]
+        for number, view in enumerate(views):
+            still = view["isocenter_px"]
+            moved = [at + sum(px * mm for px, mm in zip(row, truth["translation_mm"]))
+                     for at, row in zip(still, view["px_per_mm"])]
+            xray, drr = browser.find_elements(By.CSS_SELECTOR, "figure.view")[number].find_elements(By.TAG_NAME, "canvas")
+            for canvas, at in ((xray, moved), (drr, still)):
+                edge = canvas.size["width"]
+                dx, dy = ((value + 0.5) / size * edge - edge / 2 for value, size in zip(at, view["sizes"][0]))
+                ActionChains(browser).move_to_element_with_offset(canvas, round(dx), round(dy)).click().perform()
+        browser.save_screenshot(str(work / "landmarks.png"))
+        one("#fit").click()
+        wait_for(lambda: max(abs(a - b) for a, b in zip(shown(), truth["translation_mm"])) < 1.5, 10,
+                 f"the pose of the landmark near {truth['translation_mm']}")
+        expect("Moved by 1 landmark" in one("#landmarks").text, one("#landmarks").text)
+        one("#mark").click()
+
+#Another registration can be given up, and leaves nothing; a pose can be kept as it is.
         one("#optimize").click()
         wait_for(lambda: one("#cancel").is_displayed(), 10, "the button that cancels")
         one("#cancel").click()
@@ -92,9 +131,21 @@ def main(program, work):
         kept = json.loads((results / "2" / "result.json").read_text())
         expect(kept["verdict"] == "review" and not kept["searched"], f"{kept['verdict']}, searched: {kept['searched']}")
         one("#undo").click()
-        wait_for(lambda: [round(mm) for mm in shown()] == [13, -12, 12], 10, "the DRRs of the pose before")
+        wait_for(lambda: shown() == [0, 0, 0], 10, "the DRRs of the pose before")
 
-        # A result is looked at again.
+#Only what lies in a box is compared.
+        one("input[value=blend]").click()
+        one("#box").click()
+        canvas = browser.find_element(By.CSS_SELECTOR, "figure.view canvas")
+        ActionChains(browser).move_to_element_with_offset(canvas, -100, -80).click_and_hold().move_by_offset(180, 150).release().perform()
+        one("#box").click()
+        browser.save_screenshot(str(work / "box.png"))
+        one("#keep").click()
+        wait_for(lambda: (results / "3" / "result.json").exists(), 60, "the result of the box")
+        region = json.loads((results / "3" / "result.json").read_text())["region"]
+        expect(len(region) == 1 and region[0].startswith("rectangle " + views[0]["label"] + "="), f"compared: {region}")
+
+#A result is looked at again.
         view.kill()
         view.wait()
         view = subprocess.Popen([program, "view", study, "-o", results, "--start", results / "1" / "result.json"],

@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <fstream>
 #include <thread>
 
 #include "serve/view_screen.h"
@@ -16,6 +17,8 @@ namespace {
 
 using Json = nlohmann::json;
 using namespace std::chrono_literals;
+
+const Json kEverything = {{"part", nullptr}, {"boxes", {nullptr, nullptr}}};
 
 class ViewTest : public testing::Test {
  protected:
@@ -77,7 +80,7 @@ TEST_F(ViewTest, TheAddressOpensOnceAndNothingElseDoes) {
                 .answer({.method = "POST",
                          .path = "/api/manual/begin",
                          .headers = {{"cookie", cookie_}, {"content-type", "application/json"}},
-                         .body = Json{{"setup_error", pose(0)}, {"searched", true}}.dump()})
+                         .body = Json{{"setup_error", pose(0)}, {"searched", true}, {"region", kEverything}}.dump()})
                 .status,
             403)
       << "without the token";
@@ -132,8 +135,11 @@ TEST_F(ViewTest, WhatIsNoPoseIsRefused) {
 
 TEST_F(ViewTest, ARegistrationRunsFromThePoseAndTellsHowFarItIs) {
   EXPECT_EQ(Json::parse(get("/api/manual/state").body).at("state"), "idle");
-  EXPECT_EQ(post("/api/manual/begin", {{"setup_error", pose(3)}, {"searched", true}}).status, 200);
-  EXPECT_EQ(post("/api/manual/begin", {{"setup_error", pose(3)}, {"searched", true}}).status, 409) << "one at a time";
+  EXPECT_EQ(post("/api/manual/begin", {{"setup_error", pose(3)}, {"searched", true}, {"region", kEverything}}).status,
+            200);
+  EXPECT_EQ(post("/api/manual/begin", {{"setup_error", pose(3)}, {"searched", true}, {"region", kEverything}}).status,
+            409)
+      << "one at a time";
   std::set<std::string> steps;
   Json state = Json::parse(get("/api/manual/state").body);
   for (; state.at("state") == "runs"; state = Json::parse(get("/api/manual/state").body)) {
@@ -144,15 +150,73 @@ TEST_F(ViewTest, ARegistrationRunsFromThePoseAndTellsHowFarItIs) {
   EXPECT_TRUE(steps.contains("Registering")) << testing::PrintToString(steps);
   EXPECT_EQ(get("/api/manual/report.html").status, 200);
   EXPECT_EQ(Json::parse(get("/api/manual/state").body).at("folder"), (files_.output() / "1").string());
-  EXPECT_EQ(post("/api/manual/begin", {{"setup_error", pose(3)}, {"searched", false}}).status, 200);
+  EXPECT_EQ(post("/api/manual/begin", {{"setup_error", pose(3)}, {"searched", false}, {"region", kEverything}}).status,
+            200);
   state = end_of_registration();
   EXPECT_EQ(state.at("verdict"), "review");
   EXPECT_EQ(state.at("folder"), (files_.output() / "2").string());
   EXPECT_NEAR(read_setup_error(files_.output() / "2" / "result.json").translation().x(), 3.0, 1e-9);
 }
 
+TEST_F(ViewTest, OnlyAPartAndABoxAreRegistered) {
+  const Json study = Json::parse(get("/api/manual/study").body);
+  const auto part_named = [&](const std::string& beginning) {
+    std::size_t n = 0;
+    while (n < study.at("parts").size() && !study.at("parts")[n].get<std::string>().starts_with(beginning)) ++n;
+    return n;
+  };
+  const std::size_t structure = part_named("structure "), body = part_named("body ");
+  ASSERT_LT(structure, body);
+  ASSERT_LT(body, study.at("parts").size());
+  const Json region = {{"part", body}, {"boxes", {{10, 12, 60, 70}, nullptr}}};
+  EXPECT_EQ(post("/api/manual/begin", {{"setup_error", pose(0)}, {"searched", true}, {"region", region}}).status, 200);
+  const Json end = end_of_registration();
+  ASSERT_EQ(end.at("state"), "ended") << end;
+  const Json result = Json::parse(std::ifstream(files_.output() / "1" / "result.json"));
+  const std::string label = study.at("views")[0].at("label");
+  EXPECT_THAT(result.at("region").dump(), testing::HasSubstr("body 1, margin 5 mm"));
+  EXPECT_THAT(result.at("region").dump(), testing::HasSubstr("rectangle " + label + "=10,12,60,70"));
+  const Json wrong = {{"part", 1000}, {"boxes", Json::array()}};
+  EXPECT_EQ(post("/api/manual/begin", {{"setup_error", pose(0)}, {"searched", true}, {"region", wrong}}).status, 409);
+}
+
+TEST_F(ViewTest, OutlinesMoveWithThePatient) {
+  const auto first_column = [&](double x_mm) {
+    const HttpResponse answer = post("/api/manual/outlines", {{"setup_error", pose(x_mm)}, {"part", 0}});
+    EXPECT_EQ(answer.status, 200) << answer.body;
+    double least = 1e9;
+    const Json views = Json::parse(answer.body).at("views");
+    for (const Json& polygon : views.at(0))
+      for (const Json& point : polygon) least = std::min(least, point.at(0).get<double>());
+    return least;
+  };
+  const double px_per_mm = study_.views()[0].px_per_mm(0, 0);
+  EXPECT_NEAR(first_column(10.0) - first_column(0.0), 10.0 * px_per_mm, 1.5);
+  EXPECT_EQ(post("/api/manual/outlines", {{"setup_error", pose(0)}, {"part", 1000}}).status, 400);
+}
+
+TEST_F(ViewTest, LandmarksGiveAPose) {
+  Json xrays = Json::array(), drrs = Json::array();
+  for (const XrayView& camera : study_.cameras()) {
+    const Eigen::Vector2d moved = camera.project({15, 5, 5}).value(), still = camera.project({5, 5, 5}).value();
+    xrays.push_back({moved.x(), moved.y()});
+    drrs.push_back({still.x(), still.y()});
+  }
+  const HttpResponse answer =
+      post("/api/manual/landmarks", {{"setup_error", pose(2)}, {"landmarks", {{{"xrays", xrays}, {"drrs", drrs}}}}});
+  ASSERT_EQ(answer.status, 200) << answer.body;
+  EXPECT_NEAR(Json::parse(answer.body).at("setup_error").at("translation_mm").at(0).get<double>(), 12.0, 1e-6);
+  drrs[1] = nullptr;
+  EXPECT_EQ(
+      post("/api/manual/landmarks", {{"setup_error", pose(2)}, {"landmarks", {{{"xrays", xrays}, {"drrs", drrs}}}}})
+          .status,
+      409);
+  EXPECT_EQ(post("/api/manual/landmarks", {{"setup_error", pose(2)}}).status, 400);
+}
+
 TEST_F(ViewTest, WhatIsCancelledLeavesNothing) {
-  EXPECT_EQ(post("/api/manual/begin", {{"setup_error", pose(0)}, {"searched", true}}).status, 200);
+  EXPECT_EQ(post("/api/manual/begin", {{"setup_error", pose(0)}, {"searched", true}, {"region", kEverything}}).status,
+            200);
   EXPECT_EQ(Json::parse(post("/api/manual/cancel", Json::object()).body).at("state"), "idle");
   EXPECT_TRUE(std::filesystem::is_empty(files_.output()));
 }

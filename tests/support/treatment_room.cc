@@ -103,10 +103,16 @@ void FakeSource::forget_before(std::filesystem::file_time_type time, const std::
   }
 }
 
-void FakeRunner::begin(const StudyParts& parts, const std::filesystem::path& folder) {
-  Run& run = runs_.emplace_back(Run{.xrays = {}, .doubts = parts.doubts, .began = clock_.now()});
+void FakeRunner::begin(const RegistrationOrder& order) {
+  const StudyParts& parts = order.parts;
+  Run& run = runs_.emplace_back(Run{.xrays = {},
+                                    .doubts = parts.doubts,
+                                    .flags = order.flags,
+                                    .plan = parts.plan.filename().string(),
+                                    .ct = parts.ct.front().filename().string(),
+                                    .began = clock_.now()});
   for (const auto& image : parts.images) run.xrays.insert(image.filename().string());
-  folder_ = folder;
+  folder_ = order.output;
   is_running_ = true;
 }
 

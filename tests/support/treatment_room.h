@@ -89,6 +89,8 @@ class FakeRunner : public Runner {
   struct Run {
     std::set<std::string> xrays;      // SOPInstanceUIDs
     std::vector<std::string> doubts;  // whether they show one setup
+    std::vector<std::string> flags;   // of isoshift register
+    std::string plan, ct;             // names of the plan's and the first CT file
     Clock::Time began;
   };
   std::function<Verdict(const std::set<std::string>& xrays)> verdict = [](const auto&) { return Verdict::kAccepted; };
@@ -99,7 +101,7 @@ class FakeRunner : public Runner {
   const std::vector<Run>& runs() const { return runs_; }
   bool is_running() const { return is_running_; }
 
-  void begin(const StudyParts& parts, const std::filesystem::path& folder) override;
+  void begin(const RegistrationOrder& order) override;
   std::optional<End> end() override;
   void give_up() override { is_running_ = false; }
 

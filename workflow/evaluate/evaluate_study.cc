@@ -81,6 +81,7 @@ Json configuration_of(const EvaluateOptions& options, const Study& study, const 
           {"dof", request.search.dof},
           {"check_vertebrae", request.search.check_vertebrae},
           {"structures", request.region.structures},
+          {"bodies", request.region.bodies},
           {"excluded", request.region.excluded},
           {"around_isocenter_mm", request.region.around_isocenter_mm.value_or(0.0)},
           {"margin_mm", request.region.margin_mm},

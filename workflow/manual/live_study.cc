@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "io/dicom/structure_mask.h"
 #include "registration/preprocess/image_operations.h"
+#include "workflow/register/study_bodies.h"
 #include "workflow/register/view_pictures.h"
 
 namespace isoshift {
@@ -18,13 +20,14 @@ Study loaded(const StudyOptions& options, Observer& observer) {
   return study;
 }
 
-LiveStudy::View view_of(const FixedImage& image, const Eigen::Isometry3d& planned_room_from_patient) {
+LiveStudy::View view_of(const FixedImage& image, int block, const Eigen::Isometry3d& planned_room_from_patient) {
   LiveStudy::View view{.label = image.label,
                        .xray = GrayScale::of(image.line_integral, image.field)(image.line_integral),
                        .isocenter_px = image.view.project(Eigen::Vector3d::Zero()).value(),
                        .px_per_mm = pixels_of_steps(image.view, Eigen::Matrix3d::Identity()),
                        .from_source = image.view.central_direction_room(),
                        .field = outlines(image.field),
+                       .block = block,
                        .directions = directions_at_edges(image.view, planned_room_from_patient)};
   return view;
 }
@@ -37,8 +40,9 @@ LiveStudy::LiveStudy(const StudyOptions& options, Observer& observer) : study_(l
   std::vector<FixedImage> images = prepared(study_.xrays);
   for (FixedImage& image : images) {
     const int edge = std::max(image.view.columns, image.view.rows);
-    image = reduced(image, (edge + kMaxEdge - 1) / kMaxEdge);
-    views_.push_back(view_of(image, study_.planned_room_from_patient));
+    const int block = (edge + kMaxEdge - 1) / kMaxEdge;
+    image = reduced(image, block);
+    views_.push_back(view_of(image, block, study_.planned_room_from_patient));
   }
   int factor = 1;
   for (Level& level : levels_) {
@@ -53,6 +57,49 @@ LiveStudy::LiveStudy(const StudyOptions& options, Observer& observer) : study_(l
   const std::vector<Image<float>> planned = line_integrals(Eigen::Isometry3d::Identity(), levels_.front());
   for (std::size_t n = 0; n < images.size(); ++n)
     grays_.push_back(GrayScale::like(planned[n], views_[n].xray, images[n].field));
+  observer.progress("finding bodies", 0.0);
+  find_parts();
+}
+
+void LiveStudy::find_parts() {
+  const RtStructures* const structures = study_.structures ? &*study_.structures : nullptr;
+  if (structures != nullptr)
+    for (const Structure& structure : structures->structures) {
+      const bool is_here = structure.frame_of_reference_uid.value_or(study_.ct->frame_of_reference_uid) ==
+                           study_.ct->frame_of_reference_uid;
+      if (!is_here || structure.contours.empty()) continue;
+      structures_.push_back(structure.name);
+      parts_.push_back({"structure " + structure.name, {"--structure", structure.name}});
+    }
+  bodies_ = bodies_of(*study_.ct, structures);
+  for (int number = 1; number <= static_cast<int>(bodies_.bodies.size()); ++number) {
+    if (bodies_.bodies[static_cast<std::size_t>(number - 1)].kind == Body::Kind::kCouch) continue;
+    body_numbers_.push_back(number);
+    parts_.push_back({body_in_words(bodies_, number), {"--body", std::to_string(number)}});
+  }
+}
+
+Volume<std::uint8_t> LiveStudy::mask_of_part(std::size_t part) const {
+  const Volume<float>& ct = study_.ct->hu;
+  if (part < structures_.size())
+    return mask_of(structure_named(*study_.structures, structures_[part]), ct.size, ct.patient_from_voxel);
+  return body_mask(bodies_, body_numbers_.at(part - structures_.size()), ct);
+}
+
+std::vector<std::vector<Polygon>> LiveStudy::outlines_of(std::size_t part, const Eigen::Isometry3d& setup_error) const {
+  const ProjectedRegion* shown = nullptr;
+  {
+    const std::lock_guard lock(projected_mutex_);
+    auto found = projected_.find(part);
+    if (found == projected_.end())
+      found = projected_.emplace(part, ProjectedRegion({.volume = mask_of_part(part), .excluded = {}, .cut_ends = {}}))
+                  .first;
+    shown = &found->second;
+  }
+  std::vector<std::vector<Polygon>> outlines;
+  for (const XrayView& camera : cameras())
+    outlines.push_back(silhouette(*shown, camera, setup_error * study_.planned_room_from_patient));
+  return outlines;
 }
 
 std::vector<Image<float>> LiveStudy::line_integrals(const Eigen::Isometry3d& setup_error, const Level& level) const {

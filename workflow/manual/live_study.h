@@ -4,14 +4,19 @@
 #include <Eigen/Geometry>
 #include <array>
 #include <cstdint>
+#include <map>
 #include <memory>
+#include <mutex>
+#include <span>
 #include <string>
 #include <vector>
 
+#include "bodies/body_map.h"
 #include "drr/renderer_pyramid.h"
 #include "io/report/view_picture.h"
 #include "io/study/study.h"
 #include "registration/preprocess/preprocess.h"
+#include "registration/region.h"
 #include "workflow/observer.h"
 #include "workflow/register/study_options.h"
 
@@ -31,10 +36,22 @@ class LiveStudy {
     Eigen::Matrix<double, 2, 3> px_per_mm = Eigen::Matrix<double, 2, 3>::Zero();
     Eigen::Vector3d from_source = Eigen::Vector3d::Zero();  // the direction of the central ray, of length 1
     std::vector<Polygon> field;                             // outlines of what registration compares
+    int block = 1;                                          // pixels of the image as taken along an edge of one here
     std::array<std::string, 4> directions;                  // of the patient: at the left, right, upper and lower edge
   };
   const std::vector<View>& views() const { return views_; }
   const Study& study() const { return study_; }
+  // As the pictures show them: pixels at full detail.
+  std::span<const XrayView> cameras() const { return levels_.front().cameras; }
+
+  // A structure or a body, which can be shown and registered alone.
+  struct Part {
+    std::string words;               // "structure PTV", "body 4: vertebra"
+    std::vector<std::string> flags;  // of isoshift register: only this
+  };
+  const std::vector<Part>& parts() const { return parts_; }
+  // The outlines of a part in every view, for a patient with this setup error.
+  std::vector<std::vector<Polygon>> outlines_of(std::size_t part, const Eigen::Isometry3d& setup_error) const;
 
   // The DRR of every view as its X-ray shows it, of the X-ray's size, or a half or a quarter of that along an edge, for
   // a patient with this setup error (room, IEC 61217 fixed, about the isocenter). A line integral has the same gray
@@ -47,6 +64,8 @@ class LiveStudy {
     std::vector<XrayView> cameras;
     Renderer* renderer = nullptr;  // of the pyramid
   };
+  void find_parts();
+  Volume<std::uint8_t> mask_of_part(std::size_t part) const;
   std::vector<Image<float>> line_integrals(const Eigen::Isometry3d& setup_error, const Level& level) const;
 
   Study study_;
@@ -54,6 +73,12 @@ class LiveStudy {
   std::unique_ptr<RendererPyramid> renderers_;
   std::array<Level, 3> levels_;   // by Detail
   std::vector<GrayScale> grays_;  // of the DRR of every view
+  BodyMap bodies_;
+  std::vector<Part> parts_;              // the structures, then the bodies
+  std::vector<std::string> structures_;  // names of the first parts
+  std::vector<int> body_numbers_;        // of the others
+  mutable std::mutex projected_mutex_;
+  mutable std::map<std::size_t, ProjectedRegion> projected_;  // parts that were shown
 };
 
 }  // namespace isoshift

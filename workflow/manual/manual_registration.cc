@@ -2,6 +2,10 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <iterator>
+#include <set>
+
 #include "base/error.h"
 #include "base/output_folder.h"
 #include "workflow/register/setup_error_json.h"
@@ -16,18 +20,34 @@ fs::path next_in(const fs::path& results) {
     if (const fs::path next = results / std::to_string(number); !fs::exists(next)) return next;
 }
 
+// Flags as they are typed: "--body 3" or "--body=3".
+std::vector<std::string> with_region(const std::vector<std::string>& flags, const std::vector<std::string>& region) {
+  static const std::set<std::string> of_region = {"--structure", "--body", "--around-isocenter", "--rectangle"};
+  std::vector<std::string> all;
+  for (std::size_t n = 0; n < flags.size(); ++n) {
+    if (!of_region.contains(flags[n].substr(0, flags[n].find('='))))
+      all.push_back(flags[n]);
+    else if (of_region.contains(flags[n]))
+      ++n;  // its value
+  }
+  std::ranges::copy(region, std::back_inserter(all));
+  return all;
+}
+
 }  // namespace
 
 ManualRegistration::ManualRegistration(RegistrationOrder order, fs::path results)
     : order_(std::move(order)), results_(std::move(results)) {}
 
-void ManualRegistration::begin(const Eigen::Isometry3d& setup_error, const std::string& by, bool is_searched) {
+void ManualRegistration::begin(const Eigen::Isometry3d& setup_error, const std::string& by, bool is_searched,
+                               const std::vector<std::string>& region) {
   const std::lock_guard lock(mutex_);
   look();
   if (running_) throw Error("A registration runs. Wait for its end, or cancel it.");
   fs::create_directories(results_);
   output_ = next_in(results_);
   RegistrationOrder order = order_;
+  if (!region.empty()) order.flags = with_region(order_.flags, region);
   order.start = pose_file();
   order.is_searched = is_searched;
   order.output = output_;

@@ -9,6 +9,7 @@
 #include "base/error.h"
 #include "geometry/mask.h"
 #include "io/dicom/structure_mask.h"
+#include "workflow/register/study_bodies.h"
 
 namespace isoshift {
 namespace {
@@ -74,6 +75,7 @@ std::vector<std::string> RegionOptions::in_words() const {
   words.reserve(structures.size());
   for (const std::string& name : structures)
     words.push_back(fmt::format("structure {}, margin {} mm", name, margin_mm));
+  for (const int body : bodies) words.push_back(fmt::format("body {}, margin {} mm", body, margin_mm));
   if (around_isocenter_mm) words.push_back(fmt::format("within {} mm of the isocenter", *around_isocenter_mm));
   for (const std::string& name : excluded) words.push_back(fmt::format("without {}, margin {} mm", name, margin_mm));
   for (const std::string& rectangle : rectangles) words.push_back(fmt::format("rectangle {}", rectangle));
@@ -93,12 +95,17 @@ RegionOfStudy region_of(const RegionOptions& options, const Study& study, double
                       "registered without the switch",
                       *options.around_isocenter_mm));
   }
-  for (const std::string& name : options.structures) {
-    const Volume<std::uint8_t> mask = dilated(mask_in_ct(study, name), options.margin_mm);
+  const auto add = [&](const Volume<std::uint8_t>& exact) {
+    const Volume<std::uint8_t> mask = dilated(exact, options.margin_mm);
     if (region.volume)
       unite(*region.volume, mask);
     else
       region.volume = mask;
+  };
+  for (const std::string& name : options.structures) add(mask_in_ct(study, name));
+  if (!options.bodies.empty()) {
+    const BodyMap map = bodies_of(*study.ct, study.structures ? &*study.structures : nullptr);
+    for (const int body : options.bodies) add(body_mask(map, body, study.ct->hu));
   }
   if (region.volume) result.rendered_ct = only_inside(study.ct->hu, dilated(*region.volume, kRenderedBeyondMm));
   region.cut_ends = beyond_the_ct(study.ct->hu, threshold_hu);

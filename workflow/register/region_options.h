@@ -14,6 +14,7 @@ namespace isoshift {
 
 struct RegionOptions {
   std::vector<std::string> structures, excluded, rectangles;
+  std::vector<int> bodies;  // numbers (study_bodies.h)
   std::optional<double> around_isocenter_mm;
   double margin_mm = 5.0;
 
@@ -31,7 +32,8 @@ struct RegionOfStudy {
   std::optional<Volume<float>> rendered_ct;
   ProjectedRegion projected;
 };
-// Throws UsageError for a radius that is not positive or holds the whole CT, and Error for a structure the study lacks.
+// Throws UsageError for a radius that is not positive or holds the whole CT and for a body that there is not, and Error
+// for a structure the study lacks.
 RegionOfStudy region_of(const RegionOptions& options, const Study& study, double threshold_hu);
 
 }  // namespace isoshift

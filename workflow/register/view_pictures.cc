@@ -10,14 +10,6 @@ namespace {
 
 constexpr int kMaxEdge = 640;
 
-std::vector<Polygon> silhouette(const ProjectedRegion& structure, const XrayView& view, const Eigen::Isometry3d& pose) {
-  FixedImage shadow{.view = view,
-                    .line_integral = Image<float>(view.columns, view.rows),
-                    .field = Image<std::uint8_t>(view.columns, view.rows, 1)};
-  structure.restrict(shadow, pose, 0.0);
-  return outlines(shadow.field);
-}
-
 // An arrow as a closed line: its head is a triangle.
 Polygon arrow(const Eigen::Vector2d& from, const Eigen::Vector2d& tip) {
   constexpr double kLongestHeadPx = 12.0;
@@ -28,6 +20,15 @@ Polygon arrow(const Eigen::Vector2d& from, const Eigen::Vector2d& tip) {
 }
 
 }  // namespace
+
+std::vector<Polygon> silhouette(const ProjectedRegion& region, const XrayView& view,
+                                const Eigen::Isometry3d& room_from_patient) {
+  FixedImage shadow{.view = view,
+                    .line_integral = Image<float>(view.columns, view.rows),
+                    .field = Image<std::uint8_t>(view.columns, view.rows, 1)};
+  region.restrict(shadow, room_from_patient, 0.0);
+  return outlines(shadow.field);
+}
 
 Eigen::Matrix<double, 2, 3> pixels_of_steps(const XrayView& view, const Eigen::Matrix3d& steps_room_mm) {
   const Eigen::Vector2d isocenter = view.project(Eigen::Vector3d::Zero()).value();

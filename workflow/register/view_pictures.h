@@ -10,6 +10,7 @@
 #include "io/report/view_picture.h"
 #include "io/study/study.h"
 #include "registration/preprocess/preprocess.h"
+#include "registration/region.h"
 #include "setup/registration.h"
 
 namespace isoshift {
@@ -21,6 +22,10 @@ struct MarkedStructure {
 
 // Where steps in the room (a column each, mm) take a point on the image that lies at the isocenter: columns and rows.
 Eigen::Matrix<double, 2, 3> pixels_of_steps(const XrayView& view, const Eigen::Matrix3d& steps_room_mm);
+
+// The outlines of a region on an image.
+std::vector<Polygon> silhouette(const ProjectedRegion& region, const XrayView& view,
+                                const Eigen::Isometry3d& room_from_patient);
 
 // The directions of the patient at the left, right, upper and lower edge of the image: "R", "LA".
 std::array<std::string, 4> directions_at_edges(const XrayView& view, const Eigen::Isometry3d& room_from_patient);

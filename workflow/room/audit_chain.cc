@@ -27,11 +27,13 @@ void settle(const Json& line, AuditChain& chain) {
 
 }  // namespace
 
-std::string link_of(const Json& line) {
+std::string text_in(const Json& line, const char* key) {
   if (!line.is_object()) return "";
-  const auto found = line.find(kLink);
+  const auto found = line.find(key);
   return found != line.end() && found->is_string() ? found->get<std::string>() : "";
 }
+
+std::string link_of(const Json& line) { return text_in(line, kLink); }
 
 void link(Json& line, std::string_view covered) { line[kLink] = sha256_of(covered); }
 

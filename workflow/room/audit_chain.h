@@ -13,6 +13,9 @@
 
 namespace isoshift {
 
+// A text of a line; empty where it has none.
+std::string text_in(const nlohmann::ordered_json& line, const char* key);
+
 // The link of a line; empty where it has none.
 std::string link_of(const nlohmann::ordered_json& line);
 

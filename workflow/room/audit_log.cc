@@ -47,11 +47,6 @@ std::string end_of_log(int descriptor, off_t size) {
 }
 
 // Empty where the line has no such text.
-std::string text_of(const Json& line, const char* key) {
-  const auto found = line.find(key);
-  return found != line.end() && found->is_string() ? found->get<std::string>() : "";
-}
-
 bool has(const std::map<std::string, std::string>& entries, const std::string& key, const std::string& value) {
   const auto found = entries.find(key);
   return found != entries.end() && found->second == value;
@@ -133,18 +128,18 @@ void AuditLog::Proofs::add_lines(const std::string& text) {
 // A line that was cut off proves nothing.
 void AuditLog::Proofs::add(const Json& line) {
   if (!line.is_object()) return;
-  const std::string event = text_of(line, "event"), session = text_of(line, "session");
-  if (event == "registered") registrations[session] = text_of(line, "record");
-  if (event == "sent") sendings.insert({session, text_of(line, "peer"), text_of(line, "object")});
-  if (event == "objection") objections[session] = text_of(line, "objection");
-  if (event == "decided") decisions[session] = text_of(line, "file");
+  const std::string event = text_in(line, "event"), session = text_in(line, "session");
+  if (event == "registered") registrations[session] = text_in(line, "record");
+  if (event == "sent") sendings.insert({session, text_in(line, "peer"), text_in(line, "object")});
+  if (event == "objection") objections[session] = text_in(line, "objection");
+  if (std::ranges::find(kStatements, event) != kStatements.end()) statements[{event, session}] = text_in(line, "file");
   if (event == "not released") releases.erase(session);
   if (event != "released") return;
-  releases[session] = text_of(line, "release");
+  releases[session] = text_in(line, "release");
   release_numbers[session] = ++releases_so_far;
   if (line.contains("objects") && line["objects"].is_array())
     for (const Json& object : line["objects"])
-      if (object.is_object()) objects.emplace(text_of(object, "sha256"), session);
+      if (object.is_object()) objects.emplace(text_in(object, "sha256"), session);
 }
 
 void AuditLog::refuse_another_log() const {
@@ -211,9 +206,9 @@ std::string AuditLog::newest_objection(const std::string& session) const {
   return found == proofs().objections.end() ? "" : found->second;
 }
 
-std::string AuditLog::newest_decision(const std::string& session) const {
-  const auto found = proofs().decisions.find(session);
-  return found == proofs().decisions.end() ? "" : found->second;
+std::string AuditLog::newest_statement(const std::string& event, const std::string& session) const {
+  const auto found = proofs().statements.find({event, session});
+  return found == proofs().statements.end() ? "" : found->second;
 }
 
 bool AuditLog::has_sending(const std::string& session, const std::string& peer,

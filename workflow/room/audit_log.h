@@ -19,7 +19,10 @@
 
 namespace isoshift {
 
-// In the file of a release or decision: the head of the audit log that it saw.
+// Events in which people say something about a session, each in a file (statement_files.h).
+inline constexpr std::array kStatements = {"decided", "chosen"};
+
+// In the file of a release or statement: the head of the audit log that it saw.
 inline constexpr const char* kAuditHeadKey = "audit_head";
 
 class AuditLog {
@@ -54,8 +57,9 @@ class AuditLog {
   bool has_sending(const std::string& session, const std::string& peer, const std::string& object_sha256) const;
   // The SHA-256 of the newest objection to the session's result; empty if there is none.
   std::string newest_objection(const std::string& session) const;
-  // The SHA-256 of the file of the newest decision about the session; empty if there is none.
-  std::string newest_decision(const std::string& session) const;
+  // The SHA-256 of the file of what a person has last said about the session in lines of this event (kStatements);
+  // empty if there is none.
+  std::string newest_statement(const std::string& event, const std::string& session) const;
   // The session with which an object was released; nothing if the object was not released.
   std::optional<std::string> session_releasing(const std::string& object_sha256) const;
 
@@ -66,9 +70,9 @@ class AuditLog {
     timespec written{};
   };
   struct Proofs {
-    std::map<std::string, std::string> registrations;    // SHA-256 of the newest record, by session
-    std::map<std::string, std::string> objections;       // SHA-256 of the newest one, by session
-    std::map<std::string, std::string> decisions;        // SHA-256 of the file of the newest one, by session
+    std::map<std::string, std::string> registrations;                       // SHA-256 of the newest record, by session
+    std::map<std::string, std::string> objections;                          // SHA-256 of the newest one, by session
+    std::map<std::pair<std::string, std::string>, std::string> statements;  // SHA-256 of the file, by event and session
     std::map<std::string, std::string> releases;         // SHA-256 of the newest release file, by session
     std::map<std::string, std::size_t> release_numbers;  // by session
     std::size_t releases_so_far = 0;

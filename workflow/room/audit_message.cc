@@ -6,6 +6,8 @@
 #include <array>
 #include <string_view>
 
+#include "workflow/room/audit_chain.h"
+
 namespace isoshift {
 namespace {
 
@@ -60,16 +62,11 @@ std::string participant(const std::string& user, bool is_requestor, const std::o
                      is_requestor, more, role ? code("RoleIDCode", *role) : "");
 }
 
-std::string text_of(const Json& line, const char* key) {
-  const auto found = line.find(key);
-  return found != line.end() && found->is_string() ? found->get<std::string>() : "";
-}
-
-const Event* event_of(const Json& line) { return std::ranges::find(kEvents, text_of(line, "event"), &Event::name); }
+const Event* event_of(const Json& line) { return std::ranges::find(kEvents, text_in(line, "event"), &Event::name); }
 
 std::string participants(const Event& event, const Json& line, const AuditContext& context) {
   constexpr const char* kProgram = "isoshift";
-  const std::string person = text_of(line, "by");
+  const std::string person = text_in(line, "by");
   std::string text;
   if (!person.empty()) text += participant(person, true, std::nullopt);
   if (std::string_view(event.name) == "sent") {
@@ -109,13 +106,13 @@ std::optional<std::string> audit_message(const Json& line, const AuditContext& c
   if (event == kEvents.end()) return std::nullopt;
   std::string text = fmt::format(
       R"(<?xml version="1.0" encoding="UTF-8"?><AuditMessage><EventIdentification EventActionCode="{}" EventDateTime={} EventOutcomeIndicator="{}">)",
-      event->action, attribute(date_time(text_of(line, "on"))), event->outcome);
+      event->action, attribute(date_time(text_in(line, "on"))), event->outcome);
   text += code("EventID", event->id) + (event->type ? code("EventTypeCode", *event->type) : "");
   text += "</EventIdentification>" + participants(*event, line, context);
   text += fmt::format(
       R"(<AuditSourceIdentification AuditSourceID={}><AuditSourceTypeCode csd-code="4"/></AuditSourceIdentification>)",
       attribute(context.site));
-  if (!text_of(line, "session").empty()) text += objects(context);
+  if (!text_in(line, "session").empty()) text += objects(context);
   return text + "</AuditMessage>";
 }
 

@@ -2,10 +2,8 @@
 
 namespace isoshift {
 
-void ChildRunner::begin(const StudyParts& parts, const std::filesystem::path& folder) {
-  child_ = std::make_unique<RegistrationProcess>(
-      RegistrationOrder{.parts = parts, .flags = watch_.registration, .site = watch_.site.path, .output = folder},
-      limit_);
+void ChildRunner::begin(const RegistrationOrder& order) {
+  child_ = std::make_unique<RegistrationProcess>(order, limit_);
 }
 
 std::optional<Runner::End> ChildRunner::end() {

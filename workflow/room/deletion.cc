@@ -17,8 +17,8 @@ namespace {
 namespace fs = std::filesystem;
 
 // Those whose files and folders are named after sessions.
-constexpr std::array kFolders = {"sessions", "registered", "released", "sent",       "decided",
-                                 "orders",   "inputs",     "by_hand",  "handed_over"};
+constexpr std::array kFolders = {"sessions", "registered", "released", "sent",    "decided",
+                                 "chosen",   "orders",     "inputs",   "by_hand", "handed_over"};
 
 fs::path file_of(const fs::path& results, const std::string& session) {
   return results / "deleted" / (name_of_xrays(session) + ".json");

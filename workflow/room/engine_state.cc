@@ -30,7 +30,8 @@ void EngineFile::update(const EngineState& state) {
                                  {"patient_id", one.patient_id},
                                  {"acquired", one.acquired},
                                  {"why", one.why},
-                                 {"has_failed", one.has_failed}});
+                                 {"has_failed", one.has_failed},
+                                 {"options", json_of(one.options)}});
     replace_text(path_, json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
     std::filesystem::last_write_time(path_, clock_.file_time());
     written_ = state;
@@ -52,7 +53,8 @@ std::optional<EngineSeen> read_engine_state(const std::filesystem::path& results
                                     .patient_id = one.at("patient_id"),
                                     .acquired = one.at("acquired"),
                                     .why = one.at("why"),
-                                    .has_failed = one.at("has_failed")});
+                                    .has_failed = one.at("has_failed"),
+                                    .options = session_options_from(one.at("options"))});
   } catch (const nlohmann::json::exception& error) {
     throw Error(fmt::format("{}: is not what isoshift watch writes: {}", file.string(), error.what()));
   }

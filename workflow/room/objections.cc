@@ -23,8 +23,9 @@ std::optional<double> seconds_of(const std::string& acquired) {
 
 }  // namespace
 
-void Objections::add_result(const std::string& session, const SetupResult& result) {
+void Objections::add_result(const std::string& session, const SetupResult& result, bool is_chosen) {
   OfPatient& patient = patients_[result.identity.patient_id];
+  if (is_chosen) patient.chosen.insert(session);
   patient.is_news = true;
   std::set<Xray>& own = patient.results[session];
   for (const SetupResult::View& view : result.views) {
@@ -59,6 +60,7 @@ void Objections::see(const std::string& patient_id, const StudyFiles& files) {
         for (const auto& [session, own] : same.results)
           for (const auto& [uid, acquired] : own) patient_of_uid_[uid] = patient_id;
         patient.results.merge(same.results);
+        patient.chosen.merge(same.chosen);
         patient.xrays.merge(same.xrays);
       }
       patient.xrays[Xray(image.sop_instance_uid, image.acquired)] = {
@@ -89,7 +91,7 @@ void Objections::update(const std::map<std::string, Patient>& patients, const st
   for (auto& [patient_id, patient] : patients_) {
     if (!std::exchange(patient.is_news, false)) continue;
     for (const auto& [session, own] : patient.results) {
-      Objection found = objection(patient, own, registered);
+      Objection found = objection(patient, session, registered);
       if (const auto added = added_.find(session); added != added_.end())
         found = {.words = found.words + (found.words.empty() ? "" : "; ") + added->second};
       const auto earlier = by_session_.find(session);
@@ -134,10 +136,12 @@ Objection Objections::newer_xrays(const OfPatient& patient, const std::set<Xray>
           .newer_have_results = have_results && !acquired.empty()};
 }
 
-Objection Objections::objection(const OfPatient& patient, const std::set<Xray>& own,
+// Of X-rays that a person has grouped it is known that they would be grouped in another way.
+Objection Objections::objection(const OfPatient& patient, const std::string& session,
                                 const std::set<std::string>& registered) const {
+  const std::set<Xray>& own = patient.results.at(session);
   Objection found = newer_xrays(patient, own, registered);
-  if (!are_seen(patient, own)) return found;
+  if (patient.chosen.contains(session) || !are_seen(patient, own)) return found;
   StudyFiles all;
   for (const auto& [xray, seen] : patient.xrays)
     if (seen.image) (seen.is_rt_image ? all.images : all.other_xrays).push_back(*seen.image);

@@ -20,8 +20,8 @@
 #include "base/system_user.h"
 #include "io/report/result_folder.h"
 #include "workflow/room/audit_to_syslog.h"
-#include "workflow/room/decision_files.h"
 #include "workflow/room/signed_json.h"
+#include "workflow/room/statement_files.h"
 
 namespace isoshift {
 namespace {
@@ -33,37 +33,15 @@ constexpr const char* kAgain =
     "Nothing of the session is sent. To have its X-rays registered again, move the session's folder away and restart "
     "isoshift watch";
 
-std::vector<Delivery> deliveries_of(const Release& release) {
-  std::vector<Delivery> all;
-  for (const std::string& peer : release.peers)
-    for (const Release::Object& object : release.objects)
-      all.push_back({.session = release.session, .peer = peer, .object = object});
-  return all;
-}
-
-// A release as its file and its line in the audit log tell it.
-Json release_json(const Release& release) {
-  Json objects = Json::array();
-  for (const Release::Object& object : release.objects)
-    objects.push_back({{"file", object.file}, {"sha256", object.sha256}});
-  Json json = {{"session", release.session}, {"by", release.releaser.by}, {"user", release.releaser.user}};
-  if (!release.releaser.sudo_user.empty()) json["sudo_user"] = release.releaser.sudo_user;
-  json.update(
-      {{"verdict", release.verdict}, {"record", release.record}, {"objects", objects}, {"peers", release.peers}});
-  return json;
-}
-
-Release release_from(const nlohmann::json& json) {
-  Release release{.session = json.at("session"),
-                  .releaser = {.by = json.at("by"), .user = json.at("user"), .sudo_user = json.value("sudo_user", "")},
-                  .on = json.at("on"),
-                  .verdict = json.at("verdict"),
-                  .record = json.at("record"),
-                  .despite = json.value("despite", ""),
-                  .objects = {},
-                  .peers = json.at("peers")};
-  for (const auto& object : json.at("objects")) release.objects.push_back({object.at("file"), object.at("sha256")});
-  return release;
+// What a statement says, read by `from`.
+template <class From>
+auto as_stated(const nlohmann::json& statement, const std::string& session, From&& from) {
+  try {
+    return from(statement);
+  } catch (const std::exception& error) {
+    throw Error(fmt::format("session {}: what a person has said about it is of another version of isoshift: {}",
+                            session, error.what()));
+  }
 }
 
 constexpr const char* kObjectionsFile = "objections.json";
@@ -91,11 +69,6 @@ constexpr const char* kRegistering = ".registering-";
 
 }  // namespace
 
-std::string to_string(const Releaser& releaser) {
-  return fmt::format("{} (user {}{})", releaser.by, releaser.user,
-                     releaser.sudo_user.empty() ? "" : ", sudo of " + releaser.sudo_user);
-}
-
 void check_is_owner(const fs::path& results) {
   struct stat of_results{};
   if (::stat(results.c_str(), &of_results) == 0 && of_results.st_uid != ::geteuid())
@@ -105,9 +78,10 @@ void check_is_owner(const fs::path& results) {
                     results.string()));
 }
 
-ResultsTree::ResultsTree(fs::path path) : path_(std::move(path)), audit_(path_ / "audit.jsonl") {
-  for (const char* folder :
-       {"sessions", "registered", "released", "sent", "decided", "orders", "inputs", "handed_over", "deleted"}) {
+ResultsTree::ResultsTree(fs::path path)
+    : path_(std::move(path)), audit_(path_ / "audit.jsonl"), marks_(path_ / "sent") {
+  for (const char* folder : {"sessions", "registered", "released", "sent", "decided", "chosen", "orders", "inputs",
+                             "handed_over", "deleted"}) {
     std::error_code error;
     fs::create_directories(path_ / folder, error);
     if (error) throw Error(fmt::format("{}: cannot be made: {}", (path_ / folder).string(), error.message()));
@@ -355,13 +329,51 @@ void ResultsTree::decide(Decision decision) {
       throw Error(fmt::format("session {}: {}. Take that back first", decision.session, in_words(*before)));
   decision.user = system_user().name;
   decision.on = local_time();
-  put_decision(path_ / "decided", decision, audit_, key_);
+  put_statement(kDecisionStatement, path_, decision.session, json_of(decision),
+                {{"session", decision.session},
+                 {"decision", to_string(decision.kind)},
+                 {"by", decision.by},
+                 {"user", decision.user},
+                 {"record", decision.record}},
+                audit_, key_);
 }
 
 std::optional<Decision> ResultsTree::decision(const std::string& session) const {
-  const std::optional<Decision> newest = newest_decision(path_ / "decided", session, audit_, key_);
-  const bool stands = newest && newest->kind != DecisionKind::kReopened && newest->record == registered(session).sha256;
-  return stands ? newest : std::nullopt;
+  const auto statement = newest_statement(kDecisionStatement, path_, session, audit_, key_);
+  if (!statement) return std::nullopt;
+  Decision decision = as_stated(*statement, session, decision_from);
+  const bool stands = decision.kind != DecisionKind::kReopened && decision.record == registered(session).sha256;
+  return stands ? std::optional(std::move(decision)) : std::nullopt;
+}
+
+void ResultsTree::choose(Choice choice) {
+  const FileLock lock = lock_releases();
+  if (fs::exists(session(choice.session)))
+    throw Error(fmt::format("session {}: its X-rays have a result already", choice.session));
+  if (const auto before = this->choice(choice.session)) {
+    if (choice.patient.id.empty()) choice.patient = before->patient;
+    if (choice.plan.id.empty()) choice.plan = before->plan;
+    if (choice.ct.id.empty()) choice.ct = before->ct;
+  }
+  choice.user = system_user().name;
+  choice.on = local_time();
+  put_statement(kChoiceStatement, path_, choice.session, json_of(choice),
+                {{"session", choice.session}, {"by", choice.by}, {"user", choice.user}}, audit_, key_);
+}
+
+std::optional<Choice> ResultsTree::choice(const std::string& session) const {
+  const std::string xrays = name_of_xrays(session);
+  const auto statement = newest_statement(kChoiceStatement, path_, xrays, audit_, key_);
+  return statement ? std::optional(as_stated(*statement, xrays, choice_from)) : std::nullopt;
+}
+
+std::map<std::string, int> ResultsTree::chosen() const {
+  std::map<std::string, int> choices;
+  for (const auto& entry : fs::directory_iterator(path_ / kChoiceStatement.event)) {
+    const std::string name = entry.path().filename().string();
+    if (!name.starts_with('.')) ++choices[name.substr(0, name.find('.'))];
+  }
+  return choices;
 }
 
 void ResultsTree::check_stands(const std::string& session) const {
@@ -506,14 +518,14 @@ void ResultsTree::put_release(const Release& release) {
   const fs::path file = release_file(release.session),
                  aside = path_ / "released" / fmt::format(".{}.json", release.session);
   Json json = {{"schema", 1}, {"on", release.on}};
-  json.update(release_json(release));
+  json.update(json_of(release));
   if (!release.despite.empty()) json["despite"] = release.despite;
   json[kAuditHeadKey] = audit_.head();
   sign(json, key_);
   const std::string text = file_text(json);
   replace_text(aside, text);
   std::error_code ignored;
-  Json line = release_json(release);
+  Json line = json_of(release);
   line["release"] = sha256_of(text);
   if (!release.despite.empty()) line["despite_other_xrays"] = true;  // in words it may name a patient's file
   if (release.is_again) line["again"] = true;
@@ -533,10 +545,6 @@ void ResultsTree::put_release(const Release& release) {
   flush(file.parent_path());
 }
 
-fs::path ResultsTree::sent_file(const Delivery& delivery) const {
-  return path_ / "sent" / fmt::format("{}.{}.{}", delivery.session, delivery.peer, delivery.object.file);
-}
-
 std::vector<std::string> ResultsTree::released() const {
   std::vector<std::string> sessions;
   for (const auto& entry : fs::directory_iterator(path_ / "released"))
@@ -546,21 +554,13 @@ std::vector<std::string> ResultsTree::released() const {
   return sessions;
 }
 
-// A mark counts for the object that it names.
-bool ResultsTree::is_marked(const Delivery& delivery) const {
-  const fs::path mark = sent_file(delivery);
-  if (!fs::exists(mark)) return false;
-  const nlohmann::json json = read_json_file(mark).json;
-  return json.is_object() && json.value("object", nlohmann::json()) == delivery.object.sha256;
-}
-
-bool ResultsTree::is_sent(const Delivery& delivery) const {
-  return is_marked(delivery) && audit_.has_sending(delivery.session, delivery.peer, delivery.object.sha256);
+bool ResultsTree::has_line(const Delivery& delivery) const {
+  return audit_.has_sending(delivery.session, delivery.peer, delivery.object.sha256);
 }
 
 std::vector<Delivery> ResultsTree::pending_of(const Release& release) const {
   std::vector<Delivery> pending = deliveries_of(release);
-  std::erase_if(pending, [&](const Delivery& delivery) { return is_sent(delivery); });
+  std::erase_if(pending, [&](const Delivery& delivery) { return marks_.has(delivery) && has_line(delivery); });
   return pending;
 }
 
@@ -601,22 +601,14 @@ fs::path ResultsTree::checked_file(const Delivery& delivery) const {
   return file;
 }
 
-fs::path ResultsTree::prepared_file(const Delivery& delivery) const {
-  return path_ / "sent" / ("." + sent_file(delivery).filename().string());
-}
-
-void ResultsTree::prepare_to_send(const Delivery& delivery) {
-  replace_text(prepared_file(delivery), Json{{"on", local_time()}, {"object", delivery.object.sha256}}.dump() + "\n");
-}
+void ResultsTree::prepare_to_send(const Delivery& delivery) { marks_.prepare(delivery); }
 
 bool ResultsTree::is_in_doubt(const Delivery& delivery) const {
-  return fs::exists(prepared_file(delivery)) ||
-         is_marked(delivery) != audit_.has_sending(delivery.session, delivery.peer, delivery.object.sha256);
+  return marks_.is_prepared(delivery) || marks_.has(delivery) != has_line(delivery);
 }
 
 void ResultsTree::mark_sent(const Delivery& delivery, const std::string& answer) {
-  fs::rename(prepared_file(delivery), sent_file(delivery));
-  flush(path_ / "sent");
+  marks_.put(delivery);
   audit("sent", {{"session", delivery.session},
                  {"peer", delivery.peer},
                  {"object", delivery.object.sha256},

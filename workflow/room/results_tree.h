@@ -6,6 +6,7 @@
 //   registered/NAME.json     the SHA-256 of every file in that folder when it was registered
 //   released/NAME.json       who released the session, and which objects are sent to which peers
 //   decided/NAME.N.json      what a person has decided about the session
+//   chosen/NAME.N.json       what a person has chosen for the session's X-rays, as they were registered or will be
 //   orders/NAME.json         how the session was registered: what a person who registers it by hand begins with
 //   inputs/NAME.json         the SHA-256 of the files from which it was registered
 //   handed_over/NAME/        a result of the session's X-rays by hand that watch has yet to take over
@@ -34,22 +35,15 @@
 #include "io/config/watch_file.h"
 #include "workflow/register/registration_messages.h"
 #include "workflow/room/audit_log.h"
+#include "workflow/room/choice.h"
 #include "workflow/room/decision.h"
 #include "workflow/room/deletion.h"
+#include "workflow/room/release.h"
+#include "workflow/room/sent_marks.h"
 #include "workflow/room/session_inputs.h"
 #include "workflow/room/session_record.h"
 
 namespace isoshift {
-
-// Who releases a session: the name given, the user of the system, and the user who became that user by sudo.
-struct Releaser {
-  std::string by, user, sudo_user;  // sudo_user: empty without sudo
-  bool is_person = true;            // false: the site's rule; it releases only what was accepted, and only once
-  bool despite_objection = false;   // a person knows what other X-rays say against the result
-};
-
-// "J. Doe (user isoshift, sudo of jdoe)".
-std::string to_string(const Releaser& releaser);
 
 // What other X-rays of the patient say against a result.
 struct Objection {
@@ -57,27 +51,6 @@ struct Objection {
   bool newer_have_results = false;  // there are newer X-rays, and nothing else: all of them have results of their own
 
   bool operator==(const Objection&) const = default;
-};
-
-struct Release {
-  struct Object {
-    std::string file;  // of the session's folder
-    std::string sha256;
-  };
-  std::string session;
-  Releaser releaser;
-  std::string on;  // local time
-  std::string verdict;
-  std::string record;     // SHA-256 of the session's record at the time of the release
-  std::string despite;    // what other X-rays say against the result; empty: nothing
-  bool is_again = false;  // the audit log has an earlier release of the session, whose file is gone
-  std::vector<Object> objects;
-  std::vector<std::string> peers;
-};
-
-struct Delivery {
-  std::string session, peer;
-  Release::Object object;
 };
 
 // Throws Error if another user owns the results tree: isoshift watch could not read files that this user writes there.
@@ -152,6 +125,16 @@ class ResultsTree {
   // Throws Error if the files do not say what the audit log proves.
   std::optional<Decision> decision(const std::string& session) const;
 
+  // Records what a person has chosen for X-rays; when, and by which user of the system, is added here, and what an
+  // earlier choice for them says where this one says nothing. Throws Error if these X-rays have a result already, or if
+  // the audit log cannot be written.
+  void choose(Choice choice);
+  // The choice for the X-rays of a session; nothing if there is none. Throws Error if the files do not say what the
+  // audit log proves.
+  std::optional<Choice> choice(const std::string& session) const;
+  // How often people have chosen, by session.
+  std::map<std::string, int> chosen() const;
+
   // Whether it was released, and a peer has yet to confirm an object.
   bool is_to_be_sent(const std::string& session) const;
   // Deletes all results of the session's X-rays and what is kept of them; the audit log, and a file in deleted/, say
@@ -190,8 +173,7 @@ class ResultsTree {
   // The file to send. Throws Error if it is no longer released, if its session has changed since its registration, or
   // if other X-rays have come to speak against it since its release.
   std::filesystem::path checked_file(const Delivery& delivery) const;
-  // Writes the mark, which mark_sent() then only renames: if the disk is full, the object is not sent, since it could
-  // not be marked.
+  // Prepares the mark: an object that could not be marked is not sent.
   void prepare_to_send(const Delivery& delivery);
   // True if a sending was prepared, or has its mark without its line in the audit log, or its line without its mark:
   // the peer may have the object.
@@ -218,13 +200,11 @@ class ResultsTree {
   FileLock lock_releases() const;
   void check_objects_are_new(const Release& release) const;
   void put_release(const Release& release);
-  std::filesystem::path sent_file(const Delivery& delivery) const;
-  std::filesystem::path prepared_file(const Delivery& delivery) const;
-  bool is_marked(const Delivery& delivery) const;
-  bool is_sent(const Delivery& delivery) const;
+  bool has_line(const Delivery& delivery) const;  // the audit log tells that it was sent
 
   std::filesystem::path path_;
   AuditLog audit_;
+  SentMarks marks_;
   std::optional<SigningKey> key_;
   bool needs_second_person_ = false;  // for results that were not accepted
   std::set<std::string> delivered_;   // sessions that all of their peers have confirmed

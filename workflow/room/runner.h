@@ -1,11 +1,10 @@
 #pragma once
 // Registers sessions in the background, one at a time.
 
-#include <filesystem>
 #include <optional>
 #include <string>
 
-#include "io/study/study_files.h"
+#include "workflow/register/registration_messages.h"
 
 namespace isoshift {
 
@@ -13,9 +12,9 @@ class Runner {
  public:
   virtual ~Runner() = default;
 
-  // Begins to register these parts of a study. The result will be in `folder`, whole or not at all. Throws Error if the
+  // Begins a registration. The result will be in the order's folder, whole or not at all. Throws Error if the
   // registration cannot begin.
-  virtual void begin(const StudyParts& parts, const std::filesystem::path& folder) = 0;
+  virtual void begin(const RegistrationOrder& order) = 0;
 
   struct Failure {
     std::string why;

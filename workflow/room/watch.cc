@@ -38,6 +38,8 @@ Watch::Watch(const WatchFile& watch, const Parts& parts)
       index_(tree_, watch.site.name),
       engine_(tree_.path(), parts.clock),
       deliverer_(watch, parts.sender, parts.clock),
+      grouping_(parts.takes_other_xrays),
+      changes_(tree_, grouping_, parts.contents),
       troubles_(parts.observer),
       sending_troubles_(parts.sending),
       seen_at_(parts.clock.now()),
@@ -45,6 +47,7 @@ Watch::Watch(const WatchFile& watch, const Parts& parts)
       next_forgetting_(seen_at_),
       next_deletion_(seen_at_) {
   tree_.clean();
+  troubles_.attempt("taking choices", [&] { take_choices(); });
   take_results();
   tree_.audit("started", {{"sessions", index_.size()}});
 }
@@ -58,8 +61,10 @@ void Watch::round() {
   set_sendable({});
   const bool was_source_read = is_source_read_;
   troubles_.attempt("receiving", [&] { receive(); });
+  troubles_.attempt("comparing clocks", [&] { compare_clocks(); });
   troubles_.attempt("deleting old results", [&] { delete_old_results(); });
   troubles_.attempt("deleting results", [&] { take_deletions(); });
+  troubles_.attempt("taking choices", [&] { take_choices(); });
   troubles_.attempt("comparing files with results", [&] { look_for_changes(); });
   troubles_.attempt("registering", [&] { register_complete(); });
   troubles_.attempt("taking over results by hand", [&] { take_over_results(); });
@@ -126,12 +131,16 @@ void Watch::receive() {
   if (parts_.clock.now() < next_forgetting_) return;
   std::set<std::string> unregistered;  // patients of whom an X-ray has no result
   for (const auto& [patient_id, patient] : parts_.source.patients())
-    if (!std::ranges::all_of(patient.files.images, [&](const StudyFiles::Image& image) {
-          return registered_.contains(image.sop_instance_uid);
-        }))
-      unregistered.insert(patient_id);
+    if (!grouping_.are_all_registered(patient.files)) unregistered.insert(patient_id);
   parts_.source.forget_before(parts_.clock.file_time() - kKeptFor, unregistered);
   next_forgetting_ = parts_.clock.now() + std::chrono::days(1);
+}
+
+void Watch::compare_clocks() {
+  const auto& limit_s = watch_.site.sessions->max_clock_offset_s;
+  if (!limit_s || !is_source_read_) return;
+  clocks_.update(parts_.source.patients(), std::chrono::file_clock::to_sys(parts_.clock.file_time()));
+  if (const std::string words = clocks_.beyond(*limit_s); !words.empty()) throw Error(words);
 }
 
 // Once a day. What is still to be sent stays until it is sent.
@@ -155,16 +164,39 @@ void Watch::take_deletions() {
     for (const Deletion& deletion : tree_.finish_deletions()) {
       index_.remove(deletion.session);
       objections_.remove(deletion.session);
-      deleted_xrays_.insert(deletion.xrays.begin(), deletion.xrays.end());
+      grouping_.add_deleted(deletion.xrays);
     }
     deletions_read_ = newest;
   }
-  if (deleted_xrays_.empty()) return;
-  for (const auto& [patient_id, patient] : parts_.source.patients())
-    for (const auto* images : {&patient.files.images, &patient.files.other_xrays})
-      for (const StudyFiles::Image& image : *images)
-        if (!registered_.contains(image.sop_instance_uid) && deleted_xrays_.contains(sha256_of(image.sop_instance_uid)))
-          registered_.insert(image.sop_instance_uid);
+  for (const auto& [patient_id, patient] : parts_.source.patients()) grouping_.see(patient.files);
+}
+
+// What people have chosen on the screen. A choice that does not count hides no other.
+void Watch::take_choices() {
+  if (const std::map<std::string, int> there = tree_.chosen(); choices_read_ != there) {
+    read_choices(there);
+    choices_read_ = there;
+  }
+  if (!choice_trouble_.empty()) throw Error(choice_trouble_);
+}
+
+void Watch::read_choices(const std::map<std::string, int>& there) {
+  std::map<std::string, Choice> choices;
+  choice_trouble_.clear();
+  for (const auto& [session, count] : there) {
+    try {
+      if (auto choice = tree_.choice(session)) choices[session] = *std::move(choice);
+    } catch (const std::exception& error) {
+      choice_trouble_ = error.what();
+    }
+  }
+  for (const auto& [session, choice] : choices) {
+    const auto before = grouping_.choices().find(session);
+    if (before != grouping_.choices().end() && before->second == choice) continue;
+    failures_.erase(session);
+    if (choices_read_) parts_.observer.say(fmt::format("session {}: {}", session, in_words(choice)));
+  }
+  grouping_.set_choices(std::move(choices));
 }
 
 // A result that cannot be read hides no other.
@@ -183,14 +215,13 @@ void Watch::take_results() {
 void Watch::take_result(const std::string& session, const std::optional<Running>& made) {
   const SetupResult report = read_report(tree_.session(session));
   if (report.views.empty()) throw Error(fmt::format("{}: names no views", tree_.session(session).string()));
-  for (const auto& view : report.views) {
-    registered_.insert(view.sop_instance_uid);
-    first_of_[view.sop_instance_uid] = name_of_xrays(session);
-  }
+  std::set<std::string> xrays;
+  for (const auto& view : report.views) xrays.insert(view.sop_instance_uid);
+  grouping_.add_result(session, xrays);
   const std::string obstacle = obstacle_to_release(tree_, session, report.verdict);
   const std::string reason = reason_for_person(session, report, made);
   index_.add(session, report, obstacle, reason);
-  objections_.add_result(session, report);
+  objections_.add_result(session, report, grouping_.choices().contains(name_of_xrays(session)));
   if (made) parts_.observer.say(fmt::format("session {}: {}", session, to_string(report.verdict)));
   if (made && watch_.site.automatic_release && report.verdict == Verdict::kAccepted && obstacle.empty() &&
       reason.empty())
@@ -239,31 +270,36 @@ std::vector<Watch::Complete> Watch::complete_sessions() {
   std::vector<Complete> complete;
   std::set<std::string> found;
   for (const auto& [patient_id, patient] : parts_.source.patients()) {
-    std::vector<SessionFiles> sessions = sessions_of(patient.files, parts_.takes_other_xrays, registered_);
-    for (const auto& [first, changed] : changed_)
-      if (changed.patient_id == patient_id)
-        if (auto again = registered_session(first, patient)) {
-          again->name = tree_.further_name(first);
-          again->remarks.push_back(fmt::format("is registered again: {}", changed.what));
-          sessions.push_back(*std::move(again));
-        }
+    std::vector<SessionFiles> sessions = grouping_.sessions_in(patient.files);
+    std::ranges::move(changes_.to_register(patient_id, patient.files), std::back_inserter(sessions));
     for (SessionFiles& session : sessions) {
       found.insert(session.name);
-      StudyFiles own = files_for(session, patient.files);
-      const bool is_running = running_ && running_->session == session.name;
-      std::string why = is_running ? "is being registered" : reason_to_wait(session, own, patient_id, patient.last);
-      const bool is_complete = why.empty();
-      if (is_complete) why = "is next to be registered";
-      waiting_.push_back({.name = session.name,
-                          .patient_id = patient_id,
-                          .acquired = times_of(session.images),
-                          .why = std::move(why),
-                          .has_failed = failures_.contains(session.name)});
-      if (is_complete) complete.push_back({std::move(session), std::move(own), patient.last});
+      StudyFiles own = grouping_.files_of(session, patient.files);
+      WaitingSession& waits = waiting_.emplace_back(waiting(session, own, patient_id, patient));
+      if (!waits.why.empty()) continue;
+      waits.why = "is next to be registered";
+      complete.push_back({std::move(session), std::move(own), patient.last});
     }
   }
   std::erase_if(failures_, [&](const auto& failure) { return !found.contains(failure.first); });
   return complete;
+}
+
+// Without a reason: it can be registered now. What a person may choose counts where something else than time is
+// missing.
+WaitingSession Watch::waiting(const SessionFiles& session, const StudyFiles& own, const std::string& patient_id,
+                              const Patient& patient) {
+  const bool is_running = running_ && running_->session == session.name;
+  WaitingSession waits{
+      .name = session.name,
+      .patient_id = patient_id,
+      .acquired = times_of(session.images),
+      .why = is_running ? "is being registered" : reason_to_wait(session, own, patient_id, patient.last),
+      .has_failed = failures_.contains(session.name),
+      .options = {}};
+  const bool is_again = name_of_xrays(session.name) != session.name;
+  if (!is_running && !waits.why.empty() && !is_again) waits.options = grouping_.options_of(session, patient.files);
+  return waits;
 }
 
 // Empty: it can be registered now.
@@ -273,7 +309,7 @@ std::string Watch::reason_to_wait(const SessionFiles& session, const StudyFiles&
   if (static_cast<int>(session.images.size()) < rule.views)
     return fmt::format("{} of {} X-rays{}{}", session.images.size(), rule.views, session.remarks.empty() ? "" : "; ",
                        fmt::join(session.remarks, "; "));
-  if (const auto missing = missing_parts(own); !missing.empty()) {
+  if (const auto missing = grouping_.missing_of(session, own); !missing.empty()) {
     parts_.source.ask_for_rest(patient_id);
     return "waits for " + missing.front();
   }
@@ -289,58 +325,15 @@ bool Watch::is_quiet(const std::string& patient_id, Clock::Time last) const {
   return !parts_.source.is_coming(patient_id) && quiet.count() >= watch_.site.sessions->quiet_s;
 }
 
-// Once after all news of a patient have come. A result whose files are others now is objected to, and its X-rays are
-// registered again.
+// A result whose files are others now is objected to, and its X-rays are registered again.
 void Watch::look_for_changes() {
-  for (const auto& [patient_id, patient] : parts_.source.patients()) {
-    if (compared_[patient_id] == patient.last || !is_quiet(patient_id, patient.last)) continue;
-    std::set<std::string> sessions;
-    for (const auto* images : {&patient.files.images, &patient.files.other_xrays})
-      for (const StudyFiles::Image& image : *images)
-        if (const auto found = first_of_.find(image.sop_instance_uid); found != first_of_.end())
-          sessions.insert(found->second);
-    for (const std::string& session : sessions) look_for_change(session, patient_id, patient);
-    compared_[patient_id] = patient.last;
-  }
-}
-
-// Files that have left the source tell nothing.
-void Watch::look_for_change(const std::string& session, const std::string& patient_id, const Patient& patient) {
-  const std::optional<SessionInputs> before = tree_.inputs(session);
-  const std::optional<SessionFiles> xrays = registered_session(session, patient);
-  if (!before || !xrays) return;
-  const StudyFiles own = files_for(*xrays, patient.files);
-  if (!missing_parts(own).empty()) return;
-  std::string what;
-  bool can_be_registered = true;
-  try {
-    const SessionInputs now = inputs_of(choose_parts(own), parts_.contents, *before);
-    const std::string parts = what_changed(*before, now);
-    if (parts.empty()) {
-      if (now != *before) tree_.keep_inputs(tree_.newest_of_same_xrays(session), now);
-      return;
-    }
-    what = fmt::format("{} changed after the registration", parts);
-  } catch (const Error& error) {  // several plans, for one
-    what = fmt::format("files came after the registration: {}", error.what());
-    can_be_registered = false;
-  }
-  const std::string newest = tree_.newest_of_same_xrays(session);
-  parts_.observer.say(fmt::format("session {}: {}", newest, what));
-  objections_.add(newest, what);
-  if (can_be_registered) changed_[session] = {.patient_id = patient_id, .what = what};
-}
-
-// The X-rays of a result as one session; nothing if they would be grouped in another way now.
-std::optional<SessionFiles> Watch::registered_session(const std::string& session, const Patient& patient) const {
-  std::set<std::string> others = registered_;
-  std::erase_if(others, [&](const std::string& uid) {
-    const auto first = first_of_.find(uid);
-    return first != first_of_.end() && first->second == session;
-  });
-  for (SessionFiles& found : sessions_of(patient.files, parts_.takes_other_xrays, others))
-    if (found.name == session) return std::move(found);
-  return std::nullopt;
+  changes_.look(
+      parts_.source.patients(),
+      [&](const std::string& patient_id, Clock::Time last) { return is_quiet(patient_id, last); },
+      [&](const std::string& session, const std::string& what) {
+        parts_.observer.say(fmt::format("session {}: {}", session, what));
+        objections_.add(session, what);
+      });
 }
 
 void Watch::begin_registration(const Complete& complete) {
@@ -354,8 +347,11 @@ void Watch::begin_registration(const Complete& complete) {
     if (const std::string reason = unreadable_beside(parts, parts_.source.unreadable()); !reason.empty())
       parts.doubts.push_back("a file beside the X-rays may belong to them: " + reason);
     const SessionInputs inputs = inputs_of(parts, parts_.contents);
-    tree_.keep_order(session, {.parts = parts, .flags = watch_.registration, .site = watch_.site.path});
-    parts_.runner.begin(parts, tree_.registering(session));
+    RegistrationOrder order{.parts = parts, .flags = watch_.registration, .site = watch_.site.path};
+    std::ranges::copy(grouping_.flags_of(complete.session), std::back_inserter(order.flags));
+    tree_.keep_order(session, order);
+    order.output = tree_.registering(session);
+    parts_.runner.begin(order);
     const auto names_plan = [](const StudyFiles::Image& image) { return !image.plan_uid.empty(); };
     running_ = Running{.session = session,
                        .news = complete.last,
@@ -379,7 +375,7 @@ void Watch::end_registration() {
     } else {
       tree_.keep_inputs(session, made->inputs);
       tree_.publish(session);
-      changed_.erase(name_of_xrays(session));
+      changes_.registered(session);
       take_result(session, made);
     }
   } catch (const std::exception& error) {
@@ -403,7 +399,7 @@ void Watch::fail(const std::string& session, Clock::Time news, const Runner::Fai
 }
 
 void Watch::look_for_objections() {
-  objections_.update(parts_.source.patients(), registered_);
+  objections_.update(parts_.source.patients(), grouping_.registered());
   if (objections_.by_session() == kept_objections_) return;
   tree_.keep_objections(objections_.by_session());
   kept_objections_ = objections_.by_session();

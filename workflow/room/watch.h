@@ -20,8 +20,11 @@
 #include "setup/verdict.h"
 #include "workflow/observer.h"
 #include "workflow/room/clock.h"
+#include "workflow/room/clock_comparison.h"
 #include "workflow/room/deliver.h"
 #include "workflow/room/engine_state.h"
+#include "workflow/room/grouping.h"
+#include "workflow/room/input_changes.h"
 #include "workflow/room/objections.h"
 #include "workflow/room/results_tree.h"
 #include "workflow/room/runner.h"
@@ -88,11 +91,6 @@ class Watch {
     StudyFiles files;
     Clock::Time last;
   };
-  // X-rays that have a result, whose files are others now.
-  struct Changed {
-    std::string patient_id;  // in the source
-    std::string what;        // in words
-  };
 
   std::vector<std::string> troubles() const;  // also files that cannot be read
   void take_results();
@@ -102,14 +100,17 @@ class Watch {
                                 const std::optional<Running>& made) const;
   void take_over_results();
   void receive();
+  void compare_clocks();
   void take_deletions();
+  void take_choices();
+  void read_choices(const std::map<std::string, int>& there);
   void delete_old_results();
   void register_complete();
   std::vector<Complete> complete_sessions();
   bool is_quiet(const std::string& patient_id, Clock::Time last) const;
   void look_for_changes();
-  void look_for_change(const std::string& session, const std::string& patient_id, const Patient& patient);
-  std::optional<SessionFiles> registered_session(const std::string& session, const Patient& patient) const;
+  WaitingSession waiting(const SessionFiles& session, const StudyFiles& own, const std::string& patient_id,
+                         const Patient& patient);
   std::string reason_to_wait(const SessionFiles& session, const StudyFiles& own, const std::string& patient_id,
                              Clock::Time last);
   void begin_registration(const Complete& complete);
@@ -132,12 +133,12 @@ class Watch {
   Deliverer deliverer_;
   std::mutex sendable_mutex_;  // deliver() reads, round() writes
   Sendable sendable_;
-  std::set<std::string> registered_;             // SOPInstanceUIDs of X-rays that have a result
-  std::map<std::string, std::string> first_of_;  // the first session of an X-ray, by its SOPInstanceUID
-  std::set<std::string> deleted_xrays_;          // SHA-256 of the SOPInstanceUIDs of X-rays whose results were deleted
+  ClockComparison clocks_;
+  Grouping grouping_;
+  InputChanges changes_;
   std::optional<std::filesystem::file_time_type> deletions_read_;
-  std::map<std::string, Changed> changed_;       // by the first session of the X-rays
-  std::map<std::string, Clock::Time> compared_;  // Patient::last at that time, by PatientID in the source
+  std::optional<std::map<std::string, int>> choices_read_;
+  std::string choice_trouble_;
   std::map<std::string, std::string> accepted_;  // released without a person: PatientID in the source, by session
   bool is_source_read_ = false;                  // in this round
   std::vector<WaitingSession> waiting_;

@@ -23,10 +23,6 @@ using testing::HasSubstr;
 // A shell script stands in for isoshift.
 class ChildRunnerTest : public testing::Test {
  protected:
-  ChildRunnerTest() {
-    file_.site.path = folder_ / "site.json";
-    file_.registration = {"--preset=fast"};
-  }
   ~ChildRunnerTest() override { use_program(ISOSHIFT_PROGRAM); }
 
   void begin(Runner& runner, const std::string& script) {
@@ -35,7 +31,8 @@ class ChildRunnerTest : public testing::Test {
     write_text(program, "#!/bin/sh\ncd " + folder_.path().string() + "\n" + script + "\n");
     fs::permissions(program, fs::perms::owner_all);
     use_program(program);
-    runner.begin(parts_, folder_ / "out");
+    runner.begin(
+        {.parts = parts_, .flags = {"--preset=fast"}, .site = folder_ / "site.json", .output = folder_ / "out"});
   }
   static Runner::End end_of(Runner& runner) {
     for (;;) {
@@ -49,12 +46,11 @@ class ChildRunnerTest : public testing::Test {
   }
 
   TemporaryFolder folder_;
-  WatchFile file_;
   const StudyParts parts_ = {.ct = {"/in/ct1", "/in/ct2"}, .images = {"/in/ap", "/in/lat"}, .plan = "/in/plan"};
 };
 
-TEST_F(ChildRunnerTest, RegistersThePartsUnderTheSiteFile) {
-  ChildRunner runner(file_);
+TEST_F(ChildRunnerTest, RegistersWhatIsOrdered) {
+  ChildRunner runner;
   begin(runner, "echo $* >words; cat >order; mkdir out; echo {} >out/result.json; exit 3");
   EXPECT_FALSE(end_of(runner).failure);
   EXPECT_EQ(text_of("words"), "__child register\n");
@@ -65,7 +61,7 @@ TEST_F(ChildRunnerTest, RegistersThePartsUnderTheSiteFile) {
 }
 
 TEST_F(ChildRunnerTest, TheFailureThatIsAnsweredIsTheReason) {
-  ChildRunner runner(file_);
+  ChildRunner runner;
   write_text(folder_ / "answer", to_line(RegistrationMessage(Ready())) +
                                      to_line(RegistrationMessage(Failed{"no CT\n       Name its folder"})));
   begin(runner, "echo 'error: of a library' >&2; cat answer");
@@ -76,7 +72,7 @@ TEST_F(ChildRunnerTest, TheFailureThatIsAnsweredIsTheReason) {
 }
 
 TEST_F(ChildRunnerTest, AnAnswerThatIsNoneIsAFailureThatNamesTheChild) {
-  ChildRunner runner(file_);
+  ChildRunner runner;
   begin(runner, "echo hello");
   EXPECT_THAT(end_of(runner).failure.value().why, HasSubstr("the message of the registration: is not JSON"));
   begin(runner, "echo '{\"begun\":{}}'");
@@ -86,14 +82,14 @@ TEST_F(ChildRunnerTest, AnAnswerThatIsNoneIsAFailureThatNamesTheChild) {
 // The program itself answers, not a script.
 TEST_F(ChildRunnerTest, TheErrorOfTheProgramIsTheReason) {
   use_program(ISOSHIFT_PROGRAM);
-  ChildRunner runner(file_);
-  runner.begin(parts_, folder_ / "out");
+  ChildRunner runner;
+  runner.begin({.parts = parts_, .site = folder_ / "site.json", .output = folder_ / "out"});
   EXPECT_EQ(end_of(runner).failure.value().why,
             fmt::format("error: {}: cannot be read", (folder_ / "site.json").string()));
 }
 
 TEST_F(ChildRunnerTest, AnEndWithoutAResultIsAFailure) {
-  ChildRunner runner(file_);
+  ChildRunner runner;
   begin(runner, "echo 'driver: lost' >&2; kill -SEGV $$");
   const Runner::End end = end_of(runner);
   ASSERT_TRUE(end.failure);
@@ -101,7 +97,7 @@ TEST_F(ChildRunnerTest, AnEndWithoutAResultIsAFailure) {
 }
 
 TEST_F(ChildRunnerTest, ARegistrationThatDoesNotEndIsEnded) {
-  ChildRunner runner(file_, 300ms);
+  ChildRunner runner(300ms);
   begin(runner, "echo $$ >process; exec sleep 600");
   const Runner::End end = end_of(runner);
   ASSERT_TRUE(end.failure);
@@ -111,7 +107,7 @@ TEST_F(ChildRunnerTest, ARegistrationThatDoesNotEndIsEnded) {
 }
 
 TEST_F(ChildRunnerTest, WhatIsGivenUpEnds) {
-  ChildRunner runner(file_);
+  ChildRunner runner;
   begin(runner, "echo $$ >process; exec sleep 600");
   while (!text_of("process").ends_with('\n')) std::this_thread::sleep_for(5ms);
   EXPECT_FALSE(runner.end());

@@ -32,9 +32,14 @@ class EngineFileTest : public testing::Test {
   TemporaryFolder folder_;
   HandClock clock_;
   EngineFile file_{folder_.path(), clock_};
-  EngineState state_{
-      .waiting = {{.name = "a", .patient_id = "7", .acquired = "AP", .why = "1 of 2", .has_failed = true}},
-      .troubles = {"a server is down"}};
+  EngineState state_{.waiting = {{.name = "a",
+                                  .patient_id = "7",
+                                  .acquired = "AP",
+                                  .why = "1 of 2",
+                                  .has_failed = true,
+                                  .options = {.own_xrays = {{"1.2", "AP 10:15:00"}},
+                                              .plans = {{"1.3", "the RT Plan A"}, {"1.4", "the RT Plan B"}}}}},
+                     .troubles = {"a server is down"}};
 };
 
 TEST_F(EngineFileTest, WhatTheEngineDoesIsRead) {
