@@ -319,7 +319,7 @@ for (const id of kNumbers)
     if (numbers.every(Number.isFinite)) set(fromNumbers(numbers.slice(0, 3), numbers.slice(3)));
   });
 element("undo").addEventListener("click", undo);
-element("part").addEventListener("input", () => {
+element("part").addEventListener("change", () => {
   element("only").disabled = element("part").value === "";
   if (element("only").disabled) element("only").checked = false;
   showOutline(pose).catch(error => problem(error.message));

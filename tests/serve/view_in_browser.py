@@ -104,14 +104,14 @@ def main(program, work):
         wait_for(lambda: colored(browser, (230, 159, 0)) > before + 100, 10, "the outline")
         one("#mark").click()
         views = browser.execute_async_script("fetch('/api/manual/study').then(r => r.json()).then(arguments[0])")["views"]
-        for number, view in enumerate(views):
-            still = view["isocenter_px"]
+        for number, one_view in enumerate(views):
+            still = one_view["isocenter_px"]
             moved = [at + sum(px * mm for px, mm in zip(row, truth["translation_mm"]))
-                     for at, row in zip(still, view["px_per_mm"])]
+                     for at, row in zip(still, one_view["px_per_mm"])]
             xray, drr = browser.find_elements(By.CSS_SELECTOR, "figure.view")[number].find_elements(By.TAG_NAME, "canvas")
             for canvas, at in ((xray, moved), (drr, still)):
                 edge = canvas.size["width"]
-                dx, dy = ((value + 0.5) / size * edge - edge / 2 for value, size in zip(at, view["sizes"][0]))
+                dx, dy = ((value + 0.5) / size * edge - edge / 2 for value, size in zip(at, one_view["sizes"][0]))
                 ActionChains(browser).move_to_element_with_offset(canvas, round(dx), round(dy)).click().perform()
         browser.save_screenshot(str(work / "landmarks.png"))
         one("#fit").click()

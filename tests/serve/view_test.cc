@@ -10,6 +10,7 @@
 #include "serve/view_screen.h"
 #include "tests/support/command.h"
 #include "tests/support/small_study.h"
+#include "tests/support/testdata.h"
 #include "workflow/register/truth.h"
 
 namespace isoshift {
@@ -160,22 +161,15 @@ TEST_F(ViewTest, ARegistrationRunsFromThePoseAndTellsHowFarItIs) {
 
 TEST_F(ViewTest, OnlyAPartAndABoxAreRegistered) {
   const Json study = Json::parse(get("/api/manual/study").body);
-  const auto part_named = [&](const std::string& beginning) {
-    std::size_t n = 0;
-    while (n < study.at("parts").size() && !study.at("parts")[n].get<std::string>().starts_with(beginning)) ++n;
-    return n;
-  };
-  const std::size_t structure = part_named("structure "), body = part_named("body ");
-  ASSERT_LT(structure, body);
-  ASSERT_LT(body, study.at("parts").size());
-  const Json region = {{"part", body}, {"boxes", {{10, 12, 60, 70}, nullptr}}};
+  ASSERT_EQ(study.at("parts").at(4), "body 5: bone");  // of the skull
+  const Json region = {{"part", 4}, {"boxes", {{4, 6, 90, 92}, nullptr}}};
   EXPECT_EQ(post("/api/manual/begin", {{"setup_error", pose(0)}, {"searched", true}, {"region", region}}).status, 200);
   const Json end = end_of_registration();
   ASSERT_EQ(end.at("state"), "ended") << end;
   const Json result = Json::parse(std::ifstream(files_.output() / "1" / "result.json"));
   const std::string label = study.at("views")[0].at("label");
-  EXPECT_THAT(result.at("region").dump(), testing::HasSubstr("body 1, margin 5 mm"));
-  EXPECT_THAT(result.at("region").dump(), testing::HasSubstr("rectangle " + label + "=10,12,60,70"));
+  EXPECT_THAT(result.at("region").dump(), testing::HasSubstr("body 5, margin 5 mm"));
+  EXPECT_THAT(result.at("region").dump(), testing::HasSubstr("rectangle " + label + "=4,6,90,92"));
   const Json wrong = {{"part", 1000}, {"boxes", Json::array()}};
   EXPECT_EQ(post("/api/manual/begin", {{"setup_error", pose(0)}, {"searched", true}, {"region", wrong}}).status, 409);
 }
@@ -193,6 +187,22 @@ TEST_F(ViewTest, OutlinesMoveWithThePatient) {
   const double px_per_mm = study_.views()[0].px_per_mm(0, 0);
   EXPECT_NEAR(first_column(10.0) - first_column(0.0), 10.0 * px_per_mm, 1.5);
   EXPECT_EQ(post("/api/manual/outlines", {{"setup_error", pose(0)}, {"part", 1000}}).status, 400);
+}
+
+TEST(LiveStudyTest, PartsAreTheStructuresOfTheCtAndItsBodies) {
+  StudyOptions options;
+  options.parts.study = testdata("head");
+  Observer nobody;
+  const LiveStudy study(options, nobody);
+  const auto& parts = study.parts();
+  const auto first_body = std::ranges::find_if(parts, [](const auto& part) { return part.words.starts_with("body "); });
+  ASSERT_NE(first_body, parts.begin()) << "no structure";
+  ASSERT_NE(first_body, parts.end());
+  EXPECT_EQ(parts[0].words, "structure " + parts[0].flags[1]);
+  EXPECT_EQ(parts[0].flags[0], "--structure");
+  EXPECT_EQ(first_body->flags, (std::vector<std::string>{"--body", "1"}));
+  for (std::size_t part = 0; part < parts.size(); ++part)
+    EXPECT_EQ(study.outlines_of(part, Eigen::Isometry3d::Identity()).size(), study.views().size());
 }
 
 TEST_F(ViewTest, LandmarksGiveAPose) {

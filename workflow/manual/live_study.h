@@ -46,7 +46,7 @@ class LiveStudy {
 
   // A structure or a body, which can be shown and registered alone.
   struct Part {
-    std::string words;               // "structure PTV", "body 4: vertebra"
+    std::string words;               // "structure PTV", "body 4: vertebra 1"
     std::vector<std::string> flags;  // of isoshift register: only this
   };
   const std::vector<Part>& parts() const { return parts_; }

@@ -31,7 +31,7 @@ BodyMap bodies_of(const CtSeries& ct, const RtStructures* structures) {
 
 std::string body_in_words(const BodyMap& map, int number) {
   const Body& body = map.bodies.at(static_cast<std::size_t>(number - 1));
-  return fmt::format("body {}: {}{}{}", number, to_string(body.kind), body.name.empty() ? "" : " ", body.name);
+  return fmt::format("body {}: {}", number, body.name.empty() ? to_string(body.kind) : body.name);
 }
 
 Volume<std::uint8_t> body_mask(const BodyMap& map, int number, const Volume<float>& lattice) {

@@ -16,7 +16,7 @@ std::vector<DrawnBone> drawn_bones(const RtStructures& structures, const CtSerie
 // The bodies as isoshift inspect --bodies numbers them, from 1. `structures`: null if the study has none.
 BodyMap bodies_of(const CtSeries& ct, const RtStructures* structures);
 
-// "body 4: vertebra", "body 9: bone L3".
+// "body 4: vertebra 1", "body 9: bone".
 std::string body_in_words(const BodyMap& map, int number);
 
 // Where a body is: 1 inside, on the lattice of a volume. Throws UsageError for a number that no body has, and for the
