@@ -93,13 +93,23 @@ me = await showSignedIn();
 element("by-hand").hidden = !me.roles.includes("register");
 element("trend").href = "/session/" + encodeURIComponent(session) + "/trend";
 element("by-hand").href = "/session/" + encodeURIComponent(session) + "/by-hand";
+
+// Once the session is there: the engine may have yet to take a result over. report.pdf is kept in the page, so that it
+// can be printed while the network is down.
+let isLoading = false;
+function loadReport() {
+  if (!shown || isLoading) return;
+  isLoading = true;
+  write("problem", "");
+  element("report").src = address + "/report.html";
+  bytes(address + "/report.pdf").then(({data}) => {
+    element("pdf").href = URL.createObjectURL(new Blob([data], {type: "application/pdf"}));
+    element("pdf").download = "session-" + session + ".pdf";
+  }).catch(error => write("problem", error.message));
+}
+
 await update();
-element("report").src = address + "/report.html";
-// Kept in the page, so that it can be printed while the network is down.
-bytes(address + "/report.pdf").then(({data}) => {
-  element("pdf").href = URL.createObjectURL(new Blob([data], {type: "application/pdf"}));
-  element("pdf").download = "session-" + session + ".pdf";
-}).catch(error => write("problem", error.message));
+loadReport();
 let version = null, isAsking = false;
 follow(async now => {
   if (engine !== now.engine && shown) {
@@ -109,5 +119,6 @@ follow(async now => {
   if (now.version === version || isAsking) return;
   isAsking = true;
   if (await update(true)) version = now.version;
+  loadReport();
   isAsking = false;
 });
