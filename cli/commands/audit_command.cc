@@ -54,7 +54,7 @@ bool examine(const AuditOptions& options, Console& console) {
   const AuditChain chain = chain_of(content_of(options.log));
   console.out << fmt::format("{} lines", chain.lines);
   if (chain.without_link > 0) console.out << fmt::format(", the first {} without links", chain.without_link);
-  console.out << fmt::format("\nhead {}\n", chain.head);
+  console.out << fmt::format("\nhead {}\n", chain.head());
   if (!chain.settled.empty())
     console.out << fmt::format("broken, and repaired by a person since: line {}\n", fmt::join(chain.settled, ", "));
   bool is_whole = chain.broken.empty();
@@ -63,7 +63,7 @@ bool examine(const AuditOptions& options, Console& console) {
         "error: {}: broken: line {}: this line, or lines before it, were changed, taken out or put in\n",
         options.log.string(), fmt::join(chain.broken, ", "));
   for (const auto& [from, head] : heads_to_find(options)) {
-    if (head == chain.head || chain.links.contains(head)) continue;
+    if (head == chain.head() || chain.links.contains(head)) continue;
     console.err << fmt::format("error: {}: the log that held {} had other lines, or more\n", from, head);
     is_whole = false;
   }

@@ -47,30 +47,35 @@ std::string_view unlinked_end(std::string_view text) {
   return text;
 }
 
-AuditChain chain_of(std::string_view text) {
-  AuditChain chain;
-  std::size_t covered = 0;  // the beginning of what the next link covers
-  for (std::size_t begin = 0; begin < text.size();) {
-    const std::size_t end = std::min(text.find('\n', begin), text.size() - 1) + 1;
-    const Json line = parsed(text.substr(begin, end - begin));
+void extend(AuditChain& chain, std::string_view lines) {
+  while (!lines.empty()) {
+    const std::string_view text = lines.substr(0, std::min(lines.find('\n'), lines.size() - 1) + 1);
+    lines.remove_prefix(text.size());
+    const Json line = parsed(text);
     const std::string link = link_of(line);
     ++chain.lines;
     if (!link.empty()) {
-      if (link != sha256_of(text.substr(covered, begin - covered)))
+      if (link != sha256_of(chain.covered))
         chain.broken.push_back(chain.lines);
       else
         settle(line, chain);
       chain.links.insert(link);
-      covered = begin;
+      chain.covered.clear();
     } else if (chain.links.empty()) {
       ++chain.without_link;
     } else if (line.is_object()) {  // a line that was cut off is none, and the next link covers it
       chain.broken.push_back(chain.lines);
     }
-    begin = end;
+    chain.covered += text;
   }
-  chain.head = sha256_of(text.substr(covered));
+}
+
+AuditChain chain_of(std::string_view text) {
+  AuditChain chain;
+  extend(chain, text);
   return chain;
 }
+
+std::string AuditChain::head() const { return sha256_of(covered); }
 
 }  // namespace isoshift

@@ -32,8 +32,12 @@ struct AuditChain {
   std::vector<std::size_t> broken;   // numbers, from 1, of lines whose link is missing or does not fit
   std::vector<std::size_t> settled;  // broken ones that a later line, `repaired`, names
   std::set<std::string> links;
-  std::string head;  // the link of the line to come
+  std::string covered;  // what the link of the line to come covers
+
+  std::string head() const;  // this link
 };
 AuditChain chain_of(std::string_view text);
+// Adds lines to those of a chain. Only the last of them may be cut off, and nothing can be added after that.
+void extend(AuditChain& chain, std::string_view lines);
 
 }  // namespace isoshift

@@ -13,13 +13,13 @@
 #include <cstring>
 #include <fstream>
 #include <iterator>
-#include <sstream>
 #include <string_view>
 #include <thread>
 
 #include "base/error.h"
 #include "base/local_time.h"
 #include "base/output_folder.h"
+#include "base/sha256.h"
 #include "workflow/room/audit_chain.h"
 
 namespace isoshift {
@@ -46,7 +46,6 @@ std::string end_of_log(int descriptor, off_t size) {
   }
 }
 
-// Empty where the line has no such text.
 bool has(const std::map<std::string, std::string>& entries, const std::string& key, const std::string& value) {
   const auto found = entries.find(key);
   return found != entries.end() && found->second == value;
@@ -120,9 +119,12 @@ void AuditLog::write(const std::vector<Json>& lines) const {
   if (mirror_) std::ranges::for_each(lines, mirror_);
 }
 
-void AuditLog::Proofs::add_lines(const std::string& text) {
-  std::istringstream lines(text);
-  for (std::string line; std::getline(lines, line);) add(Json::parse(line, nullptr, false));
+void AuditLog::Proofs::add_lines(std::string_view lines) {
+  while (!lines.empty()) {
+    const std::string_view line = lines.substr(0, lines.find('\n'));
+    add(Json::parse(line, nullptr, false));
+    lines.remove_prefix(std::min(line.size() + 1, lines.size()));
+  }
 }
 
 // A line that was cut off proves nothing.
@@ -165,24 +167,24 @@ const AuditLog::Proofs& AuditLog::proofs() const {
   const std::string text{std::istreambuf_iterator<char>(file), {}};
   if (!file) throw Error(fmt::format("{}: cannot be read", path_.string()));
   if (!text.starts_with(read_lines_)) refuse_another_log();
-  const AuditChain chain = chain_of(text);
-  if (!chain.broken.empty())
+  // Without a line that is being written, or was cut off.
+  const std::string_view added = std::string_view(text).substr(0, text.rfind('\n') + 1).substr(read_lines_.size());
+  cut_off_ = text.substr(read_lines_.size() + added.size());
+  extend(chain_, added);
+  proofs_.add_lines(added);
+  read_lines_ += added;
+  if (!chain_.broken.empty())
     throw Error(fmt::format(
         "{}: line {} does not follow from those before it: lines were changed, taken out or put in. Nothing "
         "is released or sent until a person has looked (isoshift audit) and has recorded that",
-        path_.string(), chain.broken.front()));
-  Proofs proofs;
-  proofs.add_lines(text);
-  head_ = chain.head;
-  proofs_ = std::move(proofs);
+        path_.string(), chain_.broken.front()));
   read_version_ = {.inode = status.st_ino, .size = status.st_size, .written = status.st_mtim};
-  read_lines_ = text.substr(0, text.rfind('\n') + 1);  // without a line that is being written, or was cut off
   return proofs_;
 }
 
 std::string AuditLog::head() const {
   proofs();
-  return head_.empty() ? chain_of("").head : head_;
+  return cut_off_.empty() ? chain_.head() : sha256_of(chain_.covered + cut_off_ + "\n");
 }
 
 bool AuditLog::has_registration(const std::string& session, const std::string& record_sha256) const {

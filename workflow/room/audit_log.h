@@ -14,8 +14,11 @@
 #include <optional>
 #include <set>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
+
+#include "workflow/room/audit_chain.h"
 
 namespace isoshift {
 
@@ -79,7 +82,7 @@ class AuditLog {
     std::map<std::string, std::string> objects;     // session, by SHA-256 of a released object
     std::set<std::array<std::string, 3>> sendings;  // session, peer, SHA-256 of the object
 
-    void add_lines(const std::string& text);
+    void add_lines(std::string_view lines);
     void add(const nlohmann::ordered_json& line);
   };
   void write(const std::vector<nlohmann::ordered_json>& lines) const;
@@ -92,8 +95,9 @@ class AuditLog {
   Mirror mirror_;
   std::vector<nlohmann::ordered_json> kept_;  // lines that could not be written yet
   mutable Version read_version_;
-  mutable std::string read_lines_;  // the whole lines that were read: a log only grows
-  mutable std::string head_;
+  mutable std::string read_lines_;  // the whole lines that were read: a log only grows, and only what is new is parsed
+  mutable std::string cut_off_;     // what stands behind them: a line that is being written, or never was
+  mutable AuditChain chain_;
   mutable Proofs proofs_;
 };
 

@@ -54,8 +54,8 @@ TEST_F(AuditChainTest, EveryLineHoldsTheHashOfTheLineBefore) {
   const AuditChain chain = chain_of(text());
   EXPECT_EQ(chain.lines, 5U);
   EXPECT_THAT(chain.broken, IsEmpty());
-  EXPECT_EQ(chain.head, sha256_of(before));
-  EXPECT_EQ(log_.head(), chain.head);
+  EXPECT_EQ(chain.head(), sha256_of(before));
+  EXPECT_EQ(log_.head(), chain.head());
 }
 
 TEST_F(AuditChainTest, LinesThatAreChangedTakenOutPutInOrMovedBreakIt) {
