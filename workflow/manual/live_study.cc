@@ -86,19 +86,22 @@ Volume<std::uint8_t> LiveStudy::mask_of_part(std::size_t part) const {
   return body_mask(bodies_, body_numbers_.at(part - structures_.size()), ct);
 }
 
-std::vector<std::vector<Polygon>> LiveStudy::outlines_of(std::size_t part, const Eigen::Isometry3d& setup_error) const {
-  const ProjectedRegion* shown = nullptr;
-  {
-    const std::lock_guard lock(projected_mutex_);
-    auto found = projected_.find(part);
-    if (found == projected_.end())
-      found = projected_.emplace(part, ProjectedRegion({.volume = mask_of_part(part), .excluded = {}, .cut_ends = {}}))
-                  .first;
-    shown = &found->second;
+std::shared_ptr<const ProjectedRegion> LiveStudy::region_of_part(std::size_t part) const {
+  const std::lock_guard lock(shown_mutex_);
+  if (!shown_.region || shown_.part != part) {
+    shown_.region.reset();  // never two in memory
+    shown_ = {.part = part,
+              .region = std::make_shared<const ProjectedRegion>(
+                  RegionOfInterest{.volume = mask_of_part(part), .excluded = {}, .cut_ends = {}})};
   }
+  return shown_.region;
+}
+
+std::vector<std::vector<Polygon>> LiveStudy::outlines_of(std::size_t part, const Eigen::Isometry3d& setup_error) const {
+  const std::shared_ptr<const ProjectedRegion> region = region_of_part(part);
   std::vector<std::vector<Polygon>> outlines;
   for (const XrayView& camera : cameras())
-    outlines.push_back(silhouette(*shown, camera, setup_error * study_.planned_room_from_patient));
+    outlines.push_back(silhouette(*region, camera, setup_error * study_.planned_room_from_patient));
   return outlines;
 }
 

@@ -4,7 +4,6 @@
 #include <Eigen/Geometry>
 #include <array>
 #include <cstdint>
-#include <map>
 #include <memory>
 #include <mutex>
 #include <span>
@@ -64,8 +63,13 @@ class LiveStudy {
     std::vector<XrayView> cameras;
     Renderer* renderer = nullptr;  // of the pyramid
   };
+  struct ShownPart {
+    std::size_t part = 0;
+    std::shared_ptr<const ProjectedRegion> region;  // as large as the CT
+  };
   void find_parts();
   Volume<std::uint8_t> mask_of_part(std::size_t part) const;
+  std::shared_ptr<const ProjectedRegion> region_of_part(std::size_t part) const;
   std::vector<Image<float>> line_integrals(const Eigen::Isometry3d& setup_error, const Level& level) const;
 
   Study study_;
@@ -77,8 +81,8 @@ class LiveStudy {
   std::vector<Part> parts_;              // the structures, then the bodies
   std::vector<std::string> structures_;  // names of the first parts
   std::vector<int> body_numbers_;        // of the others
-  mutable std::mutex projected_mutex_;
-  mutable std::map<std::size_t, ProjectedRegion> projected_;  // parts that were shown
+  mutable std::mutex shown_mutex_;
+  mutable ShownPart shown_;  // the last one
 };
 
 }  // namespace isoshift
