@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <iterator>
 #include <set>
+#include <tuple>
 
 #include "io/config/site_file.h"
 
@@ -81,7 +82,7 @@ std::optional<SessionFiles> chosen_session(const Choice& choice, const StudyFile
   take(files.images);
   if (other_xrays) take(files.other_xrays);
   if (!left.empty() || session.images.empty()) return std::nullopt;
-  std::ranges::stable_sort(session.images, {}, &StudyFiles::Image::at_s);
+  std::ranges::sort(session.images, {}, [](const auto& image) { return std::tuple(image.at_s, image.file); });
   session.patient = choice.patient.id.empty() ? session.images.front().patient : choice.patient.id;
   return session;
 }
