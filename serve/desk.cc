@@ -87,7 +87,7 @@ void Desk::make_room() {
   places_.erase(oldest);
 }
 
-std::shared_ptr<Desk::Place> Desk::place_of(const std::string& session, const std::string& user) {
+std::shared_ptr<Desk::Place> Desk::place_of(const std::string& session) {
   const std::lock_guard lock(mutex_);
   const std::string xrays = name_of_xrays(session);
   if (const auto found = places_.find(xrays); found != places_.end()) {
@@ -98,15 +98,13 @@ std::shared_ptr<Desk::Place> Desk::place_of(const std::string& session, const st
   StudyOptions options = options_from_(order.flags).study;
   options.parts = order.parts;
   make_room();
-  room_.audit("opened by hand", user, session);
   return places_[xrays] =
              std::make_shared<Place>(order, options, room_.by_hand(session), room_.setup_error(session), clock_.now());
 }
 
 HttpResponse Desk::answer(const HttpRequest& request, const SignedIn& who, const std::string& session,
                           const std::string& what) {
-  if (!who.roles.contains(Role::kRegister)) return refusal(403, fmt::format("{} may not register.", who.user));
-  const std::shared_ptr<Place> place = place_of(session, who.user);
+  const std::shared_ptr<Place> place = place_of(session);
   if (place->has_failed()) {  // once: the next request reads again
     const std::lock_guard lock(mutex_);
     places_.erase(name_of_xrays(session));
@@ -114,10 +112,14 @@ HttpResponse Desk::answer(const HttpRequest& request, const SignedIn& who, const
   ManualScreen* screen = place->screen();
   if (screen == nullptr) return refusal(503, "The study is being read. " + place->step());
   if (request.method == "POST" && what == "hand-over") return hand_over(*place, who, session);
-  return screen->answer(request, who, what);
+  HttpResponse answer = screen->answer(request, who, what);
+  if (request.method == "GET" && what == "study")
+    room_.audit(who.roles.contains(Role::kRegister) ? "opened by hand" : "viewed", who.user, session);
+  return answer;
 }
 
 HttpResponse Desk::hand_over(Place& place, const SignedIn& who, const std::string& session) {
+  if (!who.roles.contains(Role::kRegister)) return refusal(403, fmt::format("{} may not register.", who.user));
   const ManualRegistration::State now = place.registration().state();
   if (now.what != ManualRegistration::State::What::kEnded) return refusal(409, "There is no result to hand over.");
   const std::string name = room_.hand_over(session, now.result, who.user);

@@ -1,6 +1,6 @@
 #pragma once
-// The sessions that people register by hand on the room's screen. The study of a session is read in the background, and
-// stays in memory while people work on it.
+// The sessions that people look at closely or register by hand on the room's screen. The study of a session is read in
+// the background, and stays in memory while people work on it.
 
 #include <filesystem>
 #include <functional>
@@ -36,7 +36,7 @@ class Desk {
 
  private:
   class Place;
-  std::shared_ptr<Place> place_of(const std::string& session, const std::string& user);
+  std::shared_ptr<Place> place_of(const std::string& session);
   void make_room();
   HttpResponse hand_over(Place& place, const SignedIn& who, const std::string& session);
 

@@ -98,6 +98,7 @@ HttpResponse ManualScreen::answer(const HttpRequest& request, const SignedIn& wh
                    "searched and region.");
   }
   if (what != "cancel") return refusal(404, "There is nothing at this address.");
+  if (!who.roles.contains(Role::kRegister)) return refusal(403, fmt::format("{} may not register.", who.user));
   registration_.cancel();
   return state();
 }

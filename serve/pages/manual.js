@@ -361,8 +361,10 @@ async function read() {
 }
 
 try {
-  await signedIn();
+  const me = await signedIn();
   if (isOfRoom) {
+    const mayRegister = me.roles.includes("register");
+    for (const one of document.querySelectorAll("#register, .of-register")) one.hidden = !mayRegister;
     element("back").hidden = false;
     element("back").href = "/session/" + session;
     element("back").textContent = "Session " + decodeURIComponent(session);

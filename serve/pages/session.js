@@ -90,7 +90,7 @@ element("reason").addEventListener("input", () => show(shown));
 
 element("name").textContent = session;
 me = await showSignedIn();
-element("by-hand").hidden = !me.roles.includes("register");
+element("by-hand").textContent = me.roles.includes("register") ? "Register by hand" : "Look closely";
 element("trend").href = "/session/" + encodeURIComponent(session) + "/trend";
 element("by-hand").href = "/session/" + encodeURIComponent(session) + "/by-hand";
 

@@ -60,7 +60,11 @@ def decide_and_register_by_hand(doe, poe, address, results):
     doe.find_element(By.ID, "reason").send_keys("no, he did not")
     doe.find_element(By.ID, "reopened").click()
     wait_for(lambda: doe.find_element(By.ID, "release").is_enabled(), 10, "the decision taken back")
-    expect(not poe.find_element(By.ID, "by-hand").is_displayed(), "who may not register is led to registration by hand")
+    expect(text(poe, "#by-hand") == "Look closely", "who may not register is led to registration by hand")
+    poe.find_element(By.ID, "by-hand").click()
+    wait_for(lambda: "rendered in" in text(poe, "#times"), 60, "the DRRs for who may look")
+    expect(not poe.find_element(By.ID, "optimize").is_displayed(), "who may not register could")
+    poe.get(f"{address}/session/{session}")
 
     doe.find_element(By.ID, "by-hand").click()
     wait_for(lambda: "rendered in" in text(doe, "#times"), 60, "the DRRs of the session")

@@ -277,7 +277,7 @@ TEST_F(ScreenTest, WhoMayRegisterChoosesWhereTheFilesDoNotTell) {
 
 TEST_F(ScreenTest, WhoMayRegisterDoesSoByHand) {
   const std::string address = "/api/sessions/" + a_ + "/manual/study";
-  EXPECT_EQ(get(address, "releaser").status, 403);
+  EXPECT_EQ(get(address, "stranger").status, 403);
   EXPECT_EQ(get(address, "registrar").status, 409) << "nobody kept how it was registered";
   EXPECT_EQ(get("/api/sessions/none/manual/study", "registrar").status, 404);
   tree_.keep_order(a_, {.parts = {.study = folder_ / "nowhere"}});
@@ -285,7 +285,6 @@ TEST_F(ScreenTest, WhoMayRegisterDoesSoByHand) {
   EXPECT_EQ(failed.status, 409) << failed.body;
   EXPECT_THAT(failed.body, HasSubstr("nowhere"));
   EXPECT_EQ(wait_until_read(address).status, 409) << "read again";
-  EXPECT_THAT(text_of(tree_.path() / "audit.jsonl"), HasSubstr(R"("event":"opened by hand","by":"registrar")"));
 }
 
 TEST_F(ScreenTest, AStudyIsReadOnceForAllWhoWorkOnIt) {
@@ -297,6 +296,14 @@ TEST_F(ScreenTest, AStudyIsReadOnceForAllWhoWorkOnIt) {
   EXPECT_EQ(Json::parse(read.body).at("views").size(), 2U);
   EXPECT_EQ(get(address + "xrays", "registrar").status, 200) << "at once";
   EXPECT_EQ(post("registrar", address + "hand-over", {}).status, 409) << "there is no result";
+  EXPECT_THAT(text_of(tree_.path() / "audit.jsonl"), HasSubstr(R"("event":"opened by hand","by":"registrar")"));
+  // Who may only look sees everything and registers nothing.
+  EXPECT_EQ(get(address + "study", "viewer").status, 200);
+  EXPECT_THAT(text_of(tree_.path() / "audit.jsonl"), HasSubstr(R"("event":"viewed","by":"viewer")"));
+  const Json pose = {{"translation_mm", {0, 0, 0}}, {"rotation_matrix", {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}}};
+  EXPECT_EQ(post("viewer", address + "drrs", {{"setup_error", pose}, {"detail", 2}}).status, 200);
+  for (const char* what : {"begin", "cancel", "hand-over"})
+    EXPECT_EQ(post("viewer", address + what, {{"setup_error", pose}, {"searched", true}}).status, 403) << what;
 }
 
 // Moved away and registered again, with nobody looking in between.
