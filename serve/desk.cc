@@ -104,6 +104,11 @@ std::shared_ptr<Desk::Place> Desk::place_of(const std::string& session) {
 
 HttpResponse Desk::answer(const HttpRequest& request, const SignedIn& who, const std::string& session,
                           const std::string& what) {
+  if (!room_.is_there(session)) {  // it may have been deleted
+    const std::lock_guard lock(mutex_);
+    places_.erase(name_of_xrays(session));
+    throw NotThere(fmt::format("there is no session {}", session));
+  }
   const std::shared_ptr<Place> place = place_of(session);
   if (place->has_failed()) {  // once: the next request reads again
     const std::lock_guard lock(mutex_);
@@ -111,17 +116,23 @@ HttpResponse Desk::answer(const HttpRequest& request, const SignedIn& who, const
   }
   ManualScreen* screen = place->screen();
   if (screen == nullptr) return refusal(503, "The study is being read. " + place->step());
-  if (request.method == "POST" && what == "hand-over") return hand_over(*place, who, session);
+  if (request.method == "POST" && what == "hand-over") return hand_over(*place, request, who, session);
   HttpResponse answer = screen->answer(request, who, what);
   if (request.method == "GET" && what == "study")
     room_.audit(who.roles.contains(Role::kRegister) ? "opened by hand" : "viewed", who.user, session);
   return answer;
 }
 
-HttpResponse Desk::hand_over(Place& place, const SignedIn& who, const std::string& session) {
+HttpResponse Desk::hand_over(Place& place, const HttpRequest& request, const SignedIn& who,
+                             const std::string& session) {
   if (!who.roles.contains(Role::kRegister)) return refusal(403, fmt::format("{} may not register.", who.user));
   const ManualRegistration::State now = place.registration().state();
   if (now.what != ManualRegistration::State::What::kEnded) return refusal(409, "There is no result to hand over.");
+  if (!has_type_json(request)) return refusal(415, "JSON is expected.");
+  const auto body = nlohmann::json::parse(request.body, nullptr, false);
+  if (!body.is_object() || body.value("folder", nlohmann::json()) != now.result.string())
+    return refusal(
+        409, fmt::format("{} has made another result of this session since. Look at that, or register again.", now.by));
   const std::string name = room_.hand_over(session, now.result, who.user);
   place.registration().forget();
   return json_answer({{"session", name}});

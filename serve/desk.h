@@ -28,7 +28,7 @@ class Desk {
 
   // `what`: as of ManualScreen::answer(), or
   //
-  //   POST hand-over   hands the last result to the engine, which makes a session of it
+  //   POST hand-over   hands the last result, whose folder it names, to the engine, which makes a session of it
   //
   // Status 503 while the study is being read: ask again.
   HttpResponse answer(const HttpRequest& request, const SignedIn& who, const std::string& session,
@@ -38,7 +38,7 @@ class Desk {
   class Place;
   std::shared_ptr<Place> place_of(const std::string& session);
   void make_room();
-  HttpResponse hand_over(Place& place, const SignedIn& who, const std::string& session);
+  HttpResponse hand_over(Place& place, const HttpRequest& request, const SignedIn& who, const std::string& session);
 
   Room& room_;
   const Clock& clock_;

@@ -99,7 +99,7 @@ HttpResponse ManualScreen::answer(const HttpRequest& request, const SignedIn& wh
   }
   if (what != "cancel") return refusal(404, "There is nothing at this address.");
   if (!who.roles.contains(Role::kRegister)) return refusal(403, fmt::format("{} may not register.", who.user));
-  registration_.cancel();
+  registration_.cancel(who.user);
   return state();
 }
 
@@ -193,12 +193,14 @@ HttpResponse ManualScreen::state() {
   switch (now.what) {
     case What::kIdle: return json_answer({{"state", "idle"}});
     case What::kRuns:
-      return json_answer({{"state", "runs"}, {"step", now.progress.step}, {"share", now.progress.share}});
-    case What::kFailed: return json_answer({{"state", "failed"}, {"why", now.failure}});
+      return json_answer(
+          {{"state", "runs"}, {"by", now.by}, {"step", now.progress.step}, {"share", now.progress.share}});
+    case What::kFailed: return json_answer({{"state", "failed"}, {"by", now.by}, {"why", now.failure}});
     case What::kEnded: break;
   }
   const SetupResult result = read_report(now.result);
   return json_answer({{"state", "ended"},
+                      {"by", now.by},
                       {"folder", now.result.string()},
                       {"verdict", to_string(result.verdict)},
                       {"reasons", result.reasons},

@@ -158,6 +158,10 @@ Json Room::session(const std::string& name) {
   if (tree_.is_released(name)) json["obstacle"] = "The session has been released.";
   json["newest"] = tree_.newest_of_same_xrays(name);
   if (json["newest"] != name) json["obstacle"] = "The X-rays have a newer result.";
+  json["can_choose"] = false;
+  if (const auto engine = read_engine_state(tree_.path(), clock_.file_time()))
+    json["can_choose"] =
+        std::ranges::find(engine->state.chosen, name_of_xrays(name), &WaitingSession::name) != engine->state.chosen.end();
   json["decision"] = nullptr;
   json["pose_set_by"] = "";
   try {
@@ -220,9 +224,12 @@ void Room::decide(const Decision& decision) {
 WaitingSession Room::waiting(const std::string& session) const {
   const std::optional<EngineSeen> engine = read_engine_state(tree_.path(), clock_.file_time());
   if (engine)
-    for (const WaitingSession& one : engine->state.waiting)
-      if (one.name == session) return one;
-  throw NotThere(fmt::format("no session {} waits: it may have a result by now, or other X-rays have come", session));
+    for (const auto* sessions : {&engine->state.waiting, &engine->state.chosen})
+      for (const WaitingSession& one : *sessions)
+        if (one.name == name_of_xrays(session)) return one;
+  throw NotThere(fmt::format("there is nothing to choose for session {}: it may have a result by now, or other X-rays "
+                             "have come",
+                             session));
 }
 
 Json Room::options(const std::string& session) {
@@ -232,17 +239,45 @@ Json Room::options(const std::string& session) {
   json["patient"] = waits.patient_id;
   json["acquired"] = waits.acquired;
   json["state"] = waits.why;
+  json["choice"] = "";
+  try {
+    if (const auto choice = tree_.choice(waits.name)) json["choice"] = in_words(*choice);
+  } catch (const Error& error) {
+    json["choice"] = error.what();
+  }
   return json;
 }
 
 std::string Room::choose(const std::string& session, const ChosenIds& ids, const std::string& reason,
                          const std::string& user) {
   const std::lock_guard lock(mutex_);
-  Choice choice = chosen_from(waiting(session).options, ids);
+  const WaitingSession waits = waiting(session);
+  const auto views = static_cast<std::size_t>(watch_.site.sessions ? watch_.site.sessions->views : 1);
+  if (ids.xrays.size() < views)
+    throw Error(fmt::format("{} X-rays make a session here (sessions.views of the site file)", views));
+  Choice choice = chosen_from(waits.options, ids);
+  choice.patient_id = waits.patient_id;
   choice.reason = reason;
   choice.by = user;
   tree_.choose(choice);
   return choice.session;
+}
+
+void Room::withdraw_choice(const std::string& session, const std::string& reason, const std::string& user) {
+  const std::lock_guard lock(mutex_);
+  auto choice = tree_.choice(session);
+  if (!choice || choice->is_withdrawn)
+    throw Error(fmt::format("session {}: there is no choice to withdraw", session));
+  choice->is_withdrawn = true;
+  choice->reason = reason;
+  choice->by = user;
+  tree_.choose(*choice);
+}
+
+bool Room::is_there(const std::string& session) {
+  (void)seen();
+  const std::lock_guard lock(mutex_);
+  return std::ranges::find(list_.sessions(), session, &ListedSession::name) != list_.sessions().end();
 }
 
 RegistrationOrder Room::order(const std::string& session) {

@@ -66,6 +66,10 @@ class Room {
   // Throws Error for what is not among the options, and where ResultsTree::choose() does.
   std::string choose(const std::string& session, const ChosenIds& ids, const std::string& reason,
                      const std::string& user);
+  // Records that a user withdraws the choice that stands for it. Throws Error if there is none.
+  void withdraw_choice(const std::string& session, const std::string& reason, const std::string& user);
+  // Whether the session is still in the list; at most half a second old.
+  bool is_there(const std::string& session);
 
   // What a person who registers a session by hand begins with: how its X-rays are registered, the setup error that was
   // found, and the folder for results. Throws NotThere, and Error if nobody kept how.

@@ -27,6 +27,13 @@ bool is_name(const std::string& user) {
          std::ranges::all_of(user, [](unsigned char c) { return c > ' ' && c < 127; });
 }
 
+std::optional<HttpResponse> refusal_of_reason(const std::string& reason, bool may_be_empty = false) {
+  if (reason.size() > kLongestReason) return refusal(400, "The reason is too long.");
+  if (!may_be_empty && reason.find_first_not_of(" \t\r\n") == std::string::npos)
+    return refusal(400, "A reason is missing.");
+  return std::nullopt;
+}
+
 }  // namespace
 
 HttpResponse Screen::answer(const HttpRequest& request) {
@@ -129,6 +136,7 @@ HttpResponse Screen::session(const HttpRequest& request, const SignedIn& who, co
   if (what.starts_with(kManual)) return desk_.answer(request, who, name, what.substr(kManual.size()));
   if (request.method == "POST") {
     if (what == "choose") return choose(request, who, name);
+    if (what == "withdraw-choice") return withdraw_choice(request, who, name);
     if (what == "decide") return decide(request, who, name);
     if (what == "release") return release(request, who, name);
     return refusal(404, "There is nothing at this address.");
@@ -159,9 +167,22 @@ HttpResponse Screen::choose(const HttpRequest& request, const SignedIn& who, con
   } catch (const Json::exception&) {
     return refusal(400, "xrays, patient, plan, ct and reason are expected.");
   }
-  if (reason.size() > kLongestReason) return refusal(400, "The reason is too long.");
-  if (reason.empty()) return refusal(400, "A reason is missing.");
+  if (auto refused = refusal_of_reason(reason)) return *std::move(refused);
   return json_answer({{"session", room_.choose(name, ids, reason, who.user)}});
+}
+
+HttpResponse Screen::withdraw_choice(const HttpRequest& request, const SignedIn& who, const std::string& name) {
+  if (!who.roles.contains(Role::kRegister)) return refusal(403, fmt::format("{} may not choose.", who.user));
+  if (!has_type_json(request)) return refusal(415, "JSON is expected.");
+  std::string reason;
+  try {
+    reason = Json::parse(request.body).at("reason");
+  } catch (const Json::exception&) {
+    return refusal(400, "reason is expected.");
+  }
+  if (auto refused = refusal_of_reason(reason)) return *std::move(refused);
+  room_.withdraw_choice(name, reason, who.user);
+  return json_answer({{"withdrawn", name}});
 }
 
 HttpResponse Screen::decide(const HttpRequest& request, const SignedIn& who, const std::string& name) {
@@ -178,8 +199,8 @@ HttpResponse Screen::decide(const HttpRequest& request, const SignedIn& who, con
   } catch (const Json::exception&) {
     return refusal(400, "decision, record and reason are expected.");
   }
-  if (decision.reason.size() > kLongestReason) return refusal(400, "The reason is too long.");
-  if (decision.reason.empty() && decision.kind != DecisionKind::kAgreed) return refusal(400, "A reason is missing.");
+  if (auto refused = refusal_of_reason(decision.reason, decision.kind == DecisionKind::kAgreed))
+    return *std::move(refused);
   room_.decide(decision);
   return json_answer({{"decided", to_string(decision.kind)}});
 }

@@ -28,6 +28,7 @@ class Screen {
   HttpResponse session(const HttpRequest& request, const SignedIn& who, const std::string& name,
                        const std::string& what);
   HttpResponse choose(const HttpRequest& request, const SignedIn& who, const std::string& name);
+  HttpResponse withdraw_choice(const HttpRequest& request, const SignedIn& who, const std::string& name);
   HttpResponse decide(const HttpRequest& request, const SignedIn& who, const std::string& name);
   HttpResponse release(const HttpRequest& request, const SignedIn& who, const std::string& name);
   HttpResponse events(const HttpRequest& request);

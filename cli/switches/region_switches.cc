@@ -8,6 +8,7 @@ void add_region_switches(CLI::App& command, RegionOptions& options) {
       .add_option("--structure", options.structures,
                   "Register only this structure of the RT Structure Set; may be repeated")
       ->type_name("NAME")
+      ->allow_extra_args(false)
       ->group(group);
   command
       .add_option("--body", options.bodies,
@@ -23,11 +24,13 @@ void add_region_switches(CLI::App& command, RegionOptions& options) {
       .add_option("--exclude", options.excluded,
                   "Exclude a structure that moves on its own, such as the mandible, or the couch")
       ->type_name("NAME")
+      ->allow_extra_args(false)
       ->group(group);
   command
       .add_option("--rectangle", options.rectangles,
                   "Compare only this rectangle, in pixels, of the X-ray with this label")
       ->type_name("LABEL=C0,R0,C1,R1")
+      ->allow_extra_args(false)
       ->group(group);
   command.add_option("--margin", options.margin_mm, "Margin around every structure, mm")
       ->type_name("MM")

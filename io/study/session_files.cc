@@ -304,6 +304,19 @@ std::string objection_to(const std::set<std::string>& sop_instance_uids, const S
   return same->doubts.empty() ? "" : same->doubts.front();
 }
 
+std::vector<std::string> doubts_about(const SessionFiles& session, const StudyFiles& files, bool other_xrays,
+                                      std::set<std::string> registered) {
+  for (const StudyFiles::Image& image : session.images) registered.insert(image.sop_instance_uid);
+  std::vector<SessionFiles> sessions = sessions_of(files, other_xrays, registered);
+  sessions.push_back(session);
+  std::vector<StudyFiles::Image> images;
+  std::set<std::string> seen;
+  for (const auto* all : {&files.images, &files.other_xrays})
+    for (const StudyFiles::Image& image : *all)
+      if (seen.insert(image.sop_instance_uid).second) images.push_back(image);
+  return Doubts(std::move(images), sessions).of(session);
+}
+
 void compare_copies(StudyFiles& files) {
   std::map<std::string, StudyFiles::Image*> first_of;
   for (auto* images : {&files.images, &files.other_xrays})

@@ -35,6 +35,11 @@ std::vector<SessionFiles> sessions_of(const StudyFiles& files, bool other_xrays,
 std::string objection_to(const std::set<std::string>& sop_instance_uids, const StudyFiles& files, bool other_xrays,
                          std::set<std::string> registered);
 
+// What other X-rays of the patient say against X-rays that a person has made a session, in words. `files`, of that
+// patient, hold them.
+std::vector<std::string> doubts_about(const SessionFiles& session, const StudyFiles& files, bool other_xrays,
+                                      std::set<std::string> registered);
+
 // Finds X-rays that have one SOPInstanceUID and different contents, and notes in each the file of the other.
 void compare_copies(StudyFiles& files);
 

@@ -16,10 +16,10 @@ function input(type, name, {id, words}, isChecked) {
 }
 
 // The first line leaves it to the files.
-function showCandidates(name, candidates) {
+function showCandidates(name, candidates, chosen) {
   element(name).parentElement.hidden = candidates.length === 0;
   element(name).replaceChildren(
-    ...[{id: "", words: "as the files tell"}, ...candidates].map((one, n) => input("radio", name, one, n === 0)));
+    ...[{id: "", words: "as the files tell"}, ...candidates].map(one => input("radio", name, one, one.id === chosen)));
 }
 
 // Made anew only where the options have changed: what a person has set stays.
@@ -27,12 +27,15 @@ function show(options) {
   element("patient").textContent = options.patient;
   element("acquired").textContent = options.acquired;
   if (element("state").textContent !== options.state) element("state").textContent = options.state;
-  const {state, ...rest} = options, text = JSON.stringify(rest);
+  element("standing").textContent = options.choice;
+  element("withdraw").hidden = !options.chosen;
+  const {state, choice, ...rest} = options, text = JSON.stringify(rest);
   if (text === shown) return;
   shown = text;
   element("xrays").replaceChildren(...options.own_xrays.map(one => input("checkbox", "xrays", one, true)),
                                    ...options.other_xrays.map(one => input("checkbox", "xrays", one, false)));
-  for (const name of ["patients", "plans", "cts"]) showCandidates(name, options[name]);
+  for (const [name, kind] of [["patients", "patient"], ["plans", "plan"], ["cts", "ct"]])
+    showCandidates(name, options[name], options.chosen ? options.chosen[kind] : "");
 }
 
 async function update(isAutomatic = false) {
@@ -47,6 +50,7 @@ async function update(isAutomatic = false) {
 }
 
 function enable() {
+  element("withdraw").disabled = isOver || !mayChoose || element("reason").value.trim() === "";
   element("choose").disabled = isOver || !mayChoose || element("reason").value.trim() === "" || checked("xrays").length === 0;
 }
 
@@ -60,8 +64,24 @@ element("choice").addEventListener("submit", async event => {
     const {session: made} = await post(address + "/choose", {xrays: checked("xrays"), patient: one("patients"),
       plan: one("plans"), ct: one("cts"), reason: element("reason").value.trim()});
     isOver = true;
-    element("chosen").replaceChildren("Recorded. The engine registers the X-rays as session " + made + ", which ",
-                                      make("a", "the list", {href: "/"}), " shows.");
+    recorded("The engine registers the X-rays as session " + made + ", which ");
+  } catch (error) {
+    element("problem").textContent = error.message;
+  }
+  enable();
+});
+
+function recorded(what) {
+  element("chosen").replaceChildren("Recorded. " + what, make("a", "the list", {href: "/"}), " shows.");
+}
+
+element("withdraw").addEventListener("click", async () => {
+  element("withdraw").disabled = true;
+  element("problem").textContent = "";
+  try {
+    await post(address + "/withdraw-choice", {reason: element("reason").value.trim()});
+    isOver = true;
+    recorded("The X-rays are grouped and registered as their files tell, which ");
   } catch (error) {
     element("problem").textContent = error.message;
   }

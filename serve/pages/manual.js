@@ -15,9 +15,12 @@ const kAxes = [[1, 0, 0], [0, 1, 0], [0, 0, 1]];
 
 let pose = planned, restingPose = planned;
 const history = [];
+let user = "";
 let wanted = null, isAsking = false, resting = null;
 let isFlickered = false;
 const views = [];
+let shownPose = null;   // of the DRRs on the screen
+let handOverFolder = "";  // of the result that is on the screen
 let tool = "move";      // what the mouse does: "move", "box" or "mark"
 const landmarks = [];   // {xrays, drrs}: pixels by view, or null
 
@@ -59,6 +62,7 @@ async function follow() {
       view.drr = data.subarray(at, at += columns * rows);
       view.detail = asked.detail;
     }
+    shownPose = asked.pose;
     const painted = draw();
     element("times").textContent = "DRRs of " + views.map(view => view.sizes[asked.detail].join(" x ")).join(", ") + ": rendered in " +
       headers.get("X-Isoshift-Milliseconds") + " ms, painted in " + painted.toFixed(0) + " ms, " +
@@ -187,16 +191,16 @@ function use(next) {
   if (tool === "mark" && mode() !== "side") document.querySelector("input[value=side]").click();
 }
 
-// Landmarks: a click in the X-ray and in the DRR of every view. The next one begins when all are there.
+// Landmarks: a click in the X-ray and in the DRR of two views or more. The next one begins when the same views have both.
 
-const isWhole = landmark => [...landmark.xrays, ...landmark.drrs].every(mark => mark);
-const canFit = landmark => [landmark.xrays, landmark.drrs].every(marks => marks.filter(mark => mark).length >= 2);
+const isWhole = landmark => landmark.xrays.filter(mark => mark).length >= 2 &&
+  landmark.xrays.every((mark, n) => !mark === !landmark.drrs[n]);
 
 function mark(view, isDrr, pixel) {
-  if (landmarks.length === 0 || isWhole(landmarks.at(-1)))
-    landmarks.push({xrays: views.map(() => null), drrs: views.map(() => null)});
-  const kind = isDrr ? "drrs" : "xrays", n = views.indexOf(view);
-  (landmarks.find(one => !one[kind][n]) || landmarks.at(-1))[kind][n] = pixel;
+  if (isDrr && shownPose !== pose) return;  // what was clicked is about to change
+  let current = landmarks.find(one => !isWhole(one));
+  if (!current) landmarks.push(current = {xrays: views.map(() => null), drrs: views.map(() => null)});
+  current[isDrr ? "drrs" : "xrays"][views.indexOf(view)] = pixel;
   showLandmarks();
 }
 
@@ -205,12 +209,13 @@ function showLandmarks() {
     view.marks = ["xrays", "drrs"].map(kind =>
       landmarks.flatMap((one, number) => one[kind][n] ? [{pixel: one[kind][n], number: number + 1}] : []));
   });
-  const missing = landmarks.flatMap((one, n) => views.flatMap((view, v) =>
-    [["xrays", "X-ray"], ["drrs", "DRR"]].filter(([kind]) => !one[kind][v])
-      .map(([, name]) => `${n + 1} in the ${name} of ${view.label}`)));
+  const open = landmarks.findIndex(one => !isWhole(one)), one = landmarks[open];
+  const missing = one ? views.flatMap((view, v) =>
+    [["xrays", "X-ray"], ["drrs", "DRR"]].filter(([kind]) => !one[kind][v]).map(([, name]) => `${name} of ${view.label}`)) : [];
+  const enough = views.length > 2 ? " (two views are enough)" : "";
   element("landmarks").textContent = landmarks.length === 0 ? ""
-    : missing.length ? "Still to mark: landmark " + missing.join(", ") : landmarks.length + " marked in all views";
-  element("fit").disabled = landmarks.length === 0 || !landmarks.every(canFit);
+    : one ? `Mark landmark ${open + 1} in: ${missing.join(", ")}${enough}` : landmarks.length + " marked";
+  element("fit").disabled = landmarks.length === 0 || open >= 0;
   element("clear-marks").disabled = landmarks.length === 0;
   draw();
 }
@@ -249,7 +254,8 @@ function problem(text) {
 }
 
 function showResult(now) {
-  const words = now.searched ? "Found: " : "Kept as it was set: ";
+  const words = (now.searched ? "Found" : "Kept as it was set") + (now.by === user ? ": " : ` by ${now.by}: `);
+  handOverFolder = now.folder;
   const report = make("a", "report", {href: kApi + "report.html", target: "_blank", rel: "noopener"});
   const line = make("p", words);
   line.append(verdictCell(now.verdict), " ", report);
@@ -285,7 +291,7 @@ async function watchRegistration() {
 async function handOver() {
   problem("");
   try {
-    const {session: name} = await post(kApi + "hand-over", {});
+    const {session: name} = await post(kApi + "hand-over", {folder: handOverFolder});
     element("hand-over").hidden = true;
     const link = make("a", "session " + name, {href: "/session/" + encodeURIComponent(name)});
     const line = make("p", "The engine makes it ");
@@ -362,6 +368,7 @@ async function read() {
 
 try {
   const me = await signedIn();
+  user = me.user;
   if (isOfRoom) {
     const mayRegister = me.roles.includes("register");
     for (const one of document.querySelectorAll("#register, .of-register")) one.hidden = !mayRegister;

@@ -39,6 +39,7 @@ function show(now) {
   element("rejected").disabled = !mayDecide || reason === "" || decided === "rejected";
   element("repeat").disabled = !mayDecide || reason === "" || decided === "repeat";
   element("reopened").disabled = !mayDecide || reason === "" || decided === "";
+  element("choose").hidden = !now.can_choose || !me.roles.includes("register");
   element("newest").hidden = now.newest === session;
   element("newest").href = "/session/" + encodeURIComponent(now.newest);
   element("newest").textContent = "Newest result of these X-rays: session " + now.newest;
@@ -91,6 +92,7 @@ element("reason").addEventListener("input", () => show(shown));
 element("name").textContent = session;
 me = await showSignedIn();
 element("by-hand").textContent = me.roles.includes("register") ? "Register by hand" : "Look closely";
+element("choose").href = "/session/" + encodeURIComponent(session) + "/choose";
 element("trend").href = "/session/" + encodeURIComponent(session) + "/trend";
 element("by-hand").href = "/session/" + encodeURIComponent(session) + "/by-hand";
 

@@ -267,6 +267,12 @@ TEST_F(ScreenTest, WhoMayRegisterChoosesWhereTheFilesDoNotTell) {
   EXPECT_EQ(tree_.choice(name)->by, "registrar");
   EXPECT_THAT(text_of(tree_.path() / "audit.jsonl"), HasSubstr(R"("event":"chosen")"));
   EXPECT_THAT(text_of(tree_.path() / "audit.jsonl"), Not(HasSubstr("1.2.7"))) << "no UIDs";
+  EXPECT_EQ(tree_.choice(name)->patient_id, "8");
+  EXPECT_EQ(post("releaser", "/api/sessions/" + name + "/withdraw-choice", {{"reason", "wrong"}}).status, 403);
+  EXPECT_EQ(post("registrar", "/api/sessions/" + name + "/withdraw-choice", {{"reason", "  "}}).status, 400);
+  EXPECT_EQ(post("registrar", "/api/sessions/" + name + "/withdraw-choice", {{"reason", "wrong"}}).status, 200);
+  EXPECT_TRUE(tree_.choice(name)->is_withdrawn);
+  EXPECT_EQ(post("registrar", "/api/sessions/" + name + "/withdraw-choice", {{"reason", "wrong"}}).status, 409);
   chosen["plan"] = "1.3.3";
   EXPECT_EQ(post("registrar", "/api/sessions/b/choose", chosen).status, 409) << "nobody offered it";
   chosen["plan"] = "1.3.1";
@@ -295,7 +301,7 @@ TEST_F(ScreenTest, AStudyIsReadOnceForAllWhoWorkOnIt) {
   ASSERT_EQ(read.status, 200) << read.body;
   EXPECT_EQ(Json::parse(read.body).at("views").size(), 2U);
   EXPECT_EQ(get(address + "xrays", "registrar").status, 200) << "at once";
-  EXPECT_EQ(post("registrar", address + "hand-over", {}).status, 409) << "there is no result";
+  EXPECT_EQ(post("registrar", address + "hand-over", {{"folder", "x"}}).status, 409) << "there is no result";
   EXPECT_THAT(text_of(tree_.path() / "audit.jsonl"), HasSubstr(R"("event":"opened by hand","by":"registrar")"));
   // Who may only look sees everything and registers nothing.
   EXPECT_EQ(get(address + "study", "viewer").status, 200);

@@ -124,6 +124,7 @@ std::optional<Runner::End> FakeRunner::end() {
   if (failure) return End{.failure = failure};
   SetupResult report;
   report.verdict = verdict(run.xrays);
+  report.reasons = run.doubts;
   report.site.emplace().sha256 = site_sha256;
   std::string all;
   for (const std::string& uid : run.xrays) {

@@ -91,6 +91,7 @@ LandmarkFit fit_landmarks(std::span<const XrayView> views, std::span<const Landm
     throw Error("The landmarks lie on a line, about which the patient could be turned: mark another beside it");
   const Eigen::Isometry3d motion = motion_between(in_drrs, in_xrays);
   fit.setup_error = motion * current;
+  if (!fit.setup_error.matrix().allFinite()) throw Error("The landmarks lie too far away");
   const Eigen::Matrix3Xd left = (motion * in_drrs) - in_xrays;
   fit.left_mm = std::sqrt(left.squaredNorm() / static_cast<double>(count));
   return fit;

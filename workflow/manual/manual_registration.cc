@@ -54,7 +54,7 @@ void ManualRegistration::begin(const Eigen::Isometry3d& setup_error, const std::
   order.tells_progress = true;
   write_text(order.start,
              nlohmann::json{{"setup_error", json_of_setup_error(setup_error)}, {"set_by", by}}.dump());  // start_pose.h
-  state_ = {.what = State::What::kRuns};
+  state_ = {.what = State::What::kRuns, .by = by};
   running_ = std::make_unique<RegistrationProcess>(order);
 }
 
@@ -65,9 +65,9 @@ void ManualRegistration::look() {
   if (!end) return;
   end_process();
   if (end->failure.empty())
-    state_ = {.what = State::What::kEnded, .result = output_};
+    state_ = {.what = State::What::kEnded, .by = state_.by, .result = output_};
   else
-    state_ = {.what = State::What::kFailed, .failure = end->failure};
+    state_ = {.what = State::What::kFailed, .by = state_.by, .failure = end->failure};
 }
 
 void ManualRegistration::end_process() {
@@ -82,9 +82,10 @@ ManualRegistration::State ManualRegistration::state() {
   return state_;
 }
 
-void ManualRegistration::cancel() {
+void ManualRegistration::cancel(const std::string& by) {
   const std::lock_guard lock(mutex_);
   if (!running_) return;
+  if (state_.by != by) throw Error(fmt::format("{} has begun this registration.", state_.by));
   end_process();
   state_ = {};
 }

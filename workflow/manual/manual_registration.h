@@ -27,14 +27,15 @@ class ManualRegistration {
 
   struct State {
     enum class What { kIdle, kRuns, kEnded, kFailed } what = What::kIdle;
+    std::string by;                // who has begun it
     Progressed progress;           // of what runs
     std::filesystem::path result;  // folder of what has ended
     std::string failure;           // why the last one has no result
   };
   State state();
 
-  // Ends what runs, without a result.
-  void cancel();
+  // Ends what runs, without a result. Throws Error if another person has begun it.
+  void cancel(const std::string& by);
 
   // Says no more of what has ended: its result was moved away.
   void forget();

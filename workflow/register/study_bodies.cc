@@ -36,8 +36,10 @@ std::string body_in_words(const BodyMap& map, int number) {
 
 Volume<std::uint8_t> body_mask(const BodyMap& map, int number, const Volume<float>& lattice) {
   if (number < 1 || number > static_cast<int>(map.bodies.size()))
-    throw UsageError(fmt::format("--body {}: the CT shows the bodies 1 to {} (isoshift inspect --bodies)", number,
-                                 map.bodies.size()));
+    throw UsageError(map.bodies.empty()
+                         ? fmt::format("--body {}: the CT shows no bones", number)
+                         : fmt::format("--body {}: the CT shows the bodies 1 to {} (isoshift inspect --bodies)", number,
+                                       map.bodies.size()));
   if (map.bodies[static_cast<std::size_t>(number - 1)].kind == Body::Kind::kCouch)
     throw UsageError(fmt::format("--body {}: is the couch, not a bone of the patient", number));
   Volume<std::uint8_t> mask(lattice.size, lattice.patient_from_voxel);

@@ -213,6 +213,13 @@ std::string AuditLog::newest_statement(const std::string& event, const std::stri
   return found == proofs().statements.end() ? "" : found->second;
 }
 
+std::set<std::string> AuditLog::sessions_with(const std::string& event) const {
+  std::set<std::string> sessions;
+  for (const auto& [of, sha256] : proofs().statements)
+    if (of.first == event) sessions.insert(of.second);
+  return sessions;
+}
+
 bool AuditLog::has_sending(const std::string& session, const std::string& peer,
                            const std::string& object_sha256) const {
   Proofs kept;

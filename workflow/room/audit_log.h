@@ -63,6 +63,7 @@ class AuditLog {
   // The SHA-256 of the file of what a person has last said about the session in lines of this event (kStatements);
   // empty if there is none.
   std::string newest_statement(const std::string& event, const std::string& session) const;
+  std::set<std::string> sessions_with(const std::string& event) const;
   // The session with which an object was released; nothing if the object was not released.
   std::optional<std::string> session_releasing(const std::string& object_sha256) const;
 

@@ -29,10 +29,11 @@ std::string in_words(const Choice& choice) {
   for (const Candidate& one : {choice.patient, choice.plan, choice.ct})
     if (!one.id.empty()) chosen.push_back(one.words);
   const std::string of_xrays = fmt::format("{}", fmt::join(xrays, " and "));
-  return fmt::format(
-      "{} chose on {} {}: {}", choice.by, choice.on,
-      chosen.empty() ? "as one setup " + of_xrays : fmt::format("for {} {}", of_xrays, fmt::join(chosen, " and ")),
-      choice.reason);
+  if (choice.is_withdrawn)
+    return fmt::format("{} withdrew on {} the choice for {} ({})", choice.by, choice.on, of_xrays, choice.reason);
+  if (choice.is_regrouped || chosen.empty()) chosen.insert(chosen.begin(), "that they show one setup");
+  return fmt::format("{} chose on {} for {}: {} ({})", choice.by, choice.on, of_xrays, fmt::join(chosen, ", "),
+                     choice.reason);
 }
 
 Json json_of(const Candidate& candidate) { return {{"id", candidate.id}, {"words", candidate.words}}; }
@@ -44,6 +45,9 @@ Json json_of(const Choice& choice) {
           {"patient", json_of(choice.patient)},
           {"plan", json_of(choice.plan)},
           {"ct", json_of(choice.ct)},
+          {"is_regrouped", choice.is_regrouped},
+          {"is_withdrawn", choice.is_withdrawn},
+          {"patient_id", choice.patient_id},
           {"reason", choice.reason},
           {"by", choice.by},
           {"user", choice.user},
@@ -64,13 +68,17 @@ Choice choice_from(const nlohmann::json& json) {
           .patient = candidate_from(json.at("patient")),
           .plan = candidate_from(json.at("plan")),
           .ct = candidate_from(json.at("ct")),
+          .is_regrouped = json.at("is_regrouped"),
+          .is_withdrawn = json.at("is_withdrawn"),
+          .patient_id = json.at("patient_id"),
           .reason = json.at("reason"),
           .by = json.at("by"),
           .user = json.at("user"),
           .on = json.at("on")};
 }
 
-std::optional<SessionFiles> chosen_session(const Choice& choice, const StudyFiles& files, bool other_xrays) {
+std::optional<SessionFiles> chosen_session(const Choice& choice, const StudyFiles& files, bool other_xrays,
+                                           const std::set<std::string>& registered) {
   std::set<std::string> left;  // a copy of an X-ray counts once
   for (const Candidate& xray : choice.xrays) left.insert(xray.id);
   SessionFiles session{
@@ -84,6 +92,7 @@ std::optional<SessionFiles> chosen_session(const Choice& choice, const StudyFile
   if (!left.empty() || session.images.empty()) return std::nullopt;
   std::ranges::sort(session.images, {}, [](const auto& image) { return std::tuple(image.at_s, image.file); });
   session.patient = choice.patient.id.empty() ? session.images.front().patient : choice.patient.id;
+  std::ranges::move(doubts_about(session, files, other_xrays, registered), std::back_inserter(session.doubts));
   return session;
 }
 
@@ -102,8 +111,11 @@ std::string missing_of(const Choice& choice, const StudyFiles& as_chosen) {
 }
 
 std::vector<std::string> flags_for(const Choice& choice, const SessionFiles& session) {
-  const auto &first = session.images.front().at_s, &last = session.images.back().at_s;
-  if (!first || !last || *last - *first <= kMaxTimeSpanS) return {};
+  double span_s = 0.0;
+  for (const StudyFiles::Image& image : session.images)
+    for (const StudyFiles::Image& other : session.images)
+      if (image.at_s && other.at_s) span_s = std::max(span_s, *image.at_s - *other.at_s);
+  if (span_s <= kMaxTimeSpanS) return {};
   return {"--allow", fmt::format("time-span={}", in_words(choice))};
 }
 

@@ -4,6 +4,7 @@
 
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -24,6 +25,9 @@ struct Choice {
   std::string session;           // that the X-rays make
   std::vector<Candidate> xrays;  // SOPInstanceUIDs
   Candidate patient, plan, ct;   // plan: SOPInstanceUID; CT: SeriesInstanceUID
+  bool is_regrouped = false;     // without the choice these X-rays would not make a session
+  bool is_withdrawn = false;     // the choice before does not count any more, and nothing is chosen
+  std::string patient_id;        // as the source has it
   std::string reason;            // in the person's words
   std::string by, user;          // the person, and the user of the system
   std::string on;                // local time
@@ -31,7 +35,8 @@ struct Choice {
   bool operator==(const Choice&) const = default;
 };
 
-// "J. Doe chose on 2026-03-01T10:20:00+0100 as one setup AP 10:15:00 and LAT 11:15:00: the panel had failed".
+// "J. Doe chose on 2026-03-01T10:20:00+0100 for AP 10:15:00 and LAT 11:15:00: that they show one setup (the panel had
+// failed)", "J. Doe withdrew on ... the choice for ...".
 std::string in_words(const Choice& choice);
 
 nlohmann::ordered_json json_of(const Candidate& candidate);
@@ -42,7 +47,9 @@ std::vector<Candidate> candidates_from(const nlohmann::json& json);
 Choice choice_from(const nlohmann::json& json);
 
 // The chosen X-rays as a session, which a person must review; nothing while one of them is not among the files.
-std::optional<SessionFiles> chosen_session(const Choice& choice, const StudyFiles& files, bool other_xrays);
+// `registered`: the SOPInstanceUIDs of X-rays that have a result.
+std::optional<SessionFiles> chosen_session(const Choice& choice, const StudyFiles& files, bool other_xrays,
+                                           const std::set<std::string>& registered);
 
 // The files of a session without the plans and CTs that were not chosen.
 StudyFiles as_chosen(StudyFiles of_session, const Choice& choice);

@@ -13,6 +13,30 @@ namespace {
 
 constexpr const char* kFile = "engine.json";
 
+nlohmann::ordered_json json_of(const std::vector<WaitingSession>& sessions) {
+  nlohmann::ordered_json json = nlohmann::ordered_json::array();
+  for (const WaitingSession& one : sessions)
+    json.push_back({{"session", one.name},
+                    {"patient_id", one.patient_id},
+                    {"acquired", one.acquired},
+                    {"why", one.why},
+                    {"has_failed", one.has_failed},
+                    {"options", isoshift::json_of(one.options)}});
+  return json;
+}
+
+std::vector<WaitingSession> sessions_from(const nlohmann::json& json) {
+  std::vector<WaitingSession> sessions;
+  for (const nlohmann::json& one : json)
+    sessions.push_back({.name = one.at("session"),
+                        .patient_id = one.at("patient_id"),
+                        .acquired = one.at("acquired"),
+                        .why = one.at("why"),
+                        .has_failed = one.at("has_failed"),
+                        .options = session_options_from(one.at("options"))});
+  return sessions;
+}
+
 }  // namespace
 
 EngineFile::EngineFile(const std::filesystem::path& results, const Clock& clock)
@@ -24,14 +48,10 @@ void EngineFile::update(const EngineState& state) {
   std::error_code missing;  // on a full disk the state cannot be written, and the engine runs all the same
   std::filesystem::last_write_time(path_, clock_.file_time(), missing);
   if (written_ != state || missing) {
-    nlohmann::ordered_json json = {{"schema", 1}, {"waiting", nlohmann::json::array()}, {"troubles", state.troubles}};
-    for (const WaitingSession& one : state.waiting)
-      json["waiting"].push_back({{"session", one.name},
-                                 {"patient_id", one.patient_id},
-                                 {"acquired", one.acquired},
-                                 {"why", one.why},
-                                 {"has_failed", one.has_failed},
-                                 {"options", json_of(one.options)}});
+    const nlohmann::ordered_json json = {{"schema", 1},
+                                         {"waiting", json_of(state.waiting)},
+                                         {"chosen", json_of(state.chosen)},
+                                         {"troubles", state.troubles}};
     replace_text(path_, json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
     std::filesystem::last_write_time(path_, clock_.file_time());
     written_ = state;
@@ -48,13 +68,8 @@ std::optional<EngineSeen> read_engine_state(const std::filesystem::path& results
   EngineSeen seen{.age = std::chrono::duration_cast<std::chrono::seconds>(now - written)};
   try {
     seen.state.troubles = json.at("troubles");
-    for (const nlohmann::json& one : json.at("waiting"))
-      seen.state.waiting.push_back({.name = one.at("session"),
-                                    .patient_id = one.at("patient_id"),
-                                    .acquired = one.at("acquired"),
-                                    .why = one.at("why"),
-                                    .has_failed = one.at("has_failed"),
-                                    .options = session_options_from(one.at("options"))});
+    seen.state.waiting = sessions_from(json.at("waiting"));
+    seen.state.chosen = sessions_from(json.at("chosen"));
   } catch (const nlohmann::json::exception& error) {
     throw Error(fmt::format("{}: is not what isoshift watch writes: {}", file.string(), error.what()));
   }

@@ -26,10 +26,23 @@ void Grouping::add_result(const std::string& session, const std::set<std::string
 
 void Grouping::add_deleted(const std::set<std::string>& sha256) { deleted_.insert(sha256.begin(), sha256.end()); }
 
+void Grouping::remove(const std::string& session) {
+  results_.erase(name_of_xrays(session));
+  for (auto& [uid, of] : session_of_)
+    if (of == name_of_xrays(session)) of.clear();
+}
+
+bool Grouping::is_regrouped(const std::string& session) const {
+  const Choice* const choice = choice_for(session);
+  return choice != nullptr && choice->is_regrouped;
+}
+
 void Grouping::see(const StudyFiles& files) {
   if (deleted_.empty()) return;
   for_each_xray(files, [&](const std::string& uid) {
-    if (!registered_.contains(uid) && deleted_.contains(sha256_of(uid))) registered_.insert(uid);
+    if (registered_.contains(uid) || !deleted_.contains(sha256_of(uid))) return;
+    registered_.insert(uid);
+    session_of_[uid] = "";
   });
 }
 
@@ -46,12 +59,21 @@ std::vector<SessionFiles> Grouping::sessions_in(const StudyFiles& files) const {
   std::set<std::string> taken = registered_;
   for (const auto& [name, choice] : choices_) {
     if (results_.contains(name)) continue;
-    auto session = chosen_session(choice, files, takes_other_xrays_);
+    auto session = chosen_session(choice, files, takes_other_xrays_, registered_);
     if (!session) continue;
     for (const StudyFiles::Image& image : session->images) taken.insert(image.sop_instance_uid);
     sessions.push_back(*std::move(session));
   }
   std::ranges::move(sessions_of(files, takes_other_xrays_, taken), std::back_inserter(sessions));
+  return sessions;
+}
+
+std::vector<SessionFiles> Grouping::chosen_in(const StudyFiles& files) const {
+  std::vector<SessionFiles> sessions;
+  for (const auto& [name, choice] : choices_)
+    if (results_.contains(name))
+      if (auto session = chosen_session(choice, files, takes_other_xrays_, registered_))
+        sessions.push_back(*std::move(session));
   return sessions;
 }
 
@@ -64,7 +86,7 @@ std::set<std::string> Grouping::registered_in(const StudyFiles& files) const {
 }
 
 std::optional<SessionFiles> Grouping::registered_session(const std::string& session, const StudyFiles& files) const {
-  if (const Choice* const choice = choice_for(session)) return chosen_session(*choice, files, takes_other_xrays_);
+  if (const Choice* const choice = choice_for(session)) return chosen_session(*choice, files, takes_other_xrays_, registered_);
   const auto own = results_.find(session);
   std::set<std::string> others = registered_;
   if (own != results_.end())
@@ -98,7 +120,8 @@ std::vector<std::string> Grouping::flags_of(const SessionFiles& session) const {
 }
 
 SessionOptions Grouping::options_of(const SessionFiles& session, const StudyFiles& files) const {
-  return isoshift::options_of(session, files_for(session, files), files, takes_other_xrays_, session_of_);
+  return isoshift::options_of(session, files_for(session, files), files, takes_other_xrays_, session_of_,
+                              choice_for(session.name));
 }
 
 }  // namespace isoshift

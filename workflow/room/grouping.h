@@ -24,9 +24,12 @@ class Grouping {
   void add_result(const std::string& session, const std::set<std::string>& xrays);
   // X-rays whose results were deleted, as SHA-256 of their SOPInstanceUIDs. They are not registered again.
   void add_deleted(const std::set<std::string>& sha256);
+  // Takes out all results of these X-rays.
+  void remove(const std::string& session);
   // By session. Replaces what was chosen before.
   void set_choices(std::map<std::string, Choice> choices) { choices_ = std::move(choices); }
   const std::map<std::string, Choice>& choices() const { return choices_; }
+  bool is_regrouped(const std::string& session) const;  // by choice
 
   // X-rays that have a result, or had one that was deleted, among those seen by see().
   const std::set<std::string>& registered() const { return registered_; }
@@ -37,6 +40,8 @@ class Grouping {
 
   // The sessions among a patient's files that have no result.
   std::vector<SessionFiles> sessions_in(const StudyFiles& files) const;
+  // The sessions that have a result and rest on a choice, as far as their X-rays are among the files.
+  std::vector<SessionFiles> chosen_in(const StudyFiles& files) const;
   // The sessions that have a result and of which X-rays are among the files.
   std::set<std::string> registered_in(const StudyFiles& files) const;
   // The X-rays of a result as a session; nothing if they would be grouped in another way now.
@@ -56,7 +61,7 @@ class Grouping {
 
   bool takes_other_xrays_;
   std::map<std::string, std::set<std::string>> results_;  // X-rays, by session
-  std::map<std::string, std::string> session_of_;         // the last session of an X-ray
+  SessionOfXray session_of_;                              // the last session of an X-ray
   std::set<std::string> registered_;
   std::set<std::string> deleted_;  // SHA-256
   std::map<std::string, Choice> choices_;

@@ -27,6 +27,9 @@ class InputChanges {
             const std::function<bool(const std::string& patient_id, Clock::Time last)>& is_quiet,
             const std::function<void(const std::string& session, const std::string& what)>& found);
 
+  // Compares again what was compared: what people have chosen has changed.
+  void forget_comparisons() { compared_.clear(); }
+
   // The sessions of a patient that are to be registered again, each under the name of its next result.
   std::vector<SessionFiles> to_register(const std::string& patient_id, const StudyFiles& files) const;
   // That was done. `session`: any result of the X-rays.

@@ -6,6 +6,7 @@
 #include <ctime>
 #include <iomanip>
 #include <sstream>
+#include <tuple>
 
 #include "io/study/session_files.h"
 #include "workflow/room/session_record.h"
@@ -23,9 +24,9 @@ std::optional<double> seconds_of(const std::string& acquired) {
 
 }  // namespace
 
-void Objections::add_result(const std::string& session, const SetupResult& result, bool is_chosen) {
+void Objections::add_result(const std::string& session, const SetupResult& result, bool is_regrouped) {
   OfPatient& patient = patients_[result.identity.patient_id];
-  if (is_chosen) patient.chosen.insert(session);
+  if (is_regrouped) patient.regrouped[session] = result.reasons;
   patient.is_news = true;
   std::set<Xray>& own = patient.results[session];
   for (const SetupResult::View& view : result.views) {
@@ -60,7 +61,7 @@ void Objections::see(const std::string& patient_id, const StudyFiles& files) {
         for (const auto& [session, own] : same.results)
           for (const auto& [uid, acquired] : own) patient_of_uid_[uid] = patient_id;
         patient.results.merge(same.results);
-        patient.chosen.merge(same.chosen);
+        patient.regrouped.merge(same.regrouped);
         patient.xrays.merge(same.xrays);
       }
       patient.xrays[Xray(image.sop_instance_uid, image.acquired)] = {
@@ -136,19 +137,47 @@ Objection Objections::newer_xrays(const OfPatient& patient, const std::set<Xray>
           .newer_have_results = have_results && !acquired.empty()};
 }
 
-// Of X-rays that a person has grouped it is known that they would be grouped in another way.
+// Results that share X-rays answer the same question, and at most one of them can be right.
+std::string Objections::shared_xrays(const OfPatient& patient, const std::string& session) {
+  std::set<std::string> own;
+  for (const auto& [uid, acquired] : patient.results.at(session)) own.insert(uid);
+  for (const auto& [other, xrays] : patient.results)
+    if (name_of_xrays(other) != name_of_xrays(session) &&
+        std::ranges::any_of(xrays, [&](const Xray& xray) { return own.contains(xray.first); }))
+      return fmt::format("session {} has a result of some of these X-rays with others", other);
+  return "";
+}
+
+// Of X-rays that a person has grouped, what is said in the report of their result is no news.
 Objection Objections::objection(const OfPatient& patient, const std::string& session,
                                 const std::set<std::string>& registered) const {
   const std::set<Xray>& own = patient.results.at(session);
   Objection found = newer_xrays(patient, own, registered);
-  if (patient.chosen.contains(session) || !are_seen(patient, own)) return found;
+  const auto add = [&](const std::string& words) {
+    if (!words.empty()) found = {.words = found.words + (found.words.empty() ? "" : "; ") + words};
+  };
+  add(shared_xrays(patient, session));
+  if (!are_seen(patient, own)) return found;
   StudyFiles all;
   for (const auto& [xray, seen] : patient.xrays)
     if (seen.image) (seen.is_rt_image ? all.images : all.other_xrays).push_back(*seen.image);
   std::set<std::string> uids;
   for (const auto& [uid, acquired] : own) uids.insert(uid);
-  if (const std::string words = objection_to(uids, all, takes_other_xrays_, registered); !words.empty())
-    found = {.words = found.words + (found.words.empty() ? "" : "; ") + words};
+  const auto regrouped = patient.regrouped.find(session);
+  if (regrouped == patient.regrouped.end()) {
+    add(objection_to(uids, all, takes_other_xrays_, registered));
+    return found;
+  }
+  SessionFiles group;
+  for (const Xray& xray : own) group.images.push_back(*patient.xrays.at(xray).image);
+  std::ranges::sort(group.images, {}, [](const auto& image) { return std::tuple(image.at_s, image.file); });
+  group.patient = group.images.front().patient;
+  for (const std::string& doubt : doubts_about(group, all, takes_other_xrays_, registered))
+    if (std::ranges::none_of(regrouped->second,
+                             [&](const std::string& reason) { return reason.find(doubt) != std::string::npos; })) {
+      add(doubt);
+      break;
+    }
   return found;
 }
 

@@ -21,8 +21,8 @@ class Objections {
   Objections(std::map<std::string, Objection> earlier, bool takes_other_xrays)
       : by_session_(std::move(earlier)), takes_other_xrays_(takes_other_xrays) {}
 
-  // `is_chosen`: a person has chosen that its X-rays are one setup.
-  void add_result(const std::string& session, const SetupResult& result, bool is_chosen = false);
+  // `is_regrouped`: a person has made its X-rays a session.
+  void add_result(const std::string& session, const SetupResult& result, bool is_regrouped = false);
 
   // That the files of a result are others now, in words. It counts with the next update().
   void add(const std::string& session, const std::string& words);
@@ -56,7 +56,8 @@ class Objections {
   struct OfPatient {
     std::map<Xray, Seen> xrays;
     std::map<std::string, std::set<Xray>> results;  // by session
-    std::set<std::string> chosen;                   // sessions whose X-rays a person has grouped
+    // Sessions whose X-rays a person has grouped, with the reasons that their results give.
+    std::map<std::string, std::vector<std::string>> regrouped;
     std::optional<Clock::Time> looked_at;           // Patient::last at that time
     bool is_news = false;                           // files or results that were not compared yet
   };
@@ -66,6 +67,7 @@ class Objections {
   static bool may_be_later(const Moment& moment, const Moment& than);
   static Objection newer_xrays(const OfPatient& patient, const std::set<Xray>& own,
                                const std::set<std::string>& registered);
+  static std::string shared_xrays(const OfPatient& patient, const std::string& session);
   static bool are_seen(const OfPatient& patient, const std::set<Xray>& own);
   Objection objection(const OfPatient& patient, const std::string& session,
                       const std::set<std::string>& registered) const;

@@ -348,13 +348,8 @@ std::optional<Decision> ResultsTree::decision(const std::string& session) const 
 
 void ResultsTree::choose(Choice choice) {
   const FileLock lock = lock_releases();
-  if (fs::exists(session(choice.session)))
+  if (fs::exists(session(choice.session)) && audit_.newest_statement(kChoiceStatement.event, choice.session).empty())
     throw Error(fmt::format("session {}: its X-rays have a result already", choice.session));
-  if (const auto before = this->choice(choice.session)) {
-    if (choice.patient.id.empty()) choice.patient = before->patient;
-    if (choice.plan.id.empty()) choice.plan = before->plan;
-    if (choice.ct.id.empty()) choice.ct = before->ct;
-  }
   choice.user = system_user().name;
   choice.on = local_time();
   put_statement(kChoiceStatement, path_, choice.session, json_of(choice),
@@ -367,11 +362,18 @@ std::optional<Choice> ResultsTree::choice(const std::string& session) const {
   return statement ? std::optional(as_stated(*statement, xrays, choice_from)) : std::nullopt;
 }
 
-std::map<std::string, int> ResultsTree::chosen() const {
-  std::map<std::string, int> choices;
-  for (const auto& entry : fs::directory_iterator(path_ / kChoiceStatement.event)) {
-    const std::string name = entry.path().filename().string();
-    if (!name.starts_with('.')) ++choices[name.substr(0, name.find('.'))];
+std::map<std::string, std::string> ResultsTree::chosen() const {
+  std::map<std::string, std::string> choices;
+  for (const std::string& session : audit_.sessions_with(kChoiceStatement.event))
+    if (!is_deleted(path_, session)) choices[session] = "";  // its files may be gone
+  std::set<fs::path> files;
+  for (const auto& entry : fs::directory_iterator(path_ / kChoiceStatement.event)) files.insert(entry.path());
+  for (const fs::path& file : files) {
+    const std::string name = file.filename().string();
+    std::error_code gone;
+    const auto written = fs::last_write_time(file, gone);
+    if (!name.starts_with('.'))
+      choices[name.substr(0, name.find('.'))] += fmt::format("{} {}\n", name, written.time_since_epoch().count());
   }
   return choices;
 }
@@ -416,7 +418,7 @@ bool ResultsTree::is_to_be_sent(const std::string& session) const {
 // First the line in the audit log, then the file, then the results: finish_deletions() continues after the second.
 void ResultsTree::remove(const std::string& session, const std::string& by) {
   const FileLock lock = lock_releases();
-  if (!std::ranges::binary_search(sessions(), session))
+  if (!std::ranges::binary_search(sessions(), session) && !chosen().contains(name_of_xrays(session)))
     throw Error(fmt::format("{}: holds no session {}", path_.string(), session));
   Deletion deletion{
       .session = name_of_xrays(session), .by = by, .user = system_user().name, .on = local_time(), .xrays = {}};
@@ -431,6 +433,12 @@ void ResultsTree::remove(const std::string& session, const std::string& by) {
     } catch (const Error&) {  // a damaged result names no X-rays
       continue;
     }
+  }
+  try {
+    if (const auto chosen = choice(session))
+      for (const Candidate& xray : chosen->xrays) deletion.xrays.insert(isoshift::sha256_of(xray.id));
+  } catch (const Error&) {
+    // A damaged choice names no X-rays.
   }
   audit_.append("deleted", {{"session", deletion.session}, {"by", by}, {"user", deletion.user}});
   put_deletion(path_, deletion);

@@ -125,20 +125,20 @@ class ResultsTree {
   // Throws Error if the files do not say what the audit log proves.
   std::optional<Decision> decision(const std::string& session) const;
 
-  // Records what a person has chosen for X-rays; when, and by which user of the system, is added here, and what an
-  // earlier choice for them says where this one says nothing. Throws Error if these X-rays have a result already, or if
-  // the audit log cannot be written.
+  // Records what a person has chosen for X-rays, or that an earlier choice is withdrawn; when, and by which user of the
+  // system, is added here. Throws Error if these X-rays have a result that rests on no choice, or if the audit log
+  // cannot be written.
   void choose(Choice choice);
-  // The choice for the X-rays of a session; nothing if there is none. Throws Error if the files do not say what the
-  // audit log proves.
+  // The newest choice for the X-rays of a session; nothing if there is none. Throws Error if the files do not say what
+  // the audit log proves.
   std::optional<Choice> choice(const std::string& session) const;
-  // How often people have chosen, by session.
-  std::map<std::string, int> chosen() const;
+  // The sessions for whose X-rays people have chosen, each with a text that changes with the files that say so.
+  std::map<std::string, std::string> chosen() const;
 
   // Whether it was released, and a peer has yet to confirm an object.
   bool is_to_be_sent(const std::string& session) const;
-  // Deletes all results of the session's X-rays and what is kept of them; the audit log, and a file in deleted/, say
-  // so. Throws Error, and deletes nothing, if there is no such session, if what was released of it is still to be sent,
+  // Deletes all results of the session's X-rays, and what is kept of them or was chosen for them; the audit log, and a
+  // file in deleted/, say so. Throws Error, and deletes nothing, if there is no such session, if what was released of it is still to be sent,
   // or if the audit log cannot be written. `by`: the person, or the rule of the watch file.
   void remove(const std::string& session, const std::string& by);
   // All deletions. Removes what a killed process has left of results that it was deleting.

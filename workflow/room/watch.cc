@@ -59,7 +59,7 @@ void Watch::round() {
                     "this watch ends",
                     tree_.path().string()));
   set_sendable({});
-  const bool was_source_read = is_source_read_;
+  was_source_read_ = is_source_read_;
   troubles_.attempt("receiving", [&] { receive(); });
   troubles_.attempt("comparing clocks", [&] { compare_clocks(); });
   troubles_.attempt("deleting old results", [&] { delete_old_results(); });
@@ -71,12 +71,12 @@ void Watch::round() {
   troubles_.attempt("comparing X-rays with results", [&] {
     look_for_objections();
     // In its first round a source may only have seen that there are files.
-    set_sendable({.is_known = was_source_read && is_source_read_, .waiting = sessions_whose_files_come()});
+    set_sendable({.is_known = was_source_read_ && is_source_read_, .waiting = sessions_whose_files_come()});
   });
   troubles_.attempt("releasing", [&] { release_automatically(); });
   troubles_.attempt("writing the audit log", [&] { tree_.write_kept_audit(); });
   troubles_.attempt("writing the index", [&] { index_.update(waiting_, troubles(), objections_.by_session()); });
-  troubles_.attempt("writing engine.json", [&] { engine_.update({.waiting = waiting_, .troubles = troubles()}); });
+  troubles_.attempt("writing engine.json", [&] { engine_.update({.waiting = waiting_, .chosen = chosen_, .troubles = troubles()}); });
 }
 
 std::vector<std::string> Watch::troubles() const {
@@ -139,6 +139,11 @@ void Watch::receive() {
 void Watch::compare_clocks() {
   const auto& limit_s = watch_.site.sessions->max_clock_offset_s;
   if (!limit_s || !is_source_read_) return;
+  const bool is_coming = std::ranges::any_of(parts_.source.patients(), [&](const auto& patient) {
+    return parts_.source.is_coming(patient.first);
+  });
+  if (!are_clocks_compared_ && (!was_source_read_ || is_coming)) return;  // what was there before is still being read
+  are_clocks_compared_ = true;
   clocks_.update(parts_.source.patients(), std::chrono::file_clock::to_sys(parts_.clock.file_time()));
   if (const std::string words = clocks_.beyond(*limit_s); !words.empty()) throw Error(words);
 }
@@ -163,6 +168,7 @@ void Watch::take_deletions() {
   if (deletions_read_ != newest) {
     for (const Deletion& deletion : tree_.finish_deletions()) {
       index_.remove(deletion.session);
+      grouping_.remove(deletion.session);
       objections_.remove(deletion.session);
       grouping_.add_deleted(deletion.xrays);
     }
@@ -173,17 +179,16 @@ void Watch::take_deletions() {
 
 // What people have chosen on the screen. A choice that does not count hides no other.
 void Watch::take_choices() {
-  if (const std::map<std::string, int> there = tree_.chosen(); choices_read_ != there) {
-    read_choices(there);
-    choices_read_ = there;
-  }
+  const std::map<std::string, std::string> there = tree_.chosen();
+  if (choices_read_ != there || !choice_trouble_.empty()) read_choices(there);
+  choices_read_ = there;
   if (!choice_trouble_.empty()) throw Error(choice_trouble_);
 }
 
-void Watch::read_choices(const std::map<std::string, int>& there) {
+void Watch::read_choices(const std::map<std::string, std::string>& there) {
   std::map<std::string, Choice> choices;
   choice_trouble_.clear();
-  for (const auto& [session, count] : there) {
+  for (const auto& [session, version] : there) {
     try {
       if (auto choice = tree_.choice(session)) choices[session] = *std::move(choice);
     } catch (const std::exception& error) {
@@ -191,11 +196,15 @@ void Watch::read_choices(const std::map<std::string, int>& there) {
     }
   }
   for (const auto& [session, choice] : choices) {
-    const auto before = grouping_.choices().find(session);
-    if (before != grouping_.choices().end() && before->second == choice) continue;
+    const auto before = choices_.find(session);
+    if (before != choices_.end() && before->second == choice) continue;
     failures_.erase(session);
+    changes_.forget_comparisons();
     if (choices_read_) parts_.observer.say(fmt::format("session {}: {}", session, in_words(choice)));
+    if (choice.is_withdrawn) objections_.add(tree_.newest_of_same_xrays(session), in_words(choice));
   }
+  choices_ = choices;
+  std::erase_if(choices, [](const auto& one) { return one.second.is_withdrawn; });
   grouping_.set_choices(std::move(choices));
 }
 
@@ -221,7 +230,7 @@ void Watch::take_result(const std::string& session, const std::optional<Running>
   const std::string obstacle = obstacle_to_release(tree_, session, report.verdict);
   const std::string reason = reason_for_person(session, report, made);
   index_.add(session, report, obstacle, reason);
-  objections_.add_result(session, report, grouping_.choices().contains(name_of_xrays(session)));
+  objections_.add_result(session, report, grouping_.is_regrouped(session));
   if (made) parts_.observer.say(fmt::format("session {}: {}", session, to_string(report.verdict)));
   if (made && watch_.site.automatic_release && report.verdict == Verdict::kAccepted && obstacle.empty() &&
       reason.empty())
@@ -267,11 +276,18 @@ void Watch::register_complete() {
 // Those that can be registered now. Lists all that have no result as waiting, with the reason.
 std::vector<Watch::Complete> Watch::complete_sessions() {
   waiting_.clear();
+  chosen_.clear();
   std::vector<Complete> complete;
   std::set<std::string> found;
   for (const auto& [patient_id, patient] : parts_.source.patients()) {
     std::vector<SessionFiles> sessions = grouping_.sessions_in(patient.files);
     std::ranges::move(changes_.to_register(patient_id, patient.files), std::back_inserter(sessions));
+    for (const SessionFiles& session : grouping_.chosen_in(patient.files))
+      chosen_.push_back({.name = session.name,
+                         .patient_id = patient_id,
+                         .acquired = times_of(session.images),
+                         .why = "has a result",
+                         .options = grouping_.options_of(session, patient.files)});
     for (SessionFiles& session : sessions) {
       found.insert(session.name);
       StudyFiles own = grouping_.files_of(session, patient.files);
@@ -298,7 +314,7 @@ WaitingSession Watch::waiting(const SessionFiles& session, const StudyFiles& own
       .has_failed = failures_.contains(session.name),
       .options = {}};
   const bool is_again = name_of_xrays(session.name) != session.name;
-  if (!is_running && !waits.why.empty() && !is_again) waits.options = grouping_.options_of(session, patient.files);
+  if (!is_running && !waits.why.empty() && !is_again && is_quiet(patient_id, patient.last)) waits.options = grouping_.options_of(session, patient.files);
   return waits;
 }
 
@@ -376,6 +392,7 @@ void Watch::end_registration() {
       tree_.keep_inputs(session, made->inputs);
       tree_.publish(session);
       changes_.registered(session);
+      changes_.forget_comparisons();  // somebody may have chosen in the meantime
       take_result(session, made);
     }
   } catch (const std::exception& error) {

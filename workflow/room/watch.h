@@ -103,7 +103,7 @@ class Watch {
   void compare_clocks();
   void take_deletions();
   void take_choices();
-  void read_choices(const std::map<std::string, int>& there);
+  void read_choices(const std::map<std::string, std::string>& there);
   void delete_old_results();
   void register_complete();
   std::vector<Complete> complete_sessions();
@@ -137,11 +137,14 @@ class Watch {
   Grouping grouping_;
   InputChanges changes_;
   std::optional<std::filesystem::file_time_type> deletions_read_;
-  std::optional<std::map<std::string, int>> choices_read_;
+  std::optional<std::map<std::string, std::string>> choices_read_;
+  std::map<std::string, Choice> choices_;  // those that were read, also withdrawn ones
   std::string choice_trouble_;
   std::map<std::string, std::string> accepted_;  // released without a person: PatientID in the source, by session
   bool is_source_read_ = false;                  // in this round
-  std::vector<WaitingSession> waiting_;
+  bool was_source_read_ = false;                 // in the round before
+  bool are_clocks_compared_ = false;
+  std::vector<WaitingSession> waiting_, chosen_;
   std::optional<Running> running_;
   std::map<std::string, Failure> failures_;  // by session
   Troubles troubles_, sending_troubles_;

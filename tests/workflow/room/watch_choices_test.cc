@@ -50,8 +50,9 @@ class WatchChoices : public testing::Test {
   }
   SessionOptions options(const Xrays& xrays) const {
     const auto engine = read_engine_state(room_.file.results, room_.clock.file_time());
-    for (const WaitingSession& one : engine->state.waiting)
-      if (one.name == session_name(xrays)) return one.options;
+    for (const auto* sessions : {&engine->state.waiting, &engine->state.chosen})
+      for (const WaitingSession& one : *sessions)
+        if (one.name == session_name(xrays)) return one.options;
     ADD_FAILURE() << "does not wait";
     return {};
   }
@@ -79,7 +80,7 @@ TEST_F(WatchChoices, OfTwoPlans) {
   EXPECT_THAT(room_.index(), HasSubstr("2 RT Plans"));
   const SessionOptions options = this->options({"ap", "lat"});
   EXPECT_THAT(options.plans,
-              ElementsAre(Candidate{"A", "the RT Plan A 20260301"}, Candidate{"B", "the RT Plan B 20260301"}));
+              ElementsAre(Candidate{"A", "the RT Plan A 20260301 (A)"}, Candidate{"B", "the RT Plan B 20260301 (B)"}));
   EXPECT_THAT(options.other_xrays, IsEmpty());
   EXPECT_THAT(options.cts, IsEmpty());
   choose({"ap", "lat"}, {.xrays = {"ap", "lat"}, .plan = "B"});
@@ -88,7 +89,7 @@ TEST_F(WatchChoices, OfTwoPlans) {
   EXPECT_EQ(room_.runner.runs()[0].plan, "B");
   ASSERT_THAT(room_.runner.runs()[0].doubts, SizeIs(1));
   EXPECT_THAT(room_.runner.runs()[0].doubts[0], HasSubstr("jdoe chose on "));
-  EXPECT_THAT(room_.runner.runs()[0].doubts[0], HasSubstr("the RT Plan B 20260301: the panel had failed"));
+  EXPECT_THAT(room_.runner.runs()[0].doubts[0], HasSubstr("the RT Plan B 20260301 (B) (the panel had failed)"));
   EXPECT_THAT(room_.runner.runs()[0].flags, Not(testing::Contains("--allow")));
   room_.pass(600s);
   room_.start();
@@ -108,10 +109,10 @@ TEST_F(WatchChoices, OfTwoCtsAfterThePlan) {
   choose(both, {.xrays = both, .plan = "A"});
   room_.pass(60s);
   ASSERT_THAT(room_.runs(), IsEmpty()) << "which CT is not known";
-  choose(both, {.xrays = both, .ct = "ct2"}, "rroe");
+  choose(both, {.xrays = both, .plan = "A", .ct = "ct2"}, "rroe");
   room_.pass(60s);
   ASSERT_THAT(room_.runner.runs(), SizeIs(1));
-  EXPECT_EQ(room_.runner.runs()[0].plan, "A") << "the first choice stands";
+  EXPECT_EQ(room_.runner.runs()[0].plan, "A");
   EXPECT_EQ(room_.runner.runs()[0].ct, "ct2");
 }
 
@@ -130,8 +131,10 @@ TEST_F(WatchChoices, AnHourBetweenTheViews) {
   ASSERT_THAT(flags, SizeIs(testing::Ge(2U)));
   EXPECT_EQ(flags[flags.size() - 2], "--allow");
   EXPECT_THAT(flags.back(), HasSubstr("time-span=jdoe chose on "));
-  EXPECT_THAT(room_.runner.runs()[0].doubts[0],
-              HasSubstr("as one setup AP 2026-03-02 10:15:00 and LAT 2026-03-02 11:20:00: the panel had failed"));
+  EXPECT_THAT(
+      room_.runner.runs()[0].doubts[0],
+      HasSubstr(
+          "for AP 2026-03-02 10:15:00 and LAT 2026-03-02 11:20:00: that they show one setup (the panel had failed)"));
   EXPECT_EQ(objection({"ap", "lat"}), "");
   EXPECT_THAT(room_.index(), HasSubstr("1 sessions registered, 0 waiting"));
   // The files of a chosen session change like those of any other.
@@ -178,7 +181,8 @@ TEST_F(WatchChoices, ARetakeWithAnXrayThatHasAResult) {
   room_.pass(60s);
   EXPECT_THAT(room_.runs(), ElementsAre(Xrays{"ap", "lat"}, Xrays{"ap2", "lat"}));
   EXPECT_THAT(objection({"ap", "lat"}), HasSubstr("newer X-rays"));
-  EXPECT_EQ(objection({"ap2", "lat"}), "");
+  for (const Xrays& xrays : {Xrays{"ap", "lat"}, Xrays{"ap2", "lat"}})
+    EXPECT_THAT(objection(xrays), HasSubstr("has a result of some of these X-rays with others"));
 }
 
 TEST_F(WatchChoices, NothingIsOfferedWhereTheFilesTell) {
@@ -197,6 +201,182 @@ TEST_F(WatchChoices, AnotherPlansXraysAreNotOffered) {
   EXPECT_FALSE(options({"ap"}).is_anything());
 }
 
+TEST_F(WatchChoices, OfAPlanWhatOtherXraysSayCountsOn) {
+  bring_ct("ct");
+  bring_plan("A");
+  bring_plan("B");
+  bring_pair(second_of(10, 15), second_of(10, 15, 40));
+  room_.pass(60s);
+  const Xrays both{"ap", "lat"};
+  choose(both, {.xrays = both, .plan = "A"});
+  room_.pass(60s);
+  EXPECT_EQ(objection(both), "");
+  StudyFiles between = xray("P", "ap2", "AP", second_of(10, 15, 20));
+  between.images[0].plan_uid = "";
+  room_.source.bring(between);
+  room_.pass(60s);
+  EXPECT_THAT(objection(both), HasSubstr("would be grouped in another way"));
+}
+
+TEST_F(WatchChoices, OfAGroupNewXraysCountAndThoseInTheReportDoNot) {
+  bring_ct("ct");
+  bring_plan("A");
+  bring_pair(second_of(10, 15), second_of(11, 20));
+  StudyFiles between = xray("P", "ap2", "AP", second_of(10, 40));
+  between.images[0].plan_uid = "";
+  room_.source.bring(between);
+  room_.pass(60s);
+  const Xrays both{"ap", "lat"};
+  choose({"ap"}, {.xrays = both});
+  room_.pass(60s);
+  ASSERT_THAT(room_.runner.runs(), SizeIs(1));
+  EXPECT_THAT(room_.runner.runs()[0].doubts, testing::Contains(HasSubstr("/in/ap2 was taken between these views")));
+  EXPECT_EQ(objection(both), "") << "the report tells of it";
+  StudyFiles later = xray("P", "ap3", "AP", second_of(10, 50));
+  later.images[0].plan_uid = "";
+  room_.source.bring(later);
+  room_.pass(60s);
+  EXPECT_THAT(objection(both), HasSubstr("/in/ap3 was taken between these views"));
+}
+
+TEST_F(WatchChoices, AChoiceIsMadeAgainAfterTheRegistration) {
+  bring_ct("ct");
+  bring_plan("A");
+  bring_plan("B");
+  bring_pair(second_of(10, 15), second_of(10, 15, 10));
+  room_.pass(60s);
+  const Xrays both{"ap", "lat"};
+  choose(both, {.xrays = both, .plan = "A"});
+  room_.pass(60s);
+  const SessionOptions again = options(both);
+  EXPECT_EQ(again.chosen, (ChosenIds{.xrays = both, .patient = "", .plan = "A", .ct = ""}));
+  choose(both, {.xrays = both, .plan = "B"}, "rroe");
+  room_.pass(60s);
+  ASSERT_THAT(room_.runner.runs(), SizeIs(2));
+  EXPECT_EQ(room_.runner.runs()[1].plan, "B");
+  EXPECT_THAT(room_.index(), HasSubstr("superseded by session " + session_name(both) + "-2"));
+  room_.pass(600s);
+  EXPECT_THAT(room_.runs(), SizeIs(2)) << "for nothing";
+}
+
+TEST_F(WatchChoices, AChoiceDuringTheRegistrationCountsAfterIt) {
+  bring_ct("ct");
+  bring_plan("A");
+  bring_plan("B");
+  bring_pair(second_of(10, 15), second_of(10, 15, 10));
+  room_.pass(60s);
+  const Xrays both{"ap", "lat"};
+  const SessionOptions options = this->options(both);
+  room_.runner.length = 20s;
+  choose(both, {.xrays = both, .plan = "A"});
+  room_.pass(5s);
+  Choice second = chosen_from(options, {.xrays = both, .plan = "B"});
+  second.by = "rroe";
+  ResultsTree(room_.file.results).choose(second);
+  room_.pass(120s);
+  ASSERT_THAT(room_.runner.runs(), SizeIs(2));
+  EXPECT_EQ(room_.runner.runs()[1].plan, "B");
+}
+
+TEST_F(WatchChoices, APlanThatHasGoneGivesWayToAnother) {
+  bring_ct("ct");
+  bring_plan("A");
+  bring_pair(second_of(10, 15), second_of(11, 20));
+  room_.pass(60s);
+  const Xrays both{"ap", "lat"};
+  Choice choice = chosen_from(options({"ap"}), {.xrays = both});
+  choice.plan = {"gone", "the RT Plan gone"};
+  choice.by = "jdoe";
+  ResultsTree(room_.file.results).choose(choice);
+  room_.pass(60s);
+  EXPECT_THAT(room_.index(), HasSubstr("waits for the RT Plan gone"));
+  choose(both, {.xrays = both});
+  room_.pass(60s);
+  EXPECT_THAT(room_.runs(), SizeIs(1));
+}
+
+TEST_F(WatchChoices, AWithdrawnChoiceLeavesTheXraysAsTheyWere) {
+  bring_ct("ct");
+  bring_plan("A");
+  bring_pair(second_of(10, 15), second_of(11, 20));
+  room_.pass(60s);
+  const Xrays both{"ap", "lat"};
+  room_.runner.failure = {.why = "the table moved", .may_be_over_soon = false};
+  choose({"ap"}, {.xrays = both});
+  room_.pass(60s);
+  EXPECT_THAT(room_.index(), HasSubstr("the table moved"));
+  ResultsTree tree(room_.file.results);
+  Choice withdrawn = tree.choice(session_name(both)).value();
+  withdrawn.is_withdrawn = true;
+  tree.choose(withdrawn);
+  room_.pass(60s);
+  EXPECT_THAT(room_.index(), Not(HasSubstr("the table moved")));
+  EXPECT_THAT(options({"ap"}).other_xrays, SizeIs(1));
+  EXPECT_THAT(options({"lat"}).other_xrays, SizeIs(1));
+}
+
+TEST_F(WatchChoices, ALostChoiceIsSaidAndMadeAgain) {
+  bring_ct("ct");
+  bring_plan("A");
+  bring_plan("B");
+  bring_pair(second_of(10, 15), second_of(10, 15, 10));
+  room_.pass(60s);
+  const Xrays both{"ap", "lat"};
+  room_.runner.failure = {.why = "error: out of memory", .may_be_over_soon = false};
+  choose(both, {.xrays = both, .plan = "A"});
+  room_.pass(60s);
+  std::filesystem::remove(room_.file.results / "chosen" / (session_name(both) + ".1.json"));
+  room_.pass(5s);
+  EXPECT_THAT(room_.index(), HasSubstr("audit.jsonl tells of a choice"));
+  room_.runner.failure.reset();
+  choose(both, {.xrays = both, .plan = "B"});
+  room_.pass(60s);
+  EXPECT_THAT(room_.index(), Not(HasSubstr("audit.jsonl tells of a choice")));
+  EXPECT_EQ(room_.runner.runs().back().plan, "B");
+}
+
+TEST_F(WatchChoices, XraysOfAnotherIssuerOrDeletedOnesAreNotOffered) {
+  bring_ct("ct");
+  bring_plan("A");
+  bring_pair(second_of(10, 15), second_of(10, 15, 10));
+  room_.pass(60s);
+  ASSERT_THAT(room_.runs(), SizeIs(1));
+  ResultsTree(room_.file.results).remove(session_name({"ap", "lat"}), "jdoe");
+  StudyFiles next = xray("P", "ap2", "AP", second_of(10, 30)), other = xray("P", "ap3", "AP", second_of(10, 50));
+  next.images[0].patient = "P\\A";
+  other.images[0].patient = "P\\B";
+  for (StudyFiles* one : {&next, &other}) {
+    one->images[0].plan_uid = "";
+    room_.source.bring(*one);
+  }
+  room_.pass(60s);
+  EXPECT_THAT(options({"ap2"}).other_xrays, IsEmpty());
+}
+
+TEST_F(WatchChoices, APlanThatTheXraysNameIsNotChosen) {
+  bring_ct("ct");
+  bring_plan("A");
+  bring_plan("B");
+  room_.source.bring(xray("P", "ap", "AP", second_of(10, 15)));
+  room_.source.bring(xray("P", "lat", "LAT", second_of(10, 15, 10)));
+  room_.pass(60s);
+  EXPECT_THAT(room_.index(), HasSubstr("waits for the RT Plan plan.P"));
+  EXPECT_THAT(options({"ap", "lat"}).plans, IsEmpty());
+}
+
+TEST_F(WatchChoices, AChoiceWithoutAResultIsDeletedOnRequest) {
+  bring_pair(second_of(10, 15), second_of(11, 20));
+  room_.pass(60s);
+  const Xrays both{"ap", "lat"};
+  choose({"ap"}, {.xrays = both});
+  room_.pass(60s);
+  EXPECT_THAT(room_.index(), HasSubstr("waits for the CT"));
+  ResultsTree(room_.file.results).remove(session_name(both), "jdoe");
+  EXPECT_TRUE(std::filesystem::is_empty(room_.file.results / "chosen"));
+  room_.pass(60s);
+  EXPECT_THAT(room_.index(), Not(HasSubstr("waits")));
+}
+
 TEST_F(WatchChoices, AForgedChoiceDoesNotCount) {
   bring_ct("ct");
   bring_plan("A");
@@ -210,17 +390,15 @@ TEST_F(WatchChoices, AForgedChoiceDoesNotCount) {
   EXPECT_THAT(room_.index(), HasSubstr("is not the newest choice"));
 }
 
-TEST_F(WatchChoices, WhatHasAResultIsNotChosenForAgain) {
+TEST_F(WatchChoices, ChoicesAreDeletedWithTheirResults) {
   bring_ct("ct");
   bring_plan("A");
   bring_plan("B");
   bring_pair(second_of(10, 15), second_of(10, 15, 10));
   room_.pass(60s);
   const Xrays both{"ap", "lat"};
-  const SessionOptions options = this->options(both);
   choose(both, {.xrays = both, .plan = "B"});
   room_.pass(60s);
-  EXPECT_THROW(ResultsTree(room_.file.results).choose(chosen_from(options, {.xrays = both, .plan = "A"})), Error);
   ResultsTree(room_.file.results).remove(session_name(both), "jdoe");
   EXPECT_TRUE(std::filesystem::is_empty(room_.file.results / "chosen")) << "it names X-rays of the patient";
   room_.pass(60s);
@@ -232,7 +410,8 @@ TEST_F(WatchChoices, OnlyWhatIsOfferedIsChosen) {
                                .other_xrays = {},
                                .patients = {},
                                .plans = {{"A", "the RT Plan A"}, {"B", "the RT Plan B"}},
-                               .cts = {}};
+                               .cts = {},
+                               .chosen = std::nullopt};
   EXPECT_EQ(chosen_from(options, {.xrays = {"ap", "lat"}, .plan = "A"}).plan.words, "the RT Plan A");
   EXPECT_THROW(chosen_from(options, {.xrays = {"ap", "lat"}, .plan = "C"}), Error);
   EXPECT_THROW(chosen_from(options, {.xrays = {"ap", "cbct"}}), Error);
