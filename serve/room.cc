@@ -160,8 +160,8 @@ Json Room::session(const std::string& name) {
   if (json["newest"] != name) json["obstacle"] = "The X-rays have a newer result.";
   json["can_choose"] = false;
   if (const auto engine = read_engine_state(tree_.path(), clock_.file_time()))
-    json["can_choose"] =
-        std::ranges::find(engine->state.chosen, name_of_xrays(name), &WaitingSession::name) != engine->state.chosen.end();
+    json["can_choose"] = std::ranges::find(engine->state.chosen, name_of_xrays(name), &WaitingSession::name) !=
+                         engine->state.chosen.end();
   json["decision"] = nullptr;
   json["pose_set_by"] = "";
   try {
@@ -227,9 +227,10 @@ WaitingSession Room::waiting(const std::string& session) const {
     for (const auto* sessions : {&engine->state.waiting, &engine->state.chosen})
       for (const WaitingSession& one : *sessions)
         if (one.name == name_of_xrays(session)) return one;
-  throw NotThere(fmt::format("there is nothing to choose for session {}: it may have a result by now, or other X-rays "
-                             "have come",
-                             session));
+  throw NotThere(
+      fmt::format("there is nothing to choose for session {}: it may have a result by now, or other X-rays "
+                  "have come",
+                  session));
 }
 
 Json Room::options(const std::string& session) {
@@ -266,8 +267,7 @@ std::string Room::choose(const std::string& session, const ChosenIds& ids, const
 void Room::withdraw_choice(const std::string& session, const std::string& reason, const std::string& user) {
   const std::lock_guard lock(mutex_);
   auto choice = tree_.choice(session);
-  if (!choice || choice->is_withdrawn)
-    throw Error(fmt::format("session {}: there is no choice to withdraw", session));
+  if (!choice || choice->is_withdrawn) throw Error(fmt::format("session {}: there is no choice to withdraw", session));
   choice->is_withdrawn = true;
   choice->reason = reason;
   choice->by = user;

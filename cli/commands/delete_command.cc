@@ -35,7 +35,8 @@ std::set<std::string> sessions_of_patient(const ResultsTree& tree, const std::st
   for (const auto& [session, version] : tree.chosen()) {
     try {
       const auto choice = tree.choice(session);
-      if (choice && (choice->patient_id == patient || patient.starts_with(choice->patient_id + " ("))) found.insert(session);
+      if (choice && (choice->patient_id == patient || patient.starts_with(choice->patient_id + " (")))
+        found.insert(session);
     } catch (const Error& error) {
       console.err << fmt::format("warning: a choice is not deleted, and may be of this patient: {}\n", error.what());
     }

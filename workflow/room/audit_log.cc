@@ -147,7 +147,7 @@ void AuditLog::Proofs::add(const Json& line) {
 void AuditLog::refuse_another_log() const {
   throw Error(
       fmt::format("{}: is gone, was cut, or is another file than before. Nothing is released or sent until "
-                  "isoshift watch is started again, by a person who knows why",
+                  "isoshift watch and isoshift serve are started again, by a person who knows why",
                   path_.string()));
 }
 

@@ -16,7 +16,7 @@ namespace isoshift {
 struct EngineState {
   std::vector<WaitingSession> waiting;
   std::vector<WaitingSession> chosen;  // with a result that rests on a person's choice, which can be made again
-  std::vector<std::string> troubles;  // that may be over in the next round
+  std::vector<std::string> troubles;   // that may be over in the next round
 
   bool operator==(const EngineState&) const = default;
 };

@@ -86,7 +86,8 @@ std::set<std::string> Grouping::registered_in(const StudyFiles& files) const {
 }
 
 std::optional<SessionFiles> Grouping::registered_session(const std::string& session, const StudyFiles& files) const {
-  if (const Choice* const choice = choice_for(session)) return chosen_session(*choice, files, takes_other_xrays_, registered_);
+  if (const Choice* const choice = choice_for(session))
+    return chosen_session(*choice, files, takes_other_xrays_, registered_);
   const auto own = results_.find(session);
   std::set<std::string> others = registered_;
   if (own != results_.end())

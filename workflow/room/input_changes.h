@@ -27,8 +27,8 @@ class InputChanges {
             const std::function<bool(const std::string& patient_id, Clock::Time last)>& is_quiet,
             const std::function<void(const std::string& session, const std::string& what)>& found);
 
-  // Compares again what was compared: what people have chosen has changed.
-  void forget_comparisons() { compared_.clear(); }
+  // Compares a patient's results again: what a person has chosen may have changed.
+  void compare_again(const std::string& patient_id) { compared_.erase(patient_id); }
 
   // The sessions of a patient that are to be registered again, each under the name of its next result.
   std::vector<SessionFiles> to_register(const std::string& patient_id, const StudyFiles& files) const;

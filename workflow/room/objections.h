@@ -58,8 +58,8 @@ class Objections {
     std::map<std::string, std::set<Xray>> results;  // by session
     // Sessions whose X-rays a person has grouped, with the reasons that their results give.
     std::map<std::string, std::vector<std::string>> regrouped;
-    std::optional<Clock::Time> looked_at;           // Patient::last at that time
-    bool is_news = false;                           // files or results that were not compared yet
+    std::optional<Clock::Time> looked_at;  // Patient::last at that time
+    bool is_news = false;                  // files or results that were not compared yet
   };
   // Notes the X-rays. Takes over what is known of a result of one of them: a PatientID outside ASCII may read
   // differently in a result than in a file.

@@ -138,8 +138,8 @@ class ResultsTree {
   // Whether it was released, and a peer has yet to confirm an object.
   bool is_to_be_sent(const std::string& session) const;
   // Deletes all results of the session's X-rays, and what is kept of them or was chosen for them; the audit log, and a
-  // file in deleted/, say so. Throws Error, and deletes nothing, if there is no such session, if what was released of it is still to be sent,
-  // or if the audit log cannot be written. `by`: the person, or the rule of the watch file.
+  // file in deleted/, say so. Throws Error, and deletes nothing, if there is no such session, if what was released of
+  // it is still to be sent, or if the audit log cannot be written. `by`: the person, or the rule of the watch file.
   void remove(const std::string& session, const std::string& by);
   // All deletions. Removes what a killed process has left of results that it was deleting.
   std::vector<Deletion> finish_deletions() const;

@@ -44,9 +44,9 @@ std::vector<Candidate> other_xrays_of(const SessionFiles& session, const StudyFi
       if (is_deleted || is_among(session.images, uid, &StudyFiles::Image::sop_instance_uid) ||
           is_among(others, uid, &Candidate::id) || !may_belong_together(session.images.front(), image))
         continue;
-      others.push_back({uid, words_of(image) + (registered == session_of.end()
-                                                    ? ""
-                                                    : fmt::format(" of session {}", registered->second))});
+      others.push_back(
+          {uid, words_of(image) +
+                    (registered == session_of.end() ? "" : fmt::format(" of session {}", registered->second))});
     }
   };
   add(files.images);
@@ -138,8 +138,8 @@ SessionOptions options_of(const SessionFiles& session, const StudyFiles& own, co
   add_chosen(options.patients, standing->patient);
   add_chosen(options.plans, standing->plan);
   add_chosen(options.cts, standing->ct);
-  options.chosen = ChosenIds{
-      .xrays = {}, .patient = standing->patient.id, .plan = standing->plan.id, .ct = standing->ct.id};
+  options.chosen =
+      ChosenIds{.xrays = {}, .patient = standing->patient.id, .plan = standing->plan.id, .ct = standing->ct.id};
   for (const Candidate& xray : standing->xrays) options.chosen->xrays.insert(xray.id);
   options.is_regrouped = standing->is_regrouped;
   return options;
@@ -175,10 +175,8 @@ SessionOptions session_options_from(const nlohmann::json& json) {
                          .chosen = std::nullopt,
                          .is_regrouped = json.at("is_regrouped")};
   if (const nlohmann::json& chosen = json.at("chosen"); !chosen.is_null())
-    options.chosen = ChosenIds{.xrays = chosen.at("xrays"),
-                               .patient = chosen.at("patient"),
-                               .plan = chosen.at("plan"),
-                               .ct = chosen.at("ct")};
+    options.chosen = ChosenIds{
+        .xrays = chosen.at("xrays"), .patient = chosen.at("patient"), .plan = chosen.at("plan"), .ct = chosen.at("ct")};
   return options;
 }
 

@@ -76,7 +76,8 @@ void Watch::round() {
   troubles_.attempt("releasing", [&] { release_automatically(); });
   troubles_.attempt("writing the audit log", [&] { tree_.write_kept_audit(); });
   troubles_.attempt("writing the index", [&] { index_.update(waiting_, troubles(), objections_.by_session()); });
-  troubles_.attempt("writing engine.json", [&] { engine_.update({.waiting = waiting_, .chosen = chosen_, .troubles = troubles()}); });
+  troubles_.attempt("writing engine.json",
+                    [&] { engine_.update({.waiting = waiting_, .chosen = chosen_, .troubles = troubles()}); });
 }
 
 std::vector<std::string> Watch::troubles() const {
@@ -139,9 +140,8 @@ void Watch::receive() {
 void Watch::compare_clocks() {
   const auto& limit_s = watch_.site.sessions->max_clock_offset_s;
   if (!limit_s || !is_source_read_) return;
-  const bool is_coming = std::ranges::any_of(parts_.source.patients(), [&](const auto& patient) {
-    return parts_.source.is_coming(patient.first);
-  });
+  const bool is_coming = std::ranges::any_of(
+      parts_.source.patients(), [&](const auto& patient) { return parts_.source.is_coming(patient.first); });
   if (!are_clocks_compared_ && (!was_source_read_ || is_coming)) return;  // what was there before is still being read
   are_clocks_compared_ = true;
   clocks_.update(parts_.source.patients(), std::chrono::file_clock::to_sys(parts_.clock.file_time()));
@@ -199,7 +199,7 @@ void Watch::read_choices(const std::map<std::string, std::string>& there) {
     const auto before = choices_.find(session);
     if (before != choices_.end() && before->second == choice) continue;
     failures_.erase(session);
-    changes_.forget_comparisons();
+    changes_.compare_again(choice.patient_id);
     if (choices_read_) parts_.observer.say(fmt::format("session {}: {}", session, in_words(choice)));
     if (choice.is_withdrawn) objections_.add(tree_.newest_of_same_xrays(session), in_words(choice));
   }
@@ -314,7 +314,8 @@ WaitingSession Watch::waiting(const SessionFiles& session, const StudyFiles& own
       .has_failed = failures_.contains(session.name),
       .options = {}};
   const bool is_again = name_of_xrays(session.name) != session.name;
-  if (!is_running && !waits.why.empty() && !is_again && is_quiet(patient_id, patient.last)) waits.options = grouping_.options_of(session, patient.files);
+  if (!is_running && !waits.why.empty() && !is_again && is_quiet(patient_id, patient.last))
+    waits.options = grouping_.options_of(session, patient.files);
   return waits;
 }
 
@@ -392,7 +393,7 @@ void Watch::end_registration() {
       tree_.keep_inputs(session, made->inputs);
       tree_.publish(session);
       changes_.registered(session);
-      changes_.forget_comparisons();  // somebody may have chosen in the meantime
+      changes_.compare_again(made->patient_id);  // somebody may have chosen in the meantime
       take_result(session, made);
     }
   } catch (const std::exception& error) {

@@ -60,6 +60,7 @@ class WatchChoices : public testing::Test {
   void choose(const Xrays& of, const ChosenIds& ids, const std::string& by = "jdoe") {
     Choice choice = chosen_from(options(of), ids);
     choice.by = by;
+    choice.patient_id = "P";
     choice.reason = "the panel had failed";
     ResultsTree(room_.file.results).choose(choice);
   }
@@ -272,6 +273,7 @@ TEST_F(WatchChoices, AChoiceDuringTheRegistrationCountsAfterIt) {
   room_.pass(5s);
   Choice second = chosen_from(options, {.xrays = both, .plan = "B"});
   second.by = "rroe";
+  second.patient_id = "P";
   ResultsTree(room_.file.results).choose(second);
   room_.pass(120s);
   ASSERT_THAT(room_.runner.runs(), SizeIs(2));
@@ -287,6 +289,7 @@ TEST_F(WatchChoices, APlanThatHasGoneGivesWayToAnother) {
   Choice choice = chosen_from(options({"ap"}), {.xrays = both});
   choice.plan = {"gone", "the RT Plan gone"};
   choice.by = "jdoe";
+  choice.patient_id = "P";
   ResultsTree(room_.file.results).choose(choice);
   room_.pass(60s);
   EXPECT_THAT(room_.index(), HasSubstr("waits for the RT Plan gone"));
