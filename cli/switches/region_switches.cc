@@ -14,6 +14,7 @@ void add_region_switches(CLI::App& command, RegionOptions& options) {
       .add_option("--body", options.bodies,
                   "Register only this bone, by its number in isoshift inspect --bodies; may be repeated")
       ->type_name("NUMBER")
+      ->allow_extra_args(false)
       ->group(group);
   command
       .add_option("--around-isocenter", options.around_isocenter_mm,

@@ -8,8 +8,9 @@ write cannot be equal byte for byte:
 - dates and times are those of the run;
 - the commit, the processor's instruction set and the SHA-256 of inputs differ between builds, machines and Debian releases;
 - the search ends at slightly different places on processors with different SIMD instructions: translations may differ by 0.2 mm,
-  angles by 0.2 degrees. Where the verdict is "rejected" the search has found nothing, and its pose may be any. Numbers that
-  describe the search and how many steps it took may differ at will; texts are compared without their numbers;
+  angles by 0.2 degrees. Where the verdict is "rejected" the search has found nothing: its pose may be any, and so may the
+  reasons and the parts of views that follow from it. Numbers that describe the search and how many steps it took may differ at
+  will; texts are compared without their numbers;
 - drawn pages and pictures (PDF, HTML, SVG, PNG) depend on fonts and libraries: they must be there and not empty.
 """
 import json
@@ -28,6 +29,7 @@ DRAWN = (".pdf", ".html", ".svg", ".png")
 TOLERANCE = 0.2  # mm and degrees
 IGNORED_KEYS = {"made_on", "commit", "program", "device", "sha256", "ct_sha256", "plan_sha256", "termination", "seconds", "picture",
                 "best"}
+KEYS_OF_NOTHING = {"reasons", "parts"}  # that follow from a pose at which nothing was found
 POSE_KEYS = {"setup_error", "couch_shift", "couch_target_deg"}
 IGNORED_KEYWORDS = {"EncapsulatedDocument", "EncapsulatedDocumentLength", "InstanceCreationDate", "InstanceCreationTime",
                     "ContentDate", "ContentTime", "TimezoneOffsetFromUTC", "SeriesDate", "SeriesTime", "SoftwareVersions"}
@@ -49,20 +51,21 @@ def without_numbers(text):
     return re.sub(r"[ +-]*\d+(\.\d+)?", "#", text)
 
 
-def json_differences(one, other, uids, path="", is_pose=False, pose_keys=POSE_KEYS):
+def json_differences(one, other, uids, path="", is_pose=False, was_found=True):
     if type(one) is not type(other) and not (isinstance(one, (int, float)) and isinstance(other, (int, float))):
         yield f"{path}: {one!r} and {other!r}"
     elif isinstance(one, dict):
         if one.keys() != other.keys():
             yield f"{path}: other keys: {sorted(one.keys() ^ other.keys())}"
         for key in one.keys() & other.keys():
-            if key not in IGNORED_KEYS:
-                yield from json_differences(one[key], other[key], uids, f"{path}/{key}", is_pose or key in pose_keys, pose_keys)
+            if key not in (IGNORED_KEYS if was_found else IGNORED_KEYS | KEYS_OF_NOTHING):
+                is_pose_there = is_pose or (was_found and key in POSE_KEYS)
+                yield from json_differences(one[key], other[key], uids, f"{path}/{key}", is_pose_there, was_found)
     elif isinstance(one, list):
         if len(one) != len(other):
             yield f"{path}: {len(one)} and {len(other)} entries"
         for n, (a, b) in enumerate(zip(one, other)):
-            yield from json_differences(a, b, uids, f"{path}[{n}]", is_pose, pose_keys)
+            yield from json_differences(a, b, uids, f"{path}[{n}]", is_pose, was_found)
     elif isinstance(one, str):
         if UID.fullmatch(one) and UID.fullmatch(other):
             if not uids.are_same(one, other):
@@ -97,9 +100,10 @@ def dicom_differences(one, other, uids, path=""):
             yield f"{where}: {a.value!r} and {b.value!r}"
 
 
-def text_differences(one, other):
+def text_differences(one, other, was_found):
     # What the search did on its way, and on what, may differ.
-    lines = lambda text: [without_numbers(line) for line in text.splitlines() if not re.match(r"\s+(Stage|Renderer|Time) ", line)]
+    left_out = re.compile(r"\s+(Stage|Renderer|Time) " + ("" if was_found else r"|\s+- |\d{4}-\d\d-\d\dT"))
+    lines = lambda text: [without_numbers(line) for line in text.splitlines() if not left_out.match(line)]
     for a, b in zip(lines(one), lines(other)):
         if a != b:
             yield f"{a!r} and {b!r}"
@@ -112,11 +116,11 @@ def run_differences(one, other, uids):
         return [] if one.stat().st_size and other.stat().st_size else ["is empty"]
     if one.suffix == ".dcm":
         return list(dicom_differences(pydicom.dcmread(one), pydicom.dcmread(other), uids))
+    result = one.parent / "result.json"
+    was_found = not result.exists() or json.loads(result.read_text()).get("verdict") != "rejected"
     if one.suffix == ".json":
-        result, remade = json.loads(one.read_text()), json.loads(other.read_text())
-        was_found = not isinstance(result, dict) or result.get("verdict") != "rejected"
-        return list(json_differences(result, remade, uids, pose_keys=POSE_KEYS if was_found else set()))
-    return list(text_differences(one.read_text(), other.read_text()))
+        return list(json_differences(json.loads(one.read_text()), json.loads(other.read_text()), uids, was_found=was_found))
+    return list(text_differences(one.read_text(), other.read_text(), was_found))
 
 
 def files_in(folder, by_hand):

@@ -422,24 +422,28 @@ void ResultsTree::remove(const std::string& session, const std::string& by) {
     throw Error(fmt::format("{}: holds no session {}", path_.string(), session));
   Deletion deletion{
       .session = name_of_xrays(session), .by = by, .user = system_user().name, .on = local_time(), .xrays = {}};
+  // A damaged result or choice names no X-rays.
+  const auto add_unless_damaged = [&](const auto& read_uids) {
+    try {
+      for (const std::string& uid : read_uids()) deletion.xrays.insert(isoshift::sha256_of(uid));
+    } catch (const Error&) {
+      return;
+    }
+  };
   for (const std::string& name : of_same_xrays(path_, session)) {
     if (is_to_be_sent(name))
       throw Error(
           fmt::format("session {}: was released and is still to be sent. Wait until it is sent, or reject it on the "
                       "screen of isoshift serve",
                       name));
-    try {
-      for (const std::string& uid : xrays_of(this->session(name))) deletion.xrays.insert(isoshift::sha256_of(uid));
-    } catch (const Error&) {  // a damaged result names no X-rays
-      continue;
-    }
+    add_unless_damaged([&] { return xrays_of(this->session(name)); });
   }
-  try {
+  add_unless_damaged([&] {
+    std::set<std::string> uids;
     if (const auto chosen = choice(session))
-      for (const Candidate& xray : chosen->xrays) deletion.xrays.insert(isoshift::sha256_of(xray.id));
-  } catch (const Error&) {
-    // A damaged choice names no X-rays.
-  }
+      for (const Candidate& xray : chosen->xrays) uids.insert(xray.id);
+    return uids;
+  });
   audit_.append("deleted", {{"session", deletion.session}, {"by", by}, {"user", deletion.user}});
   put_deletion(path_, deletion);
   remove_deleted(path_, {deletion});

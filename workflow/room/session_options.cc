@@ -69,6 +69,7 @@ std::vector<Candidate> patients_of(const SessionFiles& session, const StudyFiles
   add(files.structures);
   if (patients.size() < 2) return {};
   std::vector<Candidate> candidates;
+  candidates.reserve(patients.size());
   for (const std::string& patient : patients)
     candidates.push_back({patient, fmt::format("the patient ID of the issuer {}", patient.substr(id.size() + 1))});
   return candidates;
@@ -80,6 +81,7 @@ std::vector<Candidate> plans_of(const StudyFiles& own) {
       std::ranges::any_of(own.images, [](const StudyFiles::Image& image) { return !image.plan_uid.empty(); });
   if (is_named || own.plans.size() < 2) return {};
   std::vector<Candidate> candidates;
+  candidates.reserve(own.plans.size());
   for (const StudyFiles::Plan& plan : own.plans)
     candidates.push_back(
         {plan.sop_instance_uid, fmt::format("the RT Plan {} ({})", plan.label, plan.file.filename().string())});
@@ -89,6 +91,7 @@ std::vector<Candidate> plans_of(const StudyFiles& own) {
 std::vector<Candidate> cts_of(const StudyFiles& own) {
   if (own.cts.size() < 2) return {};
   std::vector<Candidate> candidates;
+  candidates.reserve(own.cts.size());
   for (const StudyFiles::Ct& ct : own.cts)
     candidates.push_back({ct.series_instance_uid, fmt::format("the CT {} ({} images, {})", ct.label, ct.files.size(),
                                                               ct.files.front().filename().string())});
