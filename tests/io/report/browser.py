@@ -7,13 +7,17 @@ from selenium.webdriver.chrome.service import Service
 
 
 def new_browser(width, height):
+    # Removed with the browser's object, at the latest when the test ends.
+    profile = tempfile.TemporaryDirectory(prefix="isoshift-browser-", ignore_cleanup_errors=True)
     options = webdriver.ChromeOptions()
     options.binary_location = "/usr/bin/chromium"
     for argument in ("--headless=new", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage", f"--window-size={width},{height}",
-                     "--user-data-dir=" + tempfile.mkdtemp(prefix="isoshift-browser-")):
+                     "--user-data-dir=" + profile.name):
         options.add_argument(argument)
     options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
-    return webdriver.Chrome(service=Service("/usr/bin/chromedriver"), options=options)
+    browser = webdriver.Chrome(service=Service("/usr/bin/chromedriver"), options=options)
+    browser.profile = profile
+    return browser
 
 
 def open_page(file, width, height):
