@@ -30,15 +30,18 @@ class Desk {
   //
   //   POST hand-over   hands the last result, whose folder it names, to the engine, which makes a session of it
   //
-  // Status 503 while the study is being read: ask again.
+  // Status 503 while the study is being read: ask again. It is read again when a page is loaded (GET study) after the
+  // X-rays got another result, or other files or a choice of a person behind them.
   HttpResponse answer(const HttpRequest& request, const SignedIn& who, const std::string& session,
                       const std::string& what);
 
  private:
   class Place;
   std::shared_ptr<Place> place_of(const std::string& session);
+  std::shared_ptr<Place> known_place_of(const std::string& session);  // null: there is none
+  void forget(const std::string& session);
   void make_room();
-  HttpResponse hand_over(Place& place, const HttpRequest& request, const SignedIn& who, const std::string& session);
+  HttpResponse hand_over(Place& place, const HttpRequest& request, const SignedIn& who);
 
   Room& room_;
   const Clock& clock_;

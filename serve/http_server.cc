@@ -4,9 +4,9 @@
 #include <openssl/ssl.h>
 
 #include <algorithm>
-#include <atomic>
 #include <cctype>
 #include <csignal>
+#include <map>
 #include <mutex>
 #include <thread>
 #include <utility>
@@ -137,16 +137,39 @@ class HttpServer::Implementation {
   using Stream = beast::tcp_stream;
   using TlsStream = beast::ssl_stream<beast::tcp_stream>;
 
-  // One of the connections that are open.
+  // The connections that are open, by address.
+  struct Open {
+    std::mutex mutex;
+    std::size_t count = 0;
+    std::map<std::string, std::size_t> of_address;
+  };
+
+  // One of them, if there is room for it.
   class Place {
    public:
-    explicit Place(std::atomic<std::size_t>& open) : open_(open) { ++open_; }
-    ~Place() { --open_; }
+    Place(Open& open, const std::string& from, const HttpServerOptions& options) : open_(open), from_(from) {
+      const std::lock_guard lock(open_.mutex);
+      const auto own = open_.of_address.find(from_);
+      is_free_ = open_.count < options.most_connections &&
+                 (own == open_.of_address.end() || own->second < options.most_of_address);
+      if (!is_free_) return;
+      ++open_.count;
+      ++open_.of_address[from_];
+    }
+    ~Place() {
+      if (!is_free_) return;
+      const std::lock_guard lock(open_.mutex);
+      --open_.count;
+      if (--open_.of_address[from_] == 0) open_.of_address.erase(from_);
+    }
     Place(const Place&) = delete;
     Place& operator=(const Place&) = delete;
+    bool is_free() const { return is_free_; }
 
    private:
-    std::atomic<std::size_t>& open_;
+    Open& open_;
+    std::string from_;
+    bool is_free_ = false;
   };
 
   net::awaitable<void> accept() {
@@ -159,7 +182,6 @@ class HttpServer::Implementation {
         co_await pause.async_wait(net::use_awaitable);
         continue;
       }
-      if (open_ >= options_.most_connections) continue;  // closes it
       const auto executor = socket.get_executor();
       // If the other end has gone, is too slow or does not speak HTTP, there is nobody to tell.
       net::co_spawn(executor, speak(std::move(socket)), [](const std::exception_ptr&) {});
@@ -167,8 +189,9 @@ class HttpServer::Implementation {
   }
 
   net::awaitable<void> speak(net::ip::tcp::socket socket) {
-    const Place place(open_);
     const std::string from = socket.remote_endpoint().address().to_string();
+    const Place place(open_, from, options_);
+    if (!place.is_free()) co_return;  // closes it
     if (!options_.tls) {
       Stream stream(std::move(socket));
       co_await answer(stream, stream, from);
@@ -274,7 +297,7 @@ class HttpServer::Implementation {
   HttpHandler handler_;
   std::mutex complaining_;
   std::function<void(const std::string&)> complain_;
-  std::atomic<std::size_t> open_ = 0;
+  Open open_;
   net::ssl::context tls_{net::ssl::context::tls_server};
   net::io_context io_;
   net::ip::tcp::acceptor acceptor_;

@@ -22,6 +22,7 @@ struct HttpServerOptions {
   std::uint16_t port = 0;  // 0: any that is free
   std::optional<ServeFile::Tls> tls;
   std::size_t most_connections = 256;                  // any more are closed at once
+  std::size_t most_of_address = 64;                    // likewise, from one address
   std::size_t most_header = 16384, most_body = 65536;  // bytes of a request
   std::chrono::milliseconds patience{10000};           // for a whole request, from its first byte or the last answer
   std::chrono::milliseconds idle{60000};               // for the next request on a connection

@@ -22,6 +22,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr std::array kDetails = {LiveStudy::Detail::kFull, LiveStudy::Detail::kHalf, LiveStudy::Detail::kQuarter};
+constexpr std::string_view kResults = "results/", kReportName = "/report.html";
 constexpr double kMostMm = 1000.0;  // nobody is moved farther by hand
 
 template <class Vector>
@@ -79,11 +80,14 @@ HttpResponse pixels_answer(std::string bytes) { return {.type = "application/oct
 }  // namespace
 
 HttpResponse ManualScreen::answer(const HttpRequest& request, const SignedIn& who, const std::string& what) {
+  if (const std::string id = request.header("x-isoshift-study"); what != "study" && !id.empty() && id != id_)
+    return refusal(409, "The study was read again since this page was loaded. Load it again.");
   if (request.method == "GET") {
     if (what == "study") return study();
     if (what == "xrays") return xrays();
     if (what == "state") return state();
-    if (what == "report.html") return report();
+    if (what.starts_with(kResults) && what.ends_with(kReportName) && what.size() > kResults.size() + kReportName.size())
+      return report(what.substr(kResults.size(), what.size() - kResults.size() - kReportName.size()));
     return refusal(404, "There is nothing at this address.");
   }
   if (!has_type_json(request)) return refusal(415, "JSON is expected.");
@@ -110,7 +114,8 @@ HttpResponse ManualScreen::study() const {
   Json parts = Json::array();
   for (const LiveStudy::Part& part : study_.parts()) parts.push_back(part.words);
   const Identity& patient = study.ct->identity;
-  return json_answer({{"patient", name_for_people(patient.patient_name)},
+  return json_answer({{"id", id_},
+                      {"patient", name_for_people(patient.patient_name)},
                       {"patient_id", patient.patient_id},
                       {"plan", study.plan ? study.plan->label : ""},
                       {"start", json_of_setup_error(start_)},
@@ -208,11 +213,10 @@ HttpResponse ManualScreen::state() {
                       {"setup_error", json_of_setup_error(result.setup_error)}});
 }
 
-HttpResponse ManualScreen::report() {
-  const ManualRegistration::State now = registration_.state();
-  if (now.result.empty()) return refusal(404, "There is no result yet.");
-  std::ifstream file(now.result / "report.html", std::ios::binary);
-  if (!file) return refusal(404, "The result has no report any more.");
+HttpResponse ManualScreen::report(const std::string& number) const {
+  const bool is_number = std::ranges::all_of(number, [](char c) { return c >= '0' && c <= '9'; });
+  std::ifstream file(registration_.results() / number / "report.html", std::ios::binary);
+  if (!is_number || !file) return refusal(404, "There is no such result, or it was handed over.");
   return report_answer({std::istreambuf_iterator<char>(file), {}});
 }
 

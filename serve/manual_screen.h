@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "base/random_word.h"
 #include "serve/http_message.h"
 #include "serve/sign_ins.h"
 #include "workflow/manual/live_study.h"
@@ -30,7 +31,10 @@ class ManualScreen {
   //   GET state         what registers, or its result
   //   POST begin        registers from a pose, or keeps it
   //   POST cancel
-  //   GET report.html   of the last result
+  //   GET results/N/report.html   of a result that has not been handed over
+  //
+  // Status 409 for a request whose header X-Isoshift-Study is not the id that `study` tells: its page shows another
+  // study, or the same in another state.
   HttpResponse answer(const HttpRequest& request, const SignedIn& who, const std::string& what);
 
  private:
@@ -42,11 +46,12 @@ class ManualScreen {
   std::vector<std::string> region_from(const nlohmann::ordered_json& region) const;
   HttpResponse begin(const HttpRequest& request, const SignedIn& who);
   HttpResponse state();
-  HttpResponse report();
+  HttpResponse report(const std::string& number) const;
 
   const LiveStudy& study_;
   ManualRegistration& registration_;
   Eigen::Isometry3d start_;
+  const std::string id_ = random_word();
 };
 
 }  // namespace isoshift

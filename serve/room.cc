@@ -102,10 +102,13 @@ void Room::look_for_sessions(std::vector<std::string>& troubles) {
 void Room::look() {
   std::vector<std::string> troubles;
   look_for_sessions(troubles);
-  try {
-    list_.update(tree_.objections());
-  } catch (const std::exception& error) {
-    troubles.emplace_back(error.what());
+  for (const auto& step :
+       std::vector<std::function<void()>>{[&] { list_.update(tree_.objections()); }, [&] { tree_.check_audit(); }}) {
+    try {
+      step();
+    } catch (const std::exception& error) {
+      troubles.emplace_back(error.what());
+    }
   }
   std::optional<EngineSeen> engine;
   try {
@@ -149,7 +152,7 @@ Json Room::session(const std::string& name) {
   look();
   const ListedSession& session = listed(name);
   Json json = json_of(session);
-  json["objection"] = tree_.objection(name).words;
+  json["objection"] = "";
   json["peers"] = watch_.names_of_peers();
   json["record"] = "";
   json["obstacle"] = "";
@@ -158,17 +161,19 @@ Json Room::session(const std::string& name) {
   if (tree_.is_released(name)) json["obstacle"] = "The session has been released.";
   json["newest"] = tree_.newest_of_same_xrays(name);
   if (json["newest"] != name) json["obstacle"] = "The X-rays have a newer result.";
-  json["can_choose"] = false;
-  if (const auto engine = read_engine_state(tree_.path(), clock_.file_time()))
-    json["can_choose"] = std::ranges::find(engine->state.chosen, name_of_xrays(name), &WaitingSession::name) !=
-                         engine->state.chosen.end();
+  if (tree_.is_handed_over(name)) json["obstacle"] = "A newer result by hand waits for the engine.";
+  json["can_choose"] = can_choose(name);
   json["decision"] = nullptr;
   json["pose_set_by"] = "";
   try {
+    json["objection"] = tree_.objection(name).words;
     const SessionRecord record = tree_.registered(name);
     json["record"] = record.sha256;
     json["pose_set_by"] = record.pose_set_by;
-    if (const auto decision = tree_.decision(name)) {
+    json["decision"] = {{"kind", "lost"}, {"by", ""}, {"words", ""}};  // if the next line throws
+    const auto decision = tree_.decision(name);
+    json["decision"] = nullptr;
+    if (decision) {
       json["decision"] = {{"kind", to_string(decision->kind)}, {"by", decision->by}, {"words", in_words(*decision)}};
       if (decision->forbids()) json["obstacle"] = "It was decided not to use the result.";
     }
@@ -177,6 +182,17 @@ Json Room::session(const std::string& name) {
     json["obstacle"] = error.what();
   }
   return json;
+}
+
+// The engine says so; while it does not, nothing can be chosen.
+bool Room::can_choose(const std::string& session) const {
+  try {
+    const auto engine = read_engine_state(tree_.path(), clock_.file_time());
+    return engine && std::ranges::find(engine->state.chosen, name_of_xrays(session), &WaitingSession::name) !=
+                         engine->state.chosen.end();
+  } catch (const Error&) {
+    return false;
+  }
 }
 
 Json Room::trend(const std::string& session) {
@@ -280,11 +296,11 @@ bool Room::is_there(const std::string& session) {
   return std::ranges::find(list_.sessions(), session, &ListedSession::name) != list_.sessions().end();
 }
 
-RegistrationOrder Room::order(const std::string& session) {
+ManualBasis Room::manual_basis(const std::string& session) {
   const std::lock_guard lock(mutex_);
   look();
   (void)listed(session);
-  return tree_.order(session);
+  return tree_.manual_basis(session);
 }
 
 Eigen::Isometry3d Room::setup_error(const std::string& session) {
@@ -296,9 +312,9 @@ std::filesystem::path Room::by_hand(const std::string& session) const {
   return watch_.results / "by_hand" / name_of_xrays(session);
 }
 
-std::string Room::hand_over(const std::string& session, const std::filesystem::path& result, const std::string& user) {
+std::string Room::hand_over(const ManualBasis& basis, const std::filesystem::path& result, const std::string& user) {
   const std::lock_guard lock(mutex_);
-  return tree_.hand_over(session, result, user);
+  return tree_.hand_over(basis, result, user);
 }
 
 void Room::audit(const std::string& event, const std::string& user, const std::string& session) {

@@ -71,14 +71,14 @@ class Room {
   // Whether the session is still in the list; at most half a second old.
   bool is_there(const std::string& session);
 
-  // What a person who registers a session by hand begins with: how its X-rays are registered, the setup error that was
-  // found, and the folder for results. Throws NotThere, and Error if nobody kept how.
-  RegistrationOrder order(const std::string& session);
+  // What a person who registers a session by hand begins with: how its X-rays are registered, the setup error of their
+  // newest result, and the folder for results. Throws NotThere, and Error if nobody kept how.
+  ManualBasis manual_basis(const std::string& session);
   Eigen::Isometry3d setup_error(const std::string& session);
   std::filesystem::path by_hand(const std::string& session) const;
   // Hands a finished result to the engine, and returns the name of the session that the engine will make of it. Throws
   // Error where ResultsTree::hand_over() does.
-  std::string hand_over(const std::string& session, const std::filesystem::path& result, const std::string& user);
+  std::string hand_over(const ManualBasis& basis, const std::filesystem::path& result, const std::string& user);
 
   // A line in the audit log: that a user has signed in or looked at a session. If it cannot be written now, it is kept:
   // on a full disk people must see reports all the same.
@@ -90,6 +90,7 @@ class Room {
   std::string registered_content(const std::string& session, const std::string& name) const;
   const ListedSession& listed(const std::string& session) const;
   WaitingSession waiting(const std::string& session) const;
+  bool can_choose(const std::string& session) const;
 
   const WatchFile& watch_;
   const Clock& clock_;

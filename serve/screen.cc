@@ -13,6 +13,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
+constexpr const char* kAutomaticHeader = "x-isoshift-automatic";  // a page asks by itself
 constexpr std::chrono::seconds kBeat(4);
 constexpr std::size_t kLongestReason = 1000;
 constexpr std::string_view kSessionPage = "/session/", kByHand = "/by-hand", kTrend = "/trend", kChoose = "/choose",
@@ -40,7 +41,7 @@ HttpResponse Screen::answer(const HttpRequest& request) {
   const bool is_read = request.method == "GET";
   if (!is_read && request.method != "POST") return refusal(405, "GET or POST is expected");
   // What a page asks for by itself does not tell that its user is still there.
-  const bool is_automatic = request.path == kEvents || !request.header("x-isoshift-automatic").empty();
+  const bool is_automatic = request.path == kEvents || !request.header(kAutomaticHeader).empty();
   auto who = sign_ins_.of(request, is_automatic ? SignIns::Use::kStays : SignIns::Use::kActs);
   if (who && !who->roles.contains(Role::kView)) who.reset();
   if (is_read)
@@ -145,7 +146,7 @@ HttpResponse Screen::session(const HttpRequest& request, const SignedIn& who, co
   if (what == "options") return json_answer(room_.options(name));
   if (what == "trend") {
     Json trend = room_.trend(name);
-    room_.audit("viewed", who.user, name);
+    if (request.header(kAutomaticHeader).empty()) room_.audit("viewed", who.user, name);
     return json_answer(trend);
   }
   if (what != "report.html" && what != "report.pdf") return refusal(404, "There is nothing at this address.");

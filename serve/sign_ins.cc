@@ -12,6 +12,7 @@ namespace {
 constexpr int kWrongPasswords = 5;  // in a row; then the user waits
 constexpr std::chrono::minutes kWait(1);
 constexpr std::chrono::seconds kPatience(5);
+constexpr std::size_t kMostSigningIn = 2;
 constexpr std::size_t kMostOpen = 1000, kMostFailures = 10000;
 
 bool is_same(const std::string& a, const std::string& b) {  // takes as long for any two words of one length
@@ -59,10 +60,34 @@ std::optional<SignedIn> SignIns::of(const HttpRequest& request, Use use) {
   return found->second.who;
 }
 
+// Few wait at a time, each from another address: the server has few threads, which others need.
+class SignIns::Turn {
+ public:
+  Turn(SignIns& sign_ins, const std::string& from) : sign_ins_(sign_ins), from_(from) {
+    const std::lock_guard lock(sign_ins_.mutex_);
+    is_mine_ = sign_ins_.signing_in_.size() < kMostSigningIn && sign_ins_.signing_in_.insert(from_).second;
+  }
+  ~Turn() {
+    if (!is_mine_) return;
+    const std::lock_guard lock(sign_ins_.mutex_);
+    sign_ins_.signing_in_.erase(from_);
+  }
+  Turn(const Turn&) = delete;
+  Turn& operator=(const Turn&) = delete;
+  bool is_mine() const { return is_mine_; }
+
+ private:
+  SignIns& sign_ins_;
+  std::string from_;
+  bool is_mine_ = false;
+};
+
 // Users without a role are not looked up: nobody can try passwords of other accounts of this computer here.
 SignIns::Attempt SignIns::sign_in(const std::string& user, const std::string& password, const std::string& from) {
   const auto roles = serve_.roles.find(user);
   if (serve_.proxy || roles == serve_.roles.end()) return {};
+  const Turn turn(*this, from);
+  if (!turn.is_mine()) return {.must_wait = true};
   const std::unique_lock one_at_a_time(checking_, kPatience);  // PAM may take seconds
   if (!one_at_a_time) return {.must_wait = true};
   const Clock::Time now = clock_.now();

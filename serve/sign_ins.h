@@ -55,7 +55,7 @@ class SignIns {
     bool must_wait = false;             // too many wrong passwords, or others are being checked
   };
   // A user who signs in anew has a new cookie, so that one that somebody else has planted is worth nothing.
-  // `from`: an address. Wrong passwords from elsewhere keep nobody out.
+  // `from`: an address, from which one user signs in at a time. Wrong passwords from elsewhere keep nobody out.
   Attempt sign_in(const std::string& user, const std::string& password, const std::string& from);
   void sign_out(const HttpRequest& request);
 
@@ -68,6 +68,7 @@ class SignIns {
     int count = 0;
     Clock::Time last;
   };
+  class Turn;
   bool is_over(const Open& open) const;
   std::optional<SignedIn> by_proxy(const HttpRequest& request);
 
@@ -77,6 +78,7 @@ class SignIns {
   Limits limits_;
   std::mutex mutex_;
   std::timed_mutex checking_;
+  std::set<std::string> signing_in_;           // addresses
   std::map<std::string, Open> open_;           // by the SHA-256 of the cookie: what is kept here opens nothing
   std::map<std::string, std::string> tokens_;  // by user, of those whom the proxy names
   std::map<std::string, Failures> failures_;   // by user and address

@@ -21,10 +21,15 @@ struct Identity {
   std::string referring_physician;
 };
 
-// The patient for people and for grouping: IDs of two issuers are two patients. "7", "7 (St. Elsewhere)".
+// The patient for people: "7", "7 (St. Elsewhere)". IDs of two issuers are two patients.
 inline std::string patient_in_words(const Identity& identity) {
   return identity.patient_id_issuer.empty() ? identity.patient_id
                                             : identity.patient_id + " (" + identity.patient_id_issuer + ")";
+}
+
+// The same as a key, which no other patient has: DICOM texts hold no backslash.
+inline std::string patient_key(const Identity& identity) {
+  return identity.patient_id + "\\" + identity.patient_id_issuer;
 }
 
 }  // namespace isoshift

@@ -20,18 +20,32 @@ struct DeleteOptions {
   std::string session, patient, by;
 };
 
+// Whom a person means: an ID of any issuer, or one of an issuer.
+bool is_of(const Identity& identity, const std::string& patient) {
+  return identity.patient_id == patient ||
+         (!identity.patient_id_issuer.empty() && patient_in_words(identity) == patient);
+}
+
 // The first sessions of all X-rays of a patient. A result that cannot be read may be of that patient: it is said.
+// Throws Error if the name is that of two patients: an ID may read like that of another with its issuer.
 std::set<std::string> sessions_of_patient(const ResultsTree& tree, const std::string& patient, Console& console) {
-  std::set<std::string> found;
+  std::set<std::string> found, ids;
   for (const std::string& session : tree.sessions()) {
     try {
       const Identity identity = read_report(tree.session(session)).identity;
-      if (identity.patient_id == patient || patient_in_words(identity) == patient) found.insert(name_of_xrays(session));
+      if (!is_of(identity, patient)) continue;
+      found.insert(name_of_xrays(session));
+      ids.insert(identity.patient_id);
     } catch (const Error& error) {
       console.err << fmt::format("warning: session {} is not deleted, and may be of this patient: {}\n", session,
                                  error.what());
     }
   }
+  if (ids.size() > 1)
+    throw Error(
+        fmt::format("--patient {}: is the ID of one patient, and that of another with its issuer. Delete sessions by "
+                    "their names",
+                    patient));
   for (const auto& [session, version] : tree.chosen()) {
     try {
       const auto choice = tree.choice(session);

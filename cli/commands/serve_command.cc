@@ -31,8 +31,9 @@ void run_serve(const std::filesystem::path& file, Console& console) {
   });
   Desk desk(room, clock, register_options_from);
   Screen screen(room, desk, sign_ins, clock, serve.proxy.has_value());
-  HttpServer server({.address = serve.address, .port = serve.port, .tls = serve.tls},
-                    [&](const HttpRequest& request) { return screen.answer(request); });
+  HttpServerOptions http{.address = serve.address, .port = serve.port, .tls = serve.tls};
+  if (serve.proxy) http.most_of_address = http.most_connections;  // all requests come from there
+  HttpServer server(http, [&](const HttpRequest& request) { return screen.answer(request); });
   ConsoleObserver observer(console);
   observer.say(fmt::format("serving {} at {}://{}:{}", serve.watch.results.string(), serve.tls ? "https" : "http",
                            serve.address.find(':') == std::string::npos ? serve.address : "[" + serve.address + "]",

@@ -13,6 +13,8 @@ namespace isoshift {
 void check_text_on_one_line(const std::string& flag, const std::string& text, const std::string& expected) {
   if (text.find_first_not_of(' ') == std::string::npos)
     throw UsageError(fmt::format("{}: expected {}", flag, expected));
+  if (text.starts_with(' ') || text.ends_with(' '))
+    throw UsageError(fmt::format("{}: begins or ends with a space; expected {}", flag, expected));
   const auto is_control = [](unsigned char c) { return c < 0x20 || c == 0x7F; };
   if (std::ranges::any_of(text, is_control))
     throw UsageError(

@@ -1,5 +1,5 @@
 // A study on the screen: a person moves the patient, and the DRRs follow; the same registration as everywhere begins there.
-import {bytes, element, kBeingRead, get, make, post, signedIn, verdictCell} from "/shared.js";
+import {bytes, element, kBeingRead, get, make, post, setStudy, signedIn, verdictCell} from "/shared.js";
 import {ManualView} from "/manual_view.js";
 import {anglesDeg, fromNumbers, motionOf, moved, planned, turned} from "/pose.js";
 
@@ -84,10 +84,12 @@ function ask(detail) {
   follow();
 }
 
+const numbers = () => kNumbers.map(id => element(id).valueAsNumber);
+
 function showNumbers() {
-  const numbers = [...pose.translation_mm, ...anglesDeg(pose)];
+  const six = [...pose.translation_mm, ...anglesDeg(pose)];
   kNumbers.forEach((id, n) => {
-    if (document.activeElement !== element(id)) element(id).value = (Math.round(numbers[n] * 100) / 100 || 0).toFixed(2);
+    if (document.activeElement !== element(id)) element(id).value = (Math.round(six[n] * 100) / 100 || 0).toFixed(2);
   });
 }
 
@@ -256,7 +258,7 @@ function problem(text) {
 function showResult(now) {
   const words = (now.searched ? "Found" : "Kept as it was set") + (now.by === user ? ": " : ` by ${now.by}: `);
   handOverFolder = now.folder;
-  const report = make("a", "report", {href: kApi + "report.html", target: "_blank", rel: "noopener"});
+  const report = make("a", "report", {href: kApi + "results/" + now.folder.split("/").pop() + "/report.html", target: "_blank", rel: "noopener"});
   const line = make("p", words);
   line.append(verdictCell(now.verdict), " ", report);
   const reasons = make("ul");
@@ -303,6 +305,7 @@ async function handOver() {
 }
 
 async function register(searched) {
+  if (!numbers().every(Number.isFinite)) return problem("One of the six numbers is missing.");
   problem("");
   element("hand-over").hidden = true;
   element("result").replaceChildren();
@@ -321,8 +324,8 @@ for (const id of ["wipe", "field", "cross", "letters", "xray-brightness", "xray-
   element(id).addEventListener("input", draw);
 for (const id of kNumbers)
   element(id).addEventListener("input", () => {
-    const numbers = kNumbers.map(one => element(one).valueAsNumber);
-    if (numbers.every(Number.isFinite)) set(fromNumbers(numbers.slice(0, 3), numbers.slice(3)));
+    const six = numbers();
+    if (six.every(Number.isFinite)) set(fromNumbers(six.slice(0, 3), six.slice(3)));
   });
 element("undo").addEventListener("click", undo);
 element("part").addEventListener("change", () => {
@@ -377,6 +380,7 @@ try {
     element("back").textContent = "Session " + decodeURIComponent(session);
   }
   const study = await read();
+  setStudy(study.id);
   problem("");
   document.title = "isoshift: " + study.patient;
   element("patient").textContent = study.patient;

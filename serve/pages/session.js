@@ -4,7 +4,7 @@ import {bytes, element, follow, get, nameForPeople, post, showSignedIn, verdictC
 const session = decodeURIComponent(location.pathname.split("/").pop());
 const address = "/api/sessions/" + encodeURIComponent(session);
 const kDecisions = ["agreed", "rejected", "repeat", "reopened"];
-let shown = null, me = null, hasReport = false, engine = "runs";
+let shown = null, me = null, isLoading = false, hasReport = false, engine = "runs";
 
 // Written only where it changes: it is read aloud then.
 function write(id, text) {
@@ -60,8 +60,14 @@ async function update(isAutomatic = false) {
 }
 
 element("despite").addEventListener("change", () => show(shown));
+
+// A frame is loaded, too, when it shows that there was an error.
 element("report").addEventListener("load", () => {
-  hasReport = element("report").hasAttribute("src");
+  if (!element("report").hasAttribute("src")) return;
+  const loads = performance.getEntriesByName(element("report").src).filter(one => one.initiatorType === "iframe");
+  hasReport = loads.at(-1)?.responseStatus === 200;
+  isLoading = hasReport;
+  if (!hasReport) write("problem", "The report could not be loaded.");
   if (shown) show(shown);
 });
 element("release").addEventListener("click", async () => {
@@ -98,7 +104,6 @@ element("by-hand").href = "/session/" + encodeURIComponent(session) + "/by-hand"
 
 // Once the session is there: the engine may have yet to take a result over. report.pdf is kept in the page, so that it
 // can be printed while the network is down.
-let isLoading = false;
 function loadReport() {
   if (!shown || isLoading) return;
   isLoading = true;
@@ -118,6 +123,7 @@ follow(async now => {
     engine = now.engine;
     show(shown);
   }
+  if (!hasReport) loadReport();
   if (now.version === version || isAsking) return;
   isAsking = true;
   if (await update(true)) version = now.version;

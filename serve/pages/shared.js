@@ -13,6 +13,11 @@ export function make(tag, text, attributes = {}) {
 export const kBeingRead = 503;  // the status while a study is being read: ask again
 
 let token = "";
+let study = "";  // that the page shows
+
+export function setStudy(id) { study = id; }
+
+const ofStudy = () => study ? {"X-Isoshift-Study": study} : {};
 
 async function answered(response) {
   if (response.status === 401) {
@@ -30,19 +35,19 @@ async function answered(response) {
 
 // `isAutomatic`: the page asks by itself, which does not tell that its user is still there.
 export const get = async (path, isAutomatic = false) =>
-  answered(await fetch(path, {headers: isAutomatic ? {"X-Isoshift-Automatic": "1"} : {}}));
+  answered(await fetch(path, {headers: {...ofStudy(), ...isAutomatic ? {"X-Isoshift-Automatic": "1"} : {}}}));
 
 export const post = async (path, body) => answered(await fetch(path, {
   method: "POST",
-  headers: {"Content-Type": "application/json", "X-Isoshift-Token": token},
+  headers: {...ofStudy(), "Content-Type": "application/json", "X-Isoshift-Token": token},
   body: JSON.stringify(body)
 }));
 
 // Bytes, and the headers that came with them; of a POST if there is a body.
 export async function bytes(path, body) {
-  const response = await fetch(path, body === undefined ? {} : {
+  const response = await fetch(path, body === undefined ? {headers: ofStudy()} : {
     method: "POST",
-    headers: {"Content-Type": "application/json", "X-Isoshift-Token": token},
+    headers: {...ofStudy(), "Content-Type": "application/json", "X-Isoshift-Token": token},
     body: JSON.stringify(body)
   });
   if (!response.ok) await answered(response);

@@ -95,9 +95,23 @@ for (const title of ["Acquired", "Plan", "Verdict", ...kComponents.map(([name, u
   element("columns").append(make("th", title, {scope: "col"}));
 element("back").href = "/session/" + encodeURIComponent(session);
 await showSignedIn();
-follow(() => {});
-try {
-  show(await get(address));
-} catch (error) {
-  element("problem").textContent = error.message;
+
+async function update(isAutomatic) {
+  try {
+    show(await get(address, isAutomatic));
+    element("problem").textContent = "";
+    return true;
+  } catch (error) {
+    element("problem").textContent = error.message;
+    return false;
+  }
 }
+
+await update(false);
+let version = null, isAsking = false;
+follow(async now => {
+  if (now.version === version || isAsking) return;
+  isAsking = true;
+  if (await update(true)) version = now.version;
+  isAsking = false;
+});

@@ -28,7 +28,10 @@ using testing::StartsWith;
 // What any program may send to the port.
 class Connection {
  public:
-  explicit Connection(std::uint16_t port) : socket_(::socket(AF_INET, SOCK_STREAM, 0)) {
+  explicit Connection(std::uint16_t port, const char* from = "127.0.0.1") : socket_(::socket(AF_INET, SOCK_STREAM, 0)) {
+    sockaddr_in own{.sin_family = AF_INET};
+    ::inet_pton(AF_INET, from, &own.sin_addr);
+    EXPECT_EQ(::bind(socket_, reinterpret_cast<const sockaddr*>(&own), sizeof own), 0);
     sockaddr_in address{.sin_family = AF_INET, .sin_port = htons(port)};
     address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
     EXPECT_EQ(::connect(socket_, reinterpret_cast<const sockaddr*>(&address), sizeof address), 0);
@@ -146,6 +149,24 @@ TEST_F(HttpServerTest, MoreConnectionsThanAllowedAreClosedAndTheRestIsServed) {
     served = answer("GET /again HTTP/1.1\r\nHost: x\r\nConnection: close\r\n\r\n");
   }
   EXPECT_THAT(served, HasSubstr("GET /again"));
+}
+
+TEST_F(HttpServerTest, OneAddressDoesNotTakeAllConnections) {
+  constexpr std::size_t kMost = 8;
+  std::atomic<bool> is_over = false;
+  HttpServer server({.most_connections = 20, .most_of_address = kMost},
+                    [](const HttpRequest&) { return HttpResponse{.body = "served"}; });
+  const std::jthread running([&] { server.run([&] { return is_over.load(); }); });
+  std::vector<std::unique_ptr<Connection>> held;
+  for (std::size_t n = 0; n < kMost + 4; ++n) held.push_back(std::make_unique<Connection>(server.port()));
+  EXPECT_EQ(held.back()->read(), "") << "closed at once";
+  const std::string question = "GET / HTTP/1.1\r\nHost: x\r\nConnection: close\r\n\r\n";
+  const Connection from_elsewhere(server.port(), "127.0.0.2");
+  from_elsewhere.send(question);
+  EXPECT_THAT(from_elsewhere.read(), EndsWith("served"));
+  held[0]->send(question);
+  EXPECT_THAT(held[0]->read(), EndsWith("served"));
+  is_over = true;
 }
 
 TEST_F(HttpServerTest, EventsComeAsTheyHappenAndEnd) {

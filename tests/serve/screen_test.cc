@@ -312,6 +312,55 @@ TEST_F(ScreenTest, AStudyIsReadOnceForAllWhoWorkOnIt) {
     EXPECT_EQ(post("viewer", address + what, {{"setup_error", pose}, {"searched", true}}).status, 403) << what;
 }
 
+// A page that was loaded before shows another plan, other X-rays, or another start.
+TEST_F(ScreenTest, AStudyIsReadAgainAfterAnotherResultOrOrder) {
+  const SmallStudy study;
+  tree_.keep_order(a_, {.parts = {.study = study.path()}});
+  const std::string address = "/api/sessions/" + a_ + "/manual/";
+  const std::string before = Json::parse(wait_until_read(address + "study").body).at("id");
+  EXPECT_EQ(Json::parse(wait_until_read(address + "study").body).at("id"), before);
+  tree_.keep_order(a_, {.parts = {.study = study.path()}, .flags = {"--preset", "fast"}});
+  const Json pose = {{"translation_mm", {0, 0, 0}}, {"rotation_matrix", {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}}};
+  const Json begin = {
+      {"setup_error", pose}, {"searched", false}, {"region", {{"part", nullptr}, {"boxes", Json::array()}}}};
+  const HttpResponse refused = post("registrar", address + "begin", begin);
+  EXPECT_EQ(refused.status, 409);
+  EXPECT_THAT(refused.body, HasSubstr("Load it again"));
+  const std::string after = Json::parse(wait_until_read(address + "study").body).at("id");
+  EXPECT_NE(after, before);
+  HttpRequest of_old_page = request("viewer", "GET", address + "xrays");
+  of_old_page.headers["x-isoshift-study"] = before;
+  EXPECT_EQ(screen_.answer(of_old_page).status, 409);
+  of_old_page.headers["x-isoshift-study"] = after;
+  EXPECT_EQ(screen_.answer(of_old_page).status, 200);
+}
+
+// Of an engine that was killed, or of another version.
+TEST_F(ScreenTest, WithoutASignOfTheEngineSessionsAreShownAllTheSame) {
+  std::ofstream(tree_.path() / "engine.json") << "{";
+  EXPECT_EQ(session().at("obstacle"), "");
+  EXPECT_EQ(session().at("can_choose"), false);
+}
+
+TEST_F(ScreenTest, ALostDecisionCanBeTakenBack) {
+  const Json agreed = {{"decision", "agreed"}, {"record", session().at("record")}, {"reason", ""}};
+  ASSERT_EQ(post("releaser", "/api/sessions/" + a_ + "/decide", agreed).status, 200);
+  std::filesystem::remove(tree_.path() / "decided" / (a_ + ".1.json"));
+  EXPECT_EQ(session().at("decision").at("kind"), "lost");
+  EXPECT_NE(session().at("obstacle"), "");
+  const Json taken_back = {{"decision", "reopened"}, {"record", session().at("record")}, {"reason", "it was lost"}};
+  EXPECT_EQ(post("releaser", "/api/sessions/" + a_ + "/decide", taken_back).status, 200);
+  EXPECT_EQ(session().at("decision"), nullptr);
+  EXPECT_EQ(session().at("obstacle"), "");
+}
+
+TEST_F(ScreenTest, TheListSaysThatTheAuditLogIsNotWhole) {
+  EXPECT_THAT(Json::parse(get("/api/room").body).at("troubles"), testing::IsEmpty());
+  std::filesystem::resize_file(tree_.path() / "audit.jsonl", 10);
+  std::this_thread::sleep_for(600ms);  // the list is kept for half a second
+  EXPECT_THAT(Json::parse(get("/api/room").body).at("troubles"), Not(testing::IsEmpty()));
+}
+
 // Moved away and registered again, with nobody looking in between.
 TEST_F(ScreenTest, ASessionThatWasRegisteredAgainIsShownAsItIsNow) {
   const std::string record = session().at("record");

@@ -2,6 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <atomic>
+#include <future>
+#include <thread>
+
 namespace isoshift {
 namespace {
 
@@ -53,6 +57,30 @@ TEST_F(SignInsTest, ACookieThatSomebodyElseHasPlantedOpensNothing) {
   sign_ins_.sign_out(with_cookie(planted));
   EXPECT_FALSE(sign_ins_.of(with_cookie(planted)));
   EXPECT_TRUE(sign_ins_.of(with_cookie(own)));
+}
+
+// The server has few threads, and a check of a password takes seconds.
+TEST_F(SignInsTest, FewWaitForACheckAndOneOfAnAddress) {
+  std::promise<void> may_end;
+  const std::shared_future<void> ended = may_end.get_future().share();
+  std::atomic<int> checked = 0;
+  SignIns slow(serve_, clock_, [&](const std::string&, const std::string&) {
+    ++checked;
+    ended.wait();
+    return true;
+  });
+  auto first = std::async(std::launch::async, [&] { return slow.sign_in("doe", "right", "here"); });
+  while (checked == 0) std::this_thread::yield();
+  EXPECT_TRUE(slow.sign_in("doe", "right", "here").must_wait);
+  auto second = std::async(std::launch::async, [&] { return slow.sign_in("doe", "right", "there"); });
+  std::this_thread::sleep_for(200ms);
+  const auto begin = std::chrono::steady_clock::now();
+  EXPECT_TRUE(slow.sign_in("doe", "right", "elsewhere").must_wait);
+  EXPECT_LT(std::chrono::steady_clock::now() - begin, 2s) << "at once";
+  may_end.set_value();
+  EXPECT_TRUE(first.get().cookie);
+  EXPECT_TRUE(second.get().cookie);
+  EXPECT_TRUE(slow.sign_in("doe", "right", "here").cookie);
 }
 
 TEST_F(SignInsTest, WhoHasNoRoleMayNotComeIn) {

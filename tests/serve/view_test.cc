@@ -149,7 +149,7 @@ TEST_F(ViewTest, ARegistrationRunsFromThePoseAndTellsHowFarItIs) {
   }
   EXPECT_EQ(state.at("state"), "ended") << state;
   EXPECT_TRUE(steps.contains("Registering")) << testing::PrintToString(steps);
-  EXPECT_EQ(get("/api/manual/report.html").status, 200);
+  EXPECT_EQ(get("/api/manual/results/1/report.html").status, 200);
   EXPECT_EQ(Json::parse(get("/api/manual/state").body).at("folder"), (files_.output() / "1").string());
   EXPECT_EQ(post("/api/manual/begin", {{"setup_error", pose(3)}, {"searched", false}, {"region", kEverything}}).status,
             200);

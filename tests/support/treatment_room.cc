@@ -84,6 +84,15 @@ void FakeSource::lose(const std::string& patient_id, const std::set<std::string>
                 [&](const StudyFiles::Image& image) { return uids.contains(image.sop_instance_uid); });
 }
 
+void FakeSource::give_away(const std::string& patient_id, const std::string& uid) {
+  const auto is_it = [&](const auto& object) { return object.sop_instance_uid == uid; };
+  StudyFiles& files = patients_.at(patient_id).files;
+  std::erase_if(files.images, is_it);
+  std::erase_if(files.plans, is_it);
+  everything_[patient_id].erase(uid);
+  here_.erase(uid);
+}
+
 void FakeSource::update(Notes& /*notes*/) {
   if (is_down_) throw Error("the server is down");
   for (const std::string& patient_id : std::exchange(asked_, {}))

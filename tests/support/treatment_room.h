@@ -56,6 +56,7 @@ class FakeSource : public Source {
 
   void bring(const StudyFiles& object);                                         // comes with the next update
   void lose(const std::string& patient_id, const std::set<std::string>& uids);  // X-rays
+  void give_away(const std::string& patient_id, const std::string& uid);  // an X-ray or a plan: to be brought again
   void set_down(bool is_down) { is_down_ = is_down; }
   void set_coming(bool is_coming) { is_coming_ = is_coming; }
 

@@ -171,18 +171,26 @@ std::size_t BatchSummary::open() const {
 
 BatchSummary summary_of(const BatchFolder& folder, const std::vector<BatchCase>& cases) {
   BatchSummary summary;
-  std::map<std::string, std::multimap<std::string, ErrorComponents>> by_patient;  // by the time of acquisition
+  struct OfPatient {
+    std::string words;
+    std::multimap<std::string, ErrorComponents> fractions;  // by the time of acquisition
+  };
+  std::map<std::string, OfPatient> by_patient;  // by patient_key()
   for (const BatchCase& one : cases) {
     summary.cases.push_back(end_of(folder, one.name));
     const CaseEnd& end = summary.cases.back();
     if (!end.report || end.report->verdict != Verdict::kAccepted) continue;
     const auto components = complete_components(shown_shift(*end.report));
-    if (components) by_patient[patient_in_words(end.report->identity)].emplace(acquired(end), *components);
+    if (!components) continue;
+    OfPatient& patient = by_patient[patient_key(end.report->identity)];
+    patient.words = patient_in_words(end.report->identity);
+    patient.fractions.emplace(acquired(end), *components);
   }
-  for (auto& [patient, fractions] : by_patient) {
+  for (const auto& [key, patient] : by_patient) {
     std::vector<ErrorComponents> in_order;
-    for (const auto& [at, error] : fractions) in_order.push_back(error);
-    summary.patients.push_back(errors_of_patient(patient, std::move(in_order)));
+    in_order.reserve(patient.fractions.size());
+    for (const auto& [at, error] : patient.fractions) in_order.push_back(error);
+    summary.patients.push_back(errors_of_patient(patient.words, std::move(in_order)));
   }
   summary.population = errors_of_population(summary.patients);
   return summary;

@@ -20,6 +20,18 @@ fs::path next_in(const fs::path& results) {
     if (const fs::path next = results / std::to_string(number); !fs::exists(next)) return next;
 }
 
+// What a registration left whose parent was killed: "3.partial-Xd82la".
+void remove_unfinished(const fs::path& results) {
+  std::vector<fs::path> unfinished;
+  for (const auto& entry : fs::directory_iterator(results)) {
+    const std::string name = entry.path().filename().string();
+    if (const auto digits = name.find_first_not_of("0123456789");
+        digits != 0 && digits != std::string::npos && name.compare(digits, 9, ".partial-") == 0)
+      unfinished.push_back(entry.path());
+  }
+  for (const fs::path& folder : unfinished) fs::remove_all(folder);
+}
+
 // Flags as they are typed: "--body 3" or "--body=3".
 std::vector<std::string> with_region(const std::vector<std::string>& flags, const std::vector<std::string>& region) {
   static const std::set<std::string> of_region = {"--structure", "--body", "--around-isocenter", "--rectangle"};
@@ -45,6 +57,7 @@ void ManualRegistration::begin(const Eigen::Isometry3d& setup_error, const std::
   look();
   if (running_) throw Error("A registration runs. Wait for its end, or cancel it.");
   fs::create_directories(results_);
+  remove_unfinished(results_);
   output_ = next_in(results_);
   RegistrationOrder order = order_;
   if (!region.empty()) order.flags = with_region(order_.flags, region);
@@ -52,8 +65,9 @@ void ManualRegistration::begin(const Eigen::Isometry3d& setup_error, const std::
   order.is_searched = is_searched;
   order.output = output_;
   order.tells_progress = true;
-  write_text(order.start,
-             nlohmann::json{{"setup_error", json_of_setup_error(setup_error)}, {"set_by", by}}.dump());  // start_pose.h
+  replace_text(
+      order.start,
+      nlohmann::json{{"setup_error", json_of_setup_error(setup_error)}, {"set_by", by}}.dump());  // start_pose.h
   state_ = {.what = State::What::kRuns, .by = by};
   running_ = std::make_unique<RegistrationProcess>(order);
 }

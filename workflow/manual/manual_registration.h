@@ -20,6 +20,8 @@ class ManualRegistration {
   // `results`/1, `results`/2 and so on, which must be of a folder that nobody else writes into at the same time.
   ManualRegistration(RegistrationOrder order, std::filesystem::path results);
 
+  const std::filesystem::path& results() const { return results_; }
+
   // Begins a registration from a pose that `by` has set, or keeps the pose as it is. `region`: flags of isoshift
   // register for what is compared, in the place of those of the order; empty: these. Throws Error if another one runs.
   void begin(const Eigen::Isometry3d& setup_error, const std::string& by, bool is_searched,

@@ -31,7 +31,8 @@ std::string in_words(const Choice& choice) {
   const std::string of_xrays = fmt::format("{}", fmt::join(xrays, " and "));
   if (choice.is_withdrawn)
     return fmt::format("{} withdrew on {} the choice for {} ({})", choice.by, choice.on, of_xrays, choice.reason);
-  if (choice.is_regrouped || chosen.empty()) chosen.insert(chosen.begin(), "that they show one setup");
+  if (choice.is_regrouped) chosen.insert(chosen.begin(), "that they show one setup");
+  if (chosen.empty()) chosen.emplace_back("as the files tell");
   return fmt::format("{} chose on {} for {}: {} ({})", choice.by, choice.on, of_xrays, fmt::join(chosen, ", "),
                      choice.reason);
 }
@@ -45,6 +46,7 @@ Json json_of(const Choice& choice) {
           {"patient", json_of(choice.patient)},
           {"plan", json_of(choice.plan)},
           {"ct", json_of(choice.ct)},
+          {"offered", choice.offered},
           {"is_regrouped", choice.is_regrouped},
           {"is_withdrawn", choice.is_withdrawn},
           {"patient_id", choice.patient_id},
@@ -68,6 +70,7 @@ Choice choice_from(const nlohmann::json& json) {
           .patient = candidate_from(json.at("patient")),
           .plan = candidate_from(json.at("plan")),
           .ct = candidate_from(json.at("ct")),
+          .offered = json.value("offered", std::set<std::string>()),  // older choices have none
           .is_regrouped = json.at("is_regrouped"),
           .is_withdrawn = json.at("is_withdrawn"),
           .patient_id = json.at("patient_id"),

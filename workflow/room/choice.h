@@ -22,15 +22,16 @@ struct Candidate {
 };
 
 struct Choice {
-  std::string session;           // that the X-rays make
-  std::vector<Candidate> xrays;  // SOPInstanceUIDs
-  Candidate patient, plan, ct;   // plan: SOPInstanceUID; CT: SeriesInstanceUID
-  bool is_regrouped = false;     // without the choice these X-rays would not make a session
-  bool is_withdrawn = false;     // the choice before does not count any more, and nothing is chosen
-  std::string patient_id;        // as the source has it
-  std::string reason;            // in the person's words
-  std::string by, user;          // the person, and the user of the system
-  std::string on;                // local time
+  std::string session;            // that the X-rays make
+  std::vector<Candidate> xrays;   // SOPInstanceUIDs
+  Candidate patient, plan, ct;    // plan: SOPInstanceUID; CT: SeriesInstanceUID
+  std::set<std::string> offered;  // UIDs of the plans and CTs among which the person has chosen
+  bool is_regrouped = false;      // without the choice these X-rays would not make a session
+  bool is_withdrawn = false;      // the choice before does not count any more, and nothing is chosen
+  std::string patient_id;         // as the source has it
+  std::string reason;             // in the person's words
+  std::string by, user;           // the person, and the user of the system
+  std::string on;                 // local time
 
   bool operator==(const Choice&) const = default;
 };

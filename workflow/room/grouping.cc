@@ -58,7 +58,7 @@ std::vector<SessionFiles> Grouping::sessions_in(const StudyFiles& files) const {
   std::vector<SessionFiles> sessions;
   std::set<std::string> taken = registered_;
   for (const auto& [name, choice] : choices_) {
-    if (results_.contains(name)) continue;
+    if (choice.is_withdrawn || results_.contains(name)) continue;
     auto session = chosen_session(choice, files, takes_other_xrays_, registered_);
     if (!session) continue;
     for (const StudyFiles::Image& image : session->images) taken.insert(image.sop_instance_uid);
@@ -85,6 +85,15 @@ std::set<std::string> Grouping::registered_in(const StudyFiles& files) const {
   return sessions;
 }
 
+std::map<std::string, std::string> Grouping::results_of(const StudyFiles& files) const {
+  std::map<std::string, std::string> found;
+  for_each_xray(files, [&](const std::string& uid) {
+    if (const auto session = session_of_.find(uid); session != session_of_.end() && !session->second.empty())
+      found.insert(*session);
+  });
+  return found;
+}
+
 std::optional<SessionFiles> Grouping::registered_session(const std::string& session, const StudyFiles& files) const {
   if (const Choice* const choice = choice_for(session))
     return chosen_session(*choice, files, takes_other_xrays_, registered_);
@@ -99,7 +108,23 @@ std::optional<SessionFiles> Grouping::registered_session(const std::string& sess
 
 const Choice* Grouping::choice_for(const std::string& session) const {
   const auto found = choices_.find(name_of_xrays(session));
-  return found == choices_.end() ? nullptr : &found->second;
+  return found == choices_.end() || found->second.is_withdrawn ? nullptr : &found->second;
+}
+
+std::string Grouping::choice_in_words(const std::string& session) const {
+  const Choice* const choice = choice_for(session);
+  return choice == nullptr ? "" : in_words(*choice);
+}
+
+std::vector<std::string> Grouping::came_after_choice(const SessionFiles& session, const StudyFiles& files) const {
+  const Choice* const choice = choice_for(session.name);
+  if (choice == nullptr || choice->offered.empty()) return {};
+  const SessionOptions now = options_of(session, files);
+  std::vector<std::string> words;
+  for (const auto* candidates : {&now.plans, &now.cts})
+    for (const Candidate& candidate : *candidates)
+      if (!choice->offered.contains(candidate.id)) words.push_back(candidate.words);
+  return words;
 }
 
 StudyFiles Grouping::files_of(const SessionFiles& session, const StudyFiles& files) const {

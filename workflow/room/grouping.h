@@ -26,9 +26,10 @@ class Grouping {
   void add_deleted(const std::set<std::string>& sha256);
   // Takes out all results of these X-rays.
   void remove(const std::string& session);
-  // By session. Replaces what was chosen before.
+  // By session, also those that were withdrawn. Replaces what was chosen before.
   void set_choices(std::map<std::string, Choice> choices) { choices_ = std::move(choices); }
-  const std::map<std::string, Choice>& choices() const { return choices_; }
+  // What a person has chosen for a session, in words. Empty: nothing.
+  std::string choice_in_words(const std::string& session) const;
   bool is_regrouped(const std::string& session) const;  // by choice
 
   // X-rays that have a result, or had one that was deleted, among those seen by see().
@@ -40,10 +41,13 @@ class Grouping {
 
   // The sessions among a patient's files that have no result.
   std::vector<SessionFiles> sessions_in(const StudyFiles& files) const;
-  // The sessions that have a result and rest on a choice, as far as their X-rays are among the files.
+  // The sessions that have a result and rest on a choice, or did until it was withdrawn, as far as their X-rays are
+  // among the files.
   std::vector<SessionFiles> chosen_in(const StudyFiles& files) const;
   // The sessions that have a result and of which X-rays are among the files.
   std::set<std::string> registered_in(const StudyFiles& files) const;
+  // The X-rays among a patient's files that have a result: the session by SOPInstanceUID.
+  std::map<std::string, std::string> results_of(const StudyFiles& files) const;
   // The X-rays of a result as a session; nothing if they would be grouped in another way now.
   std::optional<SessionFiles> registered_session(const std::string& session, const StudyFiles& files) const;
 
@@ -53,11 +57,13 @@ class Grouping {
   std::vector<std::string> missing_of(const SessionFiles& session, const StudyFiles& own) const;
   // Flags of isoshift register by which a person's choice for the session stands.
   std::vector<std::string> flags_of(const SessionFiles& session) const;
+  // Plans and CTs for the session that came after a person had chosen among others, in words.
+  std::vector<std::string> came_after_choice(const SessionFiles& session, const StudyFiles& files) const;
   // What a person may choose for it.
   SessionOptions options_of(const SessionFiles& session, const StudyFiles& files) const;
 
  private:
-  const Choice* choice_for(const std::string& session) const;  // null: there is none
+  const Choice* choice_for(const std::string& session) const;  // null: there is none that stands
 
   bool takes_other_xrays_;
   std::map<std::string, std::set<std::string>> results_;  // X-rays, by session

@@ -22,6 +22,12 @@ std::optional<double> seconds_of(const std::string& acquired) {
   return text ? std::optional(static_cast<double>(::timegm(&time))) : std::nullopt;
 }
 
+// IDs of two issuers are two patients. `a`, `b`: as StudyFiles::Image::patient.
+bool are_of_two_issuers(const std::string& a, const std::string& b) {
+  const auto issuer_of = [](const std::string& patient) { return patient.substr(patient.rfind('\\') + 1); };
+  return !issuer_of(a).empty() && !issuer_of(b).empty() && issuer_of(a) != issuer_of(b);
+}
+
 }  // namespace
 
 void Objections::add_result(const std::string& session, const SetupResult& result, bool is_regrouped) {
@@ -39,9 +45,19 @@ void Objections::add_result(const std::string& session, const SetupResult& resul
 }
 
 void Objections::add(const std::string& session, const std::string& words) {
-  added_[session] = words;
+  std::vector<std::string>& added = added_[session];
+  if (std::ranges::find(added, words) != added.end()) return;
+  added.push_back(words);
   for (auto& [patient_id, patient] : patients_)
     if (patient.results.contains(session)) patient.is_news = true;
+}
+
+void Objections::inherit(const std::string& from, const std::string& session) {
+  if (const auto added = added_.find(from); added != added_.end()) {
+    for (const std::string& words : std::vector(added->second)) add(session, words);
+  } else if (const auto earlier = by_session_.find(from); earlier != by_session_.end()) {
+    add(session, earlier->second.words);  // of an earlier run: what was added is not told apart
+  }
 }
 
 void Objections::remove(const std::string& first_session) {
@@ -94,7 +110,9 @@ void Objections::update(const std::map<std::string, Patient>& patients, const st
     for (const auto& [session, own] : patient.results) {
       Objection found = objection(patient, session, registered);
       if (const auto added = added_.find(session); added != added_.end())
-        found = {.words = found.words + (found.words.empty() ? "" : "; ") + added->second};
+        for (const std::string& words : added->second)
+          if (found.words.find(words) == std::string::npos)
+            found = {.words = found.words + (found.words.empty() ? "" : "; ") + words};
       const auto earlier = by_session_.find(session);
       const bool is_final =  // of an earlier run, which has seen more
           earlier != by_session_.end() && !earlier->second.newer_have_results && !are_seen(patient, own);
@@ -105,6 +123,14 @@ void Objections::update(const std::map<std::string, Patient>& patients, const st
 
 bool Objections::are_seen(const OfPatient& patient, const std::set<Xray>& own) {
   return std::ranges::all_of(own, [&](const Xray& xray) { return patient.xrays.at(xray).image.has_value(); });
+}
+
+// Whether it shows another patient, who has the same PatientID from another issuer.
+bool Objections::is_of_other_issuer(const OfPatient& patient, const std::set<Xray>& own, const Seen& other) {
+  return other.image && std::ranges::any_of(own, [&](const Xray& xray) {
+           const auto& image = patient.xrays.at(xray).image;
+           return image && are_of_two_issuers(image->patient, other.image->patient);
+         });
 }
 
 // True as well if it is not known, or if clock and offset from UTC contradict each other.
@@ -124,7 +150,9 @@ Objection Objections::newer_xrays(const OfPatient& patient, const std::set<Xray>
   const std::pair<const Xray, Seen>* newest = nullptr;
   bool have_results = true;
   for (const auto& one : patient.xrays) {
-    if (own.contains(one.first) || !may_be_later(one.second.moment, latest_own)) continue;
+    if (own.contains(one.first) || is_of_other_issuer(patient, own, one.second) ||
+        !may_be_later(one.second.moment, latest_own))
+      continue;
     if (newest == nullptr || may_be_later(one.second.moment, newest->second.moment)) newest = &one;
     have_results = have_results && registered.contains(one.first.first);
   }
@@ -160,7 +188,8 @@ Objection Objections::objection(const OfPatient& patient, const std::string& ses
   if (!are_seen(patient, own)) return found;
   StudyFiles all;
   for (const auto& [xray, seen] : patient.xrays)
-    if (seen.image) (seen.is_rt_image ? all.images : all.other_xrays).push_back(*seen.image);
+    if (seen.image && !is_of_other_issuer(patient, own, seen))
+      (seen.is_rt_image ? all.images : all.other_xrays).push_back(*seen.image);
   std::set<std::string> uids;
   for (const auto& [uid, acquired] : own) uids.insert(uid);
   const auto regrouped = patient.regrouped.find(session);

@@ -27,6 +27,9 @@ class Objections {
   // That the files of a result are others now, in words. It counts with the next update().
   void add(const std::string& session, const std::string& words);
 
+  // What was added against a result speaks against another one, too, which rests on it.
+  void inherit(const std::string& from, const std::string& session);
+
   // Forgets all results of these X-rays. The X-rays count on.
   void remove(const std::string& first_session);
 
@@ -68,12 +71,13 @@ class Objections {
   static Objection newer_xrays(const OfPatient& patient, const std::set<Xray>& own,
                                const std::set<std::string>& registered);
   static std::string shared_xrays(const OfPatient& patient, const std::string& session);
+  static bool is_of_other_issuer(const OfPatient& patient, const std::set<Xray>& own, const Seen& other);
   static bool are_seen(const OfPatient& patient, const std::set<Xray>& own);
   Objection objection(const OfPatient& patient, const std::string& session,
                       const std::set<std::string>& registered) const;
 
   std::map<std::string, Objection> by_session_;
-  std::map<std::string, std::string> added_;  // by session
+  std::map<std::string, std::vector<std::string>> added_;  // in words, by session
   bool takes_other_xrays_;
   std::map<std::string, OfPatient> patients_;          // by PatientID
   std::map<std::string, std::string> patient_of_uid_;  // PatientID, by the SOPInstanceUID of an X-ray that has a result

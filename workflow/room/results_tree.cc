@@ -64,10 +64,17 @@ std::vector<std::string> of_same_xrays(const fs::path& results, const std::strin
   }
 }
 
+// From what a result that was handed over was registered.
+fs::path handed_over_inputs(fs::path folder) { return folder += ".inputs.json"; }
+
 // Folders of registrations under way: ".NAME.registering-PROCESS", and what isoshift register writes beside them.
 constexpr const char* kRegistering = ".registering-";
 
 }  // namespace
+
+bool operator==(const ManualBasis& one, const ManualBasis& other) {
+  return one.newest == other.newest && to_line(one.order) == to_line(other.order) && one.inputs == other.inputs;
+}
 
 void check_is_owner(const fs::path& results) {
   struct stat of_results{};
@@ -101,6 +108,12 @@ fs::path ResultsTree::record_file(const std::string& session) const {
 }
 
 fs::path ResultsTree::order_file(const std::string& session) const { return path_ / "orders" / (session + ".json"); }
+
+fs::path ResultsTree::inputs_file(const std::string& session) const { return path_ / "inputs" / (session + ".json"); }
+
+fs::path ResultsTree::handed_over_folder(const std::string& session) const {
+  return path_ / "handed_over" / name_of_xrays(session);
+}
 
 fs::path ResultsTree::release_file(const std::string& session) const {
   return path_ / "released" / (session + ".json");
@@ -187,13 +200,13 @@ void ResultsTree::keep_order(const std::string& session, const RegistrationOrder
 }
 
 void ResultsTree::keep_inputs(const std::string& session, const SessionInputs& inputs) {
-  replace_text(path_ / "inputs" / (session + ".json"), file_text(json_of(inputs)));
+  replace_text(inputs_file(session), file_text(json_of(inputs)));
 }
 
 std::optional<SessionInputs> ResultsTree::inputs(const std::string& session) const {
   std::optional<SessionInputs> newest;
   for (const std::string& name : of_same_xrays(path_, session)) {
-    const fs::path file = path_ / "inputs" / (name + ".json");
+    const fs::path file = inputs_file(name);
     if (!fs::exists(file)) continue;
     try {
       newest = session_inputs_from(read_json_file(file).json);
@@ -217,16 +230,32 @@ RegistrationOrder ResultsTree::order(const std::string& session) const {
   return registration_order_from(line, file.string());
 }
 
-std::string ResultsTree::hand_over(const std::string& session, const fs::path& folder, const std::string& by) {
+ManualBasis ResultsTree::manual_basis(const std::string& session) const {
+  return {.newest = newest_of_same_xrays(session), .order = order(session), .inputs = inputs(session)};
+}
+
+// First the inputs, then the line in the audit log, then the folder, which counts.
+std::string ResultsTree::hand_over(const ManualBasis& basis, const fs::path& folder, const std::string& by) {
   const FileLock lock = lock_releases();
+  const std::string& session = basis.newest;
   check_is_not_deleted(session);
-  const fs::path place = path_ / "handed_over" / name_of_xrays(session);
+  if (manual_basis(session) != basis)
+    throw Error(
+        fmt::format("session {}: its X-rays have another result or are registered in another way since this result "
+                    "was begun by hand. Load the page again, and register again",
+                    session));
+  const fs::path place = handed_over_folder(session);
   if (fs::exists(place))
     throw Error(
         fmt::format("session {}: an earlier result by hand waits for isoshift watch. Try again when it has been "
                     "taken over",
                     session));
   const SessionRecord record = record_of(further_name(session), folder);
+  const fs::path inputs = handed_over_inputs(place);
+  if (basis.inputs)
+    replace_text(inputs, file_text(json_of(*basis.inputs)));
+  else
+    fs::remove(inputs);
   audit_.append("handed over", {{"session", session},
                                 {"by", by},
                                 {"user", system_user().name},
@@ -244,9 +273,15 @@ std::vector<std::string> ResultsTree::handed_over() const {
   return sessions;
 }
 
+bool ResultsTree::is_handed_over(const std::string& session) const { return fs::exists(handed_over_folder(session)); }
+
 std::string ResultsTree::take_over(const std::string& session) {
   std::string name = further_name(session);
-  publish(name, path_ / "handed_over" / session);
+  const fs::path folder = handed_over_folder(session);
+  if (const fs::path inputs = handed_over_inputs(folder); fs::exists(inputs))
+    keep_inputs(name, session_inputs_from(read_json_file(inputs).json));
+  publish(name, folder);
+  fs::remove(handed_over_inputs(folder));
   return name;
 }
 
@@ -324,6 +359,8 @@ void ResultsTree::decide(Decision decision) {
     throw Error(fmt::format("{}: holds no session {}", path_.string(), decision.session));
   if (registered(decision.session).sha256 != decision.record)
     throw Error(fmt::format("session {}: is not what was on the screen any more. Look at it again", decision.session));
+  if (decision.kind == DecisionKind::kReopened && !is_decided(decision.session))
+    throw Error(fmt::format("session {}: there is no decision to take back", decision.session));
   if (decision.kind == DecisionKind::kAgreed)
     if (const auto before = this->decision(decision.session); before && before->forbids())
       throw Error(fmt::format("session {}: {}. Take that back first", decision.session, in_words(*before)));
@@ -338,6 +375,15 @@ void ResultsTree::decide(Decision decision) {
                 audit_, key_);
 }
 
+// Also if the decision was lost.
+bool ResultsTree::is_decided(const std::string& session) const {
+  try {
+    return decision(session).has_value();
+  } catch (const Error&) {
+    return true;
+  }
+}
+
 std::optional<Decision> ResultsTree::decision(const std::string& session) const {
   const auto statement = newest_statement(kDecisionStatement, path_, session, audit_, key_);
   if (!statement) return std::nullopt;
@@ -348,8 +394,6 @@ std::optional<Decision> ResultsTree::decision(const std::string& session) const 
 
 void ResultsTree::choose(Choice choice) {
   const FileLock lock = lock_releases();
-  if (fs::exists(session(choice.session)) && audit_.newest_statement(kChoiceStatement.event, choice.session).empty())
-    throw Error(fmt::format("session {}: its X-rays have a result already", choice.session));
   choice.user = system_user().name;
   choice.on = local_time();
   put_statement(kChoiceStatement, path_, choice.session, json_of(choice),
@@ -381,6 +425,10 @@ std::map<std::string, std::string> ResultsTree::chosen() const {
 void ResultsTree::check_stands(const std::string& session) const {
   if (const std::string newest = newest_of_same_xrays(session); newest != session)
     throw Error(fmt::format("session {}: its X-rays have a newer result, session {}", session, newest));
+  if (is_handed_over(session))
+    throw Error(fmt::format(
+        "session {}: its X-rays have a newer result by hand, which isoshift watch has yet to take over ({})", session,
+        handed_over_folder(session).string()));
   if (const auto decided = decision(session); decided && decided->forbids())
     throw Error(fmt::format("session {}: {}. Take that back first, on the screen of isoshift serve", session,
                             in_words(*decided)));
@@ -628,6 +676,8 @@ void ResultsTree::mark_sent(const Delivery& delivery, const std::string& answer)
 }
 
 void ResultsTree::audit(const std::string& event, const Json& details) { audit_.note(event, details); }
+
+void ResultsTree::check_audit() const { (void)audit_.head(); }
 
 void ResultsTree::write_kept_audit() { audit_.write_kept(); }
 

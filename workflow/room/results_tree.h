@@ -9,7 +9,8 @@
 //   chosen/NAME.N.json       what a person has chosen for the session's X-rays, as they were registered or will be
 //   orders/NAME.json         how the session was registered: what a person who registers it by hand begins with
 //   inputs/NAME.json         the SHA-256 of the files from which it was registered
-//   handed_over/NAME/        a result of the session's X-rays by hand that watch has yet to take over
+//   handed_over/NAME/        a result of the session's X-rays by hand that watch has yet to take over; beside it, in
+//                            NAME.inputs.json, from what it was registered
 //   sent/NAME.PEER.FILE      the mark that this peer has confirmed this file; it counts with its line in the audit log
 //   deleted/NAME.json        that the results of these X-rays were deleted
 //   objections.json          what other X-rays of the patient say against results
@@ -53,6 +54,14 @@ struct Objection {
   bool operator==(const Objection&) const = default;
 };
 
+// With what a person begins who registers X-rays by hand.
+struct ManualBasis {
+  std::string newest;                   // the newest result of the X-rays
+  RegistrationOrder order;              // how they are registered, from the planned pose
+  std::optional<SessionInputs> inputs;  // from what the newest result was registered; nothing: that was not kept
+};
+bool operator==(const ManualBasis& one, const ManualBasis& other);
+
 // Throws Error if another user owns the results tree: isoshift watch could not read files that this user writes there.
 void check_is_owner(const std::filesystem::path& results);
 
@@ -85,19 +94,22 @@ class ResultsTree {
   // Keeps how a session is registered, and from what. The caller must hold the lock of the tree.
   void keep_order(const std::string& session, const RegistrationOrder& order);
   void keep_inputs(const std::string& session, const SessionInputs& inputs);
-  // From what the newest result of the session's X-rays was registered; nothing if that was not kept. A result by hand
-  // was made from what the result before it was made from.
+  // From what the newest result of the session's X-rays was registered; nothing if that was not kept.
   std::optional<SessionInputs> inputs(const std::string& session) const;
   // How its X-rays were registered, from the planned pose. Throws Error if that was not kept.
   RegistrationOrder order(const std::string& session) const;
-  // Hands a finished result of the session's X-rays to the process that registers, as a line in the audit log says, and
-  // returns the name that it will have. The folder is moved away. Throws Error, and changes nothing, if it is no result
-  // of these X-rays, or if an earlier one was not taken over yet.
-  std::string hand_over(const std::string& session, const std::filesystem::path& folder, const std::string& by);
+  // Throws as order() does.
+  ManualBasis manual_basis(const std::string& session) const;
+  // Hands a finished result by hand to the process that registers, as a line in the audit log says, and returns the
+  // name that it will have. The folder is moved away. Throws Error, and changes nothing, if it is no result of these
+  // X-rays, if the basis is another one now, or if an earlier one was not taken over yet.
+  std::string hand_over(const ManualBasis& basis, const std::filesystem::path& folder, const std::string& by);
   std::vector<std::string> handed_over() const;  // sessions
-  // Publishes what was handed over as a session of its own, and returns its name. Throws as publish() does. The caller
-  // must hold the lock of the tree.
+  // Publishes what was handed over as a session of its own, with the inputs of its basis, and returns its name. Throws
+  // as publish() does. The caller must hold the lock of the tree.
   std::string take_over(const std::string& session);
+  // Whether a result of the session's X-rays by hand waits to be taken over.
+  bool is_handed_over(const std::string& session) const;
   // The newest result of the same X-rays: the session itself, or a further one.
   std::string newest_of_same_xrays(const std::string& session) const;
   // The name of the next result of the session's X-rays.
@@ -119,15 +131,14 @@ class ResultsTree {
 
   // Records what a person has decided about the result that its record names; when, and by which user of the system,
   // is added here. Throws Error if there is no such session, if its record is another one now, if somebody agrees with
-  // what was rejected and not taken back, or if the audit log cannot be written.
+  // what was rejected and not taken back, if there is nothing to take back, or if the audit log cannot be written.
   void decide(Decision decision);
   // The newest decision about the present result of a session; nothing if there is none, or if it was taken back.
   // Throws Error if the files do not say what the audit log proves.
   std::optional<Decision> decision(const std::string& session) const;
 
   // Records what a person has chosen for X-rays, or that an earlier choice is withdrawn; when, and by which user of the
-  // system, is added here. Throws Error if these X-rays have a result that rests on no choice, or if the audit log
-  // cannot be written.
+  // system, is added here. Throws Error if the audit log cannot be written.
   void choose(Choice choice);
   // The newest choice for the X-rays of a session; nothing if there is none. Throws Error if the files do not say what
   // the audit log proves.
@@ -182,19 +193,25 @@ class ResultsTree {
 
   // Adds a line to the audit log for a step that has taken effect. If the line cannot be written now, it is kept.
   void audit(const std::string& event, const nlohmann::ordered_json& details);
+  // Throws Error if the audit log is not whole.
+  void check_audit() const;
   // Writes the lines that were kept. Throws Error if they still cannot be written.
   void write_kept_audit();
 
  private:
   std::filesystem::path record_file(const std::string& session) const;
   std::filesystem::path order_file(const std::string& session) const;
+  std::filesystem::path inputs_file(const std::string& session) const;
+  std::filesystem::path handed_over_folder(const std::string& session) const;
   std::filesystem::path release_file(const std::string& session) const;
   std::vector<std::string> released() const;  // sessions
   // The record of a session. Throws Error if the session's folder has changed since its registration.
   SessionRecord checked(const std::string& session) const;
   void publish(const std::string& session, const std::filesystem::path& folder);
+  bool is_decided(const std::string& session) const;
   void check_is_not_deleted(const std::string& session) const;
-  // Throws Error if a newer result or a decision forbids that the session is released or sent.
+  // Throws Error if a newer result, one by hand that waits to be taken over, or a decision forbids that the session is
+  // released or sent.
   void check_stands(const std::string& session) const;
   void check_second_person(const SessionRecord& record, const std::string& releaser) const;
   FileLock lock_releases() const;

@@ -38,7 +38,7 @@ void SessionList::add(const std::string& session, const SetupResult& report, con
                       .patient = fmt::format("{} ({})", report.identity.patient_name, report.identity.patient_id),
                       .verdict = std::string(to_string(report.verdict)),
                       .action = std::string(to_string(shown_shift(report).decision.action)),
-                      .patient_key = patient_in_words(report.identity),
+                      .patient_key = isoshift::patient_key(report.identity),
                       .held = std::move(held),
                       .state = "",
                       .first = report.views.front().acquired,

@@ -13,7 +13,7 @@ namespace isoshift {
 
 struct ListedSession {
   std::string name, patient, verdict, action;
-  std::string patient_key;  // patient_in_words()
+  std::string patient_key;  // as patient_key()
   std::string held;         // in words: the state before it is released
   std::string state;  // in words: "held", "released by J. Doe on ...; 1 to be sent", "held; superseded by session ..."
   std::string first;  // when the first X-ray was acquired, "2026-03-01 10:15:00"

@@ -199,6 +199,8 @@ Choice chosen_from(const SessionOptions& options, const ChosenIds& ids) {
   choice.patient = found(options.patients, ids.patient);
   choice.plan = found(options.plans, ids.plan);
   choice.ct = found(options.cts, ids.ct);
+  for (const auto* candidates : {&options.plans, &options.cts})
+    for (const Candidate& candidate : *candidates) choice.offered.insert(candidate.id);
   choice.is_regrouped = is_regrouped || options.is_regrouped;
   return choice;
 }

@@ -18,7 +18,8 @@ struct StatementKind {
   const char* consequence;  // of a file that the audit log or the key does not prove
 };
 inline constexpr StatementKind kDecisionStatement{
-    "decided", "decision", "Nothing of the session is released or sent until a person decides again"};
+    "decided", "decision",
+    "Nothing of the session is released or sent until a person takes it back or decides against the result"};
 inline constexpr StatementKind kChoiceStatement{"chosen", "choice",
                                                 "The choice does not count until a person chooses again"};
 

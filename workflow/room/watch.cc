@@ -170,6 +170,7 @@ void Watch::take_deletions() {
       index_.remove(deletion.session);
       grouping_.remove(deletion.session);
       objections_.remove(deletion.session);
+      changes_.remove(deletion.session);
       grouping_.add_deleted(deletion.xrays);
     }
     deletions_read_ = newest;
@@ -204,7 +205,6 @@ void Watch::read_choices(const std::map<std::string, std::string>& there) {
     if (choice.is_withdrawn) objections_.add(tree_.newest_of_same_xrays(session), in_words(choice));
   }
   choices_ = choices;
-  std::erase_if(choices, [](const auto& one) { return one.second.is_withdrawn; });
   grouping_.set_choices(std::move(choices));
 }
 
@@ -227,6 +227,7 @@ void Watch::take_result(const std::string& session, const std::optional<Running>
   std::set<std::string> xrays;
   for (const auto& view : report.views) xrays.insert(view.sop_instance_uid);
   grouping_.add_result(session, xrays);
+  changes_.add_result(session, report.identity.patient_id);
   const std::string obstacle = obstacle_to_release(tree_, session, report.verdict);
   const std::string reason = reason_for_person(session, report, made);
   index_.add(session, report, obstacle, reason);
@@ -253,14 +254,28 @@ void Watch::take_over_results() {
   std::string trouble;
   for (const std::string& session : tree_.handed_over()) {
     try {
-      const std::string name = tree_.take_over(session);
-      parts_.observer.say(fmt::format("session {}: made by hand", name));
-      take_result(name);
+      take_over(session);
     } catch (const std::exception& error) {
       trouble = error.what();
     }
   }
   if (!trouble.empty()) throw Error(trouble);
+}
+
+// What speaks against the result before it does so against one by hand, which was made from the same files.
+void Watch::take_over(const std::string& session) {
+  const std::string before = tree_.newest_of_same_xrays(session);
+  const std::optional<SessionInputs> inputs_before = tree_.inputs(session);
+  const bool is_overtaken =
+      changes_.is_to_be_registered(session) || (running_ && name_of_xrays(running_->session) == session);
+  const std::string name = tree_.take_over(session);
+  parts_.observer.say(fmt::format("session {}: made by hand", name));
+  objections_.inherit(before, name);
+  if (is_overtaken || tree_.inputs(name) != inputs_before)
+    objections_.add(name, "it was made by hand from files that are others now");
+  take_result(name);
+  for (const auto& [patient_id, patient] : parts_.source.patients())
+    if (grouping_.registered_in(patient.files).contains(session)) changes_.compare_again(patient_id);
 }
 
 // One at a time, those with the newest X-rays first: somebody waits for them.
@@ -282,7 +297,12 @@ std::vector<Watch::Complete> Watch::complete_sessions() {
   for (const auto& [patient_id, patient] : parts_.source.patients()) {
     std::vector<SessionFiles> sessions = grouping_.sessions_in(patient.files);
     std::ranges::move(changes_.to_register(patient_id, patient.files), std::back_inserter(sessions));
-    for (const SessionFiles& session : grouping_.chosen_in(patient.files))
+    std::vector<SessionFiles> chosen = grouping_.chosen_in(patient.files);
+    std::ranges::copy_if(changes_.ambiguous_in(patient_id, patient.files), std::back_inserter(chosen),
+                         [&](const SessionFiles& one) {
+                           return std::ranges::find(chosen, one.name, &SessionFiles::name) == chosen.end();
+                         });
+    for (const SessionFiles& session : chosen)
       chosen_.push_back({.name = session.name,
                          .patient_id = patient_id,
                          .acquired = times_of(session.images),

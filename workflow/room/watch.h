@@ -99,6 +99,7 @@ class Watch {
   std::string reason_for_person(const std::string& session, const SetupResult& result,
                                 const std::optional<Running>& made) const;
   void take_over_results();
+  void take_over(const std::string& session);
   void receive();
   void compare_clocks();
   void take_deletions();

@@ -21,6 +21,7 @@ using testing::Not;
 
 class DecisionsTest : public ResultsTreeTest {
  protected:
+  DecisionsTest() { tree_.keep_order(a_, {.parts = {.study = "/in"}}); }
   void decide(DecisionKind kind, const std::string& by = "jdoe", const std::string& reason = "Mrs Roe coughed") {
     tree_.decide({.kind = kind, .session = a_, .record = tree_.registered(a_).sha256, .reason = reason, .by = by});
   }
@@ -39,7 +40,7 @@ class DecisionsTest : public ResultsTreeTest {
     return folder;
   }
   std::string by_hand(const std::string& set_by = "jdoe") {
-    tree_.hand_over(a_, write_by_hand(set_by), set_by);
+    tree_.hand_over(tree_.manual_basis(a_), write_by_hand(set_by), set_by);
     return tree_.take_over(a_);
   }
   std::string error_of_release_by(const std::string& session, const std::string& by) {
@@ -156,24 +157,68 @@ TEST_F(DecisionsTest, OnlyAResultOfTheSameXraysIsHandedOver) {
   const fs::path other = tree_.registering(register_session(tree_, {"1.2.7"}, "review"));
   fs::create_directories(other);
   write_text(other / kResultFile, R"({"verdict": "review", "views": [{"sop_instance_uid": "1.2.7"}]})");
-  EXPECT_THROW(tree_.hand_over(a_, other, "jdoe"), Error);
+  EXPECT_THROW(tree_.hand_over(tree_.manual_basis(a_), other, "jdoe"), Error);
   EXPECT_TRUE(fs::exists(other));
   EXPECT_THAT(tree_.handed_over(), IsEmpty());
   EXPECT_EQ(lines_of("handed over"), 0);
 }
 
 TEST_F(DecisionsTest, ASecondResultWaitsUntilTheFirstHasBeenTakenOver) {
-  tree_.hand_over(a_, write_by_hand(), "jdoe");
+  tree_.hand_over(tree_.manual_basis(a_), write_by_hand(), "jdoe");
   const fs::path second = write_by_hand("rroe");
-  EXPECT_THROW(tree_.hand_over(a_, second, "rroe"), Error);
+  EXPECT_THROW(tree_.hand_over(tree_.manual_basis(a_), second, "rroe"), Error);
   EXPECT_TRUE(fs::exists(second));
   tree_.take_over(a_);
-  EXPECT_NO_THROW(tree_.hand_over(a_, second, "rroe"));
+  EXPECT_NO_THROW(tree_.hand_over(tree_.manual_basis(a_), second, "rroe"));
+}
+
+TEST_F(DecisionsTest, WhatWasBegunByHandBeforeAnotherResultOrderOrInputsIsNotHandedOver) {
+  const ManualBasis before = tree_.manual_basis(a_);
+  const auto error_of_hand_over = [&](const ManualBasis& basis) {
+    fs::remove_all(tree_.registering(a_));
+    try {
+      tree_.hand_over(basis, write_by_hand("rroe"), "rroe");
+    } catch (const Error& error) {
+      return std::string(error.what());
+    }
+    return std::string();
+  };
+  tree_.keep_order(a_, {.parts = {.study = "/in", .plan = "/in/another.dcm"}});
+  EXPECT_THAT(error_of_hand_over(before), HasSubstr("registered in another way"));
+  const ManualBasis with_plan = tree_.manual_basis(a_);
+  SessionInputs inputs;
+  inputs.parts[0] = {.versions = "other", .contents = "slices"};
+  tree_.keep_inputs(a_, inputs);
+  EXPECT_THAT(error_of_hand_over(with_plan), HasSubstr("registered in another way"));
+  const ManualBasis with_slices = tree_.manual_basis(a_);
+  EXPECT_EQ(with_slices.inputs, inputs);
+  fs::remove_all(tree_.registering(a_));
+  const std::string further = by_hand();
+  EXPECT_EQ(tree_.inputs(further), inputs) << "of its basis";
+  EXPECT_THAT(error_of_hand_over(with_slices), HasSubstr("have another result"));
+  EXPECT_EQ(error_of_hand_over(tree_.manual_basis(a_)), "");
+}
+
+TEST_F(DecisionsTest, NothingIsReleasedWhileAResultByHandWaits) {
+  tree_.hand_over(tree_.manual_basis(a_), write_by_hand(), "jdoe");
+  EXPECT_THAT(error_of_release(a_), HasSubstr("newer result by hand, which isoshift watch has yet to take over"));
+  tree_.take_over(a_);
+  EXPECT_THAT(error_of_release(a_), HasSubstr("have a newer result"));
+}
+
+TEST_F(DecisionsTest, OnlyADecisionIsTakenBackAlsoOneThatWasLost) {
+  EXPECT_THROW(decide(DecisionKind::kReopened), Error);
+  decide(DecisionKind::kAgreed);
+  fs::remove(decided(1));
+  EXPECT_THROW(decide(DecisionKind::kAgreed), Error);
+  decide(DecisionKind::kReopened);
+  EXPECT_THROW(decide(DecisionKind::kReopened), Error) << "twice";
+  EXPECT_NO_THROW(decide(DecisionKind::kAgreed));
 }
 
 TEST_F(DecisionsTest, AnOrderIsKeptForEveryResultOfTheSameXrays) {
   const RegistrationOrder order{.parts = {.study = "/in", .doubts = {"one"}}, .flags = {"--preset", "fast"}};
-  EXPECT_THROW((void)tree_.order(a_), Error);
+  EXPECT_THROW((void)tree_.order("none"), Error);
   tree_.keep_order(a_, order);
   EXPECT_EQ(tree_.order(a_ + "-2"), order);
 }

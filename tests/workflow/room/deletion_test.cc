@@ -5,6 +5,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "base/json_file.h"
 #include "base/output_folder.h"
 #include "io/report/result_folder.h"
 #include "tests/support/command.h"
@@ -129,6 +130,18 @@ TEST_F(DeletionTest, TheCommandDeletesAllOfAPatient) {
   EXPECT_EQ(run({"--patient", "R"}).exit_status, 1);
   EXPECT_EQ(run({"0123456789ab"}).exit_status, 1);
   ASSERT_THAT(sessions(), SizeIs(2));
+  // The ID of one patient reads like that of another with its issuer.
+  const auto set_patient = [&](const std::string& patient, const std::string& id, const std::string& issuer) {
+    const fs::path file = room_.file.results / "sessions" / session(patient) / kResultFile;
+    nlohmann::json result = read_json_file(file).json;
+    result["patient"]["id"] = id;
+    result["patient"]["id_issuer"] = issuer;
+    replace_text(file, result.dump());
+  };
+  set_patient("P", "P", "A");
+  set_patient("Q", "P (A)", "");
+  EXPECT_EQ(run({"--patient", "P (A)"}).exit_status, 1);
+  EXPECT_THAT(sessions(), SizeIs(2));
   const CommandOutcome outcome = run({"--patient", "P"});
   EXPECT_EQ(outcome.exit_status, 0) << outcome.err;
   EXPECT_THAT(outcome.out, HasSubstr("session " + session("P") + ": deleted"));

@@ -8,6 +8,7 @@
 namespace isoshift {
 namespace {
 
+namespace fs = std::filesystem;
 using namespace std::chrono_literals;
 using testing::ElementsAre;
 using testing::HasSubstr;
@@ -31,6 +32,32 @@ class WatchChanges : public WatchReleases {
   void revise_plan() {
     room_.contents.written["/in/plan.P"] = "revised";
     room_.source.bring(plan_of("P"));
+  }
+  // A second plan, with X-rays that do not tell which is meant.
+  void make_plan_of_q_unclear() {
+    for (StudyFiles image : {xray("Q", "Q1", "AP", second_of(11, 15)), xray("Q", "Q2", "LAT", second_of(11, 15, 10))}) {
+      image.images[0].plan_uid = "";
+      room_.source.bring(image);
+    }
+    room_.source.bring(ct_of("Q"));
+    room_.source.bring(plan_of("Q"));
+    room_.pass(60s);
+    StudyFiles second = plan_of("Q");
+    second.plans[0].file = "/in/second";
+    second.plans[0].sop_instance_uid = "second";
+    room_.source.bring(second);
+    room_.pass(60s);
+  }
+  // A result of a patient's X-rays by hand, made from what they were registered from last, and handed over.
+  void hand_over(const std::string& patient) {
+    ResultsTree tree(room_.file.results);
+    const fs::path folder = room_.folder / "by_hand";
+    fs::remove_all(folder);
+    fs::copy(tree.session(session(patient)), folder);
+    tree.hand_over(tree.manual_basis(session(patient)), folder, "jdoe");
+  }
+  std::string objection(const std::string& session) const {
+    return ResultsTree(room_.file.results).objection(session).words;
   }
   std::vector<std::string> sessions() const { return ResultsTree(room_.file.results).sessions(); }
 };
@@ -110,21 +137,76 @@ TEST_F(WatchChanges, APersonReleasesWhatWasRegisteredAgain) {
 
 // The X-rays name no plan, and a second one comes: which is meant, nothing tells.
 TEST_F(WatchChanges, FilesThatMakeItUnclearWhatIsMeantAreSaid) {
-  for (StudyFiles image : {xray("Q", "Q1", "AP", second_of(11, 15)), xray("Q", "Q2", "LAT", second_of(11, 15, 10))}) {
-    image.images[0].plan_uid = "";
-    room_.source.bring(image);
+  make_plan_of_q_unclear();
+  EXPECT_THAT(room_.runs(), SizeIs(2));
+  EXPECT_THAT(room_.index(), HasSubstr("files came after the registration: "));
+}
+
+TEST_F(WatchChanges, AResultByHandIsNoWayAroundWhatSpeaksAgainstTheOneBefore) {
+  make_plan_of_q_unclear();
+  hand_over("Q");
+  room_.pass(1s);
+  const std::string by_hand = session("Q") + "-2";
+  ASSERT_THAT(sessions(), testing::Contains(by_hand));
+  EXPECT_THAT(objection(by_hand), HasSubstr("files came after the registration: "));
+  room_.start();
+  hand_over("Q");
+  room_.pass(1s);
+  EXPECT_THAT(objection(session("Q") + "-3"), HasSubstr("files came after the registration: ")) << "after a restart";
+}
+
+TEST_F(WatchChanges, AResultByHandFromEarlierFilesIsObjectedToAndTheXraysAreRegisteredAgain) {
+  hand_over("P");  // which the engine takes over when it has begun to register again
+  room_.runner.length = 30s;
+  revise_plan();
+  room_.watch.reset();
+  room_.start();
+  room_.pass(60s);
+  const std::string by_hand = session("P") + "-2";
+  EXPECT_THAT(objection(by_hand), HasSubstr("RT Plan changed after the registration"));
+  room_.pass(120s);
+  EXPECT_THAT(sessions(), testing::Contains(session("P") + "-3"));
+  EXPECT_EQ(objection(session("P") + "-3"), "");
+}
+
+TEST_F(WatchChanges, WhatIsTakenOverDuringARegistrationOfOtherFilesIsObjectedToAtOnce) {
+  room_.runner.length = 600s;
+  revise_plan();
+  room_.pass(30s);
+  ASSERT_TRUE(room_.runner.is_running());
+  hand_over("P");
+  room_.pass(1s);
+  EXPECT_THAT(objection(session("P") + "-2"), HasSubstr("made by hand from files that are others now"));
+  room_.pass(1300s, 10s);
+  EXPECT_THAT(sessions(), testing::Contains(session("P") + "-3"));
+  EXPECT_EQ(objection(session("P") + "-3"), "");
+}
+
+// Sent again with the right patient's ID.
+TEST_F(WatchChanges, XraysThatBelongToAnotherPatientNowAreRegisteredForThatPatient) {
+  for (const auto& [uid, label, second] : {std::tuple("P1", "AP", 0), std::tuple("P2", "LAT", 10)}) {
+    const StudyFiles of_q = xray("Q", uid, label, second_of(10, 15, second));
+    room_.source.give_away("P", uid);
+    room_.contents.written[of_q.images[0].file] = "of Q";
+    room_.source.bring(of_q);
   }
+  room_.pass(60s);
+  EXPECT_THAT(objection(session("P")), HasSubstr("X-rays of it belong to patient Q now"));
+  EXPECT_THAT(room_.index(), HasSubstr("waits for"));
   room_.source.bring(ct_of("Q"));
   room_.source.bring(plan_of("Q"));
   room_.pass(60s);
-  ASSERT_THAT(room_.runs(), SizeIs(2));
-  StudyFiles second = plan_of("Q");
-  second.plans[0].file = "/in/second";
-  second.plans[0].sop_instance_uid = "second";
-  room_.source.bring(second);
-  room_.pass(60s);
   EXPECT_THAT(room_.runs(), SizeIs(2));
-  EXPECT_THAT(room_.index(), HasSubstr("files came after the registration: "));
+  EXPECT_THAT(error_of_release("P"), HasSubstr("have a newer result"));
+}
+
+TEST_F(WatchChanges, APlanThatBelongsToAnotherPatientNowSpeaksAgainstResults) {
+  StudyFiles moved = plan_of("Q");
+  moved.plans[0].sop_instance_uid = plan_of("P").plans[0].sop_instance_uid;
+  room_.source.give_away("P", moved.plans[0].sop_instance_uid);
+  room_.source.bring(moved);
+  room_.pass(60s);
+  EXPECT_THAT(objection(session("P")), HasSubstr("its RT Plan belongs to patient Q now"));
 }
 
 }  // namespace

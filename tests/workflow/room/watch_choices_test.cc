@@ -318,6 +318,68 @@ TEST_F(WatchChoices, AWithdrawnChoiceLeavesTheXraysAsTheyWere) {
   EXPECT_THAT(options({"lat"}).other_xrays, SizeIs(1));
 }
 
+TEST_F(WatchChoices, AfterAWithdrawnChoiceWithAResultAPersonChoosesAgain) {
+  bring_ct("ct");
+  bring_plan("A");
+  bring_plan("B");
+  bring_pair(second_of(10, 15), second_of(10, 15, 10));
+  room_.pass(60s);
+  const Xrays both{"ap", "lat"};
+  choose(both, {.xrays = both, .plan = "A"});
+  room_.pass(60s);
+  ResultsTree tree(room_.file.results);
+  Choice withdrawn = tree.choice(session_name(both)).value();
+  withdrawn.is_withdrawn = true;
+  tree.choose(withdrawn);
+  room_.pass(60s);
+  EXPECT_THAT(objection(both), testing::AllOf(HasSubstr("jdoe withdrew on "), HasSubstr("2 RT Plans")));
+  choose(both, {.xrays = both, .plan = "A"}, "rroe");
+  room_.pass(60s);
+  ASSERT_THAT(room_.runner.runs(), SizeIs(2)) << "by another person, of the same plan";
+  EXPECT_THAT(room_.runner.runs()[1].doubts[0], HasSubstr("rroe chose on "));
+  EXPECT_EQ(tree.objection(session_name(both) + "-2").words, "");
+  room_.pass(600s);
+  room_.start();
+  room_.pass(60s);
+  EXPECT_THAT(room_.runs(), SizeIs(2)) << "for nothing";
+}
+
+TEST_F(WatchChoices, OfASecondPlanThatCameAfterTheResult) {
+  bring_ct("ct");
+  bring_plan("A");
+  bring_pair(second_of(10, 15), second_of(10, 15, 10));
+  room_.pass(60s);
+  ASSERT_THAT(room_.runs(), SizeIs(1));
+  bring_plan("B");
+  room_.pass(60s);
+  const Xrays both{"ap", "lat"};
+  EXPECT_THAT(objection(both), HasSubstr("2 RT Plans"));
+  choose(both, {.xrays = both, .plan = "A"});
+  room_.pass(60s);
+  ASSERT_THAT(room_.runner.runs(), SizeIs(2));
+  EXPECT_EQ(room_.runner.runs()[1].plan, "A");
+}
+
+TEST_F(WatchChoices, APlanThatComesAfterTheChoiceSpeaksAgainstItsResult) {
+  bring_ct("ct");
+  bring_plan("A");
+  bring_plan("B");
+  bring_pair(second_of(10, 15), second_of(10, 15, 10));
+  room_.pass(60s);
+  const Xrays both{"ap", "lat"};
+  choose(both, {.xrays = both, .plan = "A"});
+  room_.pass(60s);
+  ASSERT_EQ(objection(both), "");
+  bring_plan("C");
+  room_.pass(60s);
+  EXPECT_THAT(objection(both), HasSubstr("a person had chosen before the RT Plan C 20260301 (C) came"));
+  choose(both, {.xrays = both, .plan = "C"});
+  room_.pass(60s);
+  ASSERT_THAT(room_.runner.runs(), SizeIs(2));
+  EXPECT_EQ(room_.runner.runs()[1].plan, "C");
+  EXPECT_EQ(ResultsTree(room_.file.results).objection(session_name(both) + "-2").words, "");
+}
+
 TEST_F(WatchChoices, ALostChoiceIsSaidAndMadeAgain) {
   bring_ct("ct");
   bring_plan("A");
