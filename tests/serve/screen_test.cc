@@ -357,7 +357,7 @@ TEST_F(ScreenTest, ALostDecisionCanBeTakenBack) {
 TEST_F(ScreenTest, TheListSaysThatTheAuditLogIsNotWhole) {
   EXPECT_THAT(Json::parse(get("/api/room").body).at("troubles"), testing::IsEmpty());
   std::filesystem::resize_file(tree_.path() / "audit.jsonl", 10);
-  std::this_thread::sleep_for(600ms);  // the list is kept for half a second
+  std::this_thread::sleep_for(std::chrono::milliseconds(600));  // the list is kept for half a second
   EXPECT_THAT(Json::parse(get("/api/room").body).at("troubles"), Not(testing::IsEmpty()));
 }
 
