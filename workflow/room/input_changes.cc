@@ -105,7 +105,7 @@ bool InputChanges::has_moved_to(const std::string& patient_id, const std::string
     for (const StudyFiles::Image& image : *images)
       if (const auto found = results.find(image.sop_instance_uid); found != results.end() && found->second == session)
         parts.images.push_back(image.file);
-  return before->parts.back() != inputs_of(parts, contents_, *before).parts.back();
+  return before->parts.back().contents != inputs_of(parts, contents_, *before).parts.back().contents;
 }
 
 // Plans of this patient that X-rays of other patients' results name, and that these patients have no more.
@@ -114,12 +114,13 @@ void InputChanges::look_for_plans_of(const std::string& patient_id, const std::m
   std::set<std::string> plans;
   for (const StudyFiles::Plan& plan : patients.at(patient_id).files.plans) plans.insert(plan.sop_instance_uid);
   for (const auto& [other, patient] : patients) {
-    if (other == patient_id) continue;
+    if (plans.empty() || other == patient_id) continue;
     std::set<std::string> moved = plans;
     for (const StudyFiles::Plan& plan : patient.files.plans) moved.erase(plan.sop_instance_uid);
     StudyFiles of_moved;
     std::ranges::copy_if(patient.files.images, std::back_inserter(of_moved.images),
                          [&](const StudyFiles::Image& image) { return moved.contains(image.plan_uid); });
+    if (of_moved.images.empty()) continue;
     for (const std::string& session : grouping_.registered_in(of_moved))
       found(tree_.newest_of_same_xrays(session), fmt::format("its RT Plan belongs to patient {} now", patient_id));
   }

@@ -275,7 +275,9 @@ void Watch::take_over(const std::string& session) {
     objections_.add(name, "it was made by hand from files that are others now");
   take_result(name);
   for (const auto& [patient_id, patient] : parts_.source.patients())
-    if (grouping_.registered_in(patient.files).contains(session)) changes_.compare_again(patient_id);
+    if (std::ranges::any_of(grouping_.results_of(patient.files),
+                            [&](const auto& one) { return one.second == session; }))
+      changes_.compare_again(patient_id);
 }
 
 // One at a time, those with the newest X-rays first: somebody waits for them.
