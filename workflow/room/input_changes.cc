@@ -74,7 +74,7 @@ std::optional<std::string> InputChanges::change_of(const std::string& session, c
     can_be_registered = false;
     return fmt::format("files came after the registration: {}", error.what());
   }
-  if (const std::string choice = grouping_.choice_in_words(session); !choice.empty() && !rests_on(session, choice))
+  if (std::string choice = grouping_.choice_in_words(session); !choice.empty() && !rests_on(session, choice))
     return choice;
   return std::nullopt;
 }
