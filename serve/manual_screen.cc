@@ -214,9 +214,10 @@ HttpResponse ManualScreen::state() {
 }
 
 HttpResponse ManualScreen::report(const std::string& number) const {
-  const bool is_number = std::ranges::all_of(number, [](char c) { return c >= '0' && c <= '9'; });
-  std::ifstream file(registration_.results() / number / "report.html", std::ios::binary);
-  if (!is_number || !file) return refusal(404, "There is no such result, or it was handed over.");
+  std::ifstream file;
+  if (std::ranges::all_of(number, [](char c) { return c >= '0' && c <= '9'; }))
+    file.open(registration_.results() / number / "report.html", std::ios::binary);
+  if (!file.is_open()) return refusal(404, "There is no such result, or it was handed over.");
   return report_answer({std::istreambuf_iterator<char>(file), {}});
 }
 

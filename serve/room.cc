@@ -102,20 +102,17 @@ void Room::look_for_sessions(std::vector<std::string>& troubles) {
 void Room::look() {
   std::vector<std::string> troubles;
   look_for_sessions(troubles);
-  for (const auto& step :
-       std::vector<std::function<void()>>{[&] { list_.update(tree_.objections()); }, [&] { tree_.check_audit(); }}) {
+  std::optional<EngineSeen> engine;
+  const auto attempt = [&](const auto& step) {
     try {
       step();
     } catch (const std::exception& error) {
       troubles.emplace_back(error.what());
     }
-  }
-  std::optional<EngineSeen> engine;
-  try {
-    engine = read_engine_state(tree_.path(), clock_.file_time());
-  } catch (const std::exception& error) {
-    troubles.emplace_back(error.what());
-  }
+  };
+  attempt([&] { list_.update(tree_.objections()); });
+  attempt([&] { tree_.check_audit(); });
+  attempt([&] { engine = read_engine_state(tree_.path(), clock_.file_time()); });
   if (engine) std::ranges::copy(engine->state.troubles, std::back_inserter(troubles));
   auto seen = std::make_shared<Seen>();
   seen->does_engine_run = engine && engine->runs();

@@ -274,6 +274,11 @@ StudyParts chosen(StudyFiles files, std::vector<StudyFiles::Plan> other_plans, c
 
 std::string patient_id_of(const std::string& patient) { return patient.substr(0, patient.rfind('\\')); }
 
+bool may_be_of_one_issuer(const std::string& a, const std::string& b) {
+  const auto issuer_of = [](const std::string& patient) { return patient.substr(patient.rfind('\\') + 1); };
+  return issuer_of(a) == issuer_of(b) || issuer_of(a).empty() || issuer_of(b).empty();
+}
+
 std::vector<fs::path> files_below(const std::vector<fs::path>& paths, const std::unordered_set<std::string>& but,
                                   std::set<fs::path>* unsearchable) {
   std::vector<fs::path> files;

@@ -66,6 +66,8 @@ struct StudyFiles {
 
 // The PatientID, without the issuer, of a `patient` of StudyFiles.
 std::string patient_id_of(const std::string& patient);
+// Whether two `patient`s of one PatientID may be one: their issuers are the same, or one names none.
+bool may_be_of_one_issuer(const std::string& a, const std::string& b);
 
 // All files below `paths` (files or folders), in the order of their names, without the files named in `but` and without
 // hidden files (with a leading dot). Throws Error for a path that does not exist or cannot be searched. If

@@ -22,10 +22,9 @@ std::optional<double> seconds_of(const std::string& acquired) {
   return text ? std::optional(static_cast<double>(::timegm(&time))) : std::nullopt;
 }
 
-// IDs of two issuers are two patients. `a`, `b`: as StudyFiles::Image::patient.
-bool are_of_two_issuers(const std::string& a, const std::string& b) {
-  const auto issuer_of = [](const std::string& patient) { return patient.substr(patient.rfind('\\') + 1); };
-  return !issuer_of(a).empty() && !issuer_of(b).empty() && issuer_of(a) != issuer_of(b);
+// Says one thing more; empty words say nothing.
+void add_words(const std::string& words, Objection& to) {
+  if (!words.empty()) to = {.words = to.words + (to.words.empty() ? "" : "; ") + words};
 }
 
 }  // namespace
@@ -111,8 +110,7 @@ void Objections::update(const std::map<std::string, Patient>& patients, const st
       Objection found = objection(patient, session, registered);
       if (const auto added = added_.find(session); added != added_.end())
         for (const std::string& words : added->second)
-          if (found.words.find(words) == std::string::npos)
-            found = {.words = found.words + (found.words.empty() ? "" : "; ") + words};
+          if (found.words.find(words) == std::string::npos) add_words(words, found);
       const auto earlier = by_session_.find(session);
       const bool is_final =  // of an earlier run, which has seen more
           earlier != by_session_.end() && !earlier->second.newer_have_results && !are_seen(patient, own);
@@ -129,7 +127,7 @@ bool Objections::are_seen(const OfPatient& patient, const std::set<Xray>& own) {
 bool Objections::is_of_other_issuer(const OfPatient& patient, const std::set<Xray>& own, const Seen& other) {
   return other.image && std::ranges::any_of(own, [&](const Xray& xray) {
            const auto& image = patient.xrays.at(xray).image;
-           return image && are_of_two_issuers(image->patient, other.image->patient);
+           return image && !may_be_of_one_issuer(image->patient, other.image->patient);
          });
 }
 
@@ -181,10 +179,7 @@ Objection Objections::objection(const OfPatient& patient, const std::string& ses
                                 const std::set<std::string>& registered) const {
   const std::set<Xray>& own = patient.results.at(session);
   Objection found = newer_xrays(patient, own, registered);
-  const auto add = [&](const std::string& words) {
-    if (!words.empty()) found = {.words = found.words + (found.words.empty() ? "" : "; ") + words};
-  };
-  add(shared_xrays(patient, session));
+  add_words(shared_xrays(patient, session), found);
   if (!are_seen(patient, own)) return found;
   StudyFiles all;
   for (const auto& [xray, seen] : patient.xrays)
@@ -194,7 +189,7 @@ Objection Objections::objection(const OfPatient& patient, const std::string& ses
   for (const auto& [uid, acquired] : own) uids.insert(uid);
   const auto regrouped = patient.regrouped.find(session);
   if (regrouped == patient.regrouped.end()) {
-    add(objection_to(uids, all, takes_other_xrays_, registered));
+    add_words(objection_to(uids, all, takes_other_xrays_, registered), found);
     return found;
   }
   SessionFiles group;
@@ -204,7 +199,7 @@ Objection Objections::objection(const OfPatient& patient, const std::string& ses
   for (const std::string& doubt : doubts_about(group, all, takes_other_xrays_, registered))
     if (std::ranges::none_of(regrouped->second,
                              [&](const std::string& reason) { return reason.find(doubt) != std::string::npos; })) {
-      add(doubt);
+      add_words(doubt, found);
       break;
     }
   return found;

@@ -72,10 +72,6 @@ constexpr const char* kRegistering = ".registering-";
 
 }  // namespace
 
-bool operator==(const ManualBasis& one, const ManualBasis& other) {
-  return one.newest == other.newest && to_line(one.order) == to_line(other.order) && one.inputs == other.inputs;
-}
-
 void check_is_owner(const fs::path& results) {
   struct stat of_results{};
   if (::stat(results.c_str(), &of_results) == 0 && of_results.st_uid != ::geteuid())

@@ -59,8 +59,9 @@ struct ManualBasis {
   std::string newest;                   // the newest result of the X-rays
   RegistrationOrder order;              // how they are registered, from the planned pose
   std::optional<SessionInputs> inputs;  // from what the newest result was registered; nothing: that was not kept
+
+  bool operator==(const ManualBasis&) const = default;
 };
-bool operator==(const ManualBasis& one, const ManualBasis& other);
 
 // Throws Error if another user owns the results tree: isoshift watch could not read files that this user writes there.
 void check_is_owner(const std::filesystem::path& results);

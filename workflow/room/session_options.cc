@@ -24,8 +24,7 @@ std::string words_of(const StudyFiles::Image& image) {
 // Whether both may show one setup: nothing but the time between them tells that they do not. An X-ray without an issuer
 // may be of any.
 bool may_belong_together(const StudyFiles::Image& a, const StudyFiles::Image& b) {
-  const auto has_issuer = [](const StudyFiles::Image& image) { return !image.patient.ends_with('\\'); };
-  return (a.patient == b.patient || !has_issuer(a) || !has_issuer(b)) &&
+  return may_be_of_one_issuer(a.patient, b.patient) &&
          std::tie(a.plan_uid, a.machine) == std::tie(b.plan_uid, b.machine) &&
          (!a.at_s || !b.at_s || std::abs(*a.at_s - *b.at_s) <= kDayS);
 }

@@ -48,6 +48,14 @@ class WatchChoices : public testing::Test {
     ct.cts[0].patient = patient;
     room_.source.bring(ct);
   }
+  // A session that cannot be registered before a person chooses.
+  void wait_with_two_plans() {
+    bring_ct("ct");
+    bring_plan("A");
+    bring_plan("B");
+    bring_pair(second_of(10, 15), second_of(10, 15, 10));
+    room_.pass(60s);
+  }
   SessionOptions options(const Xrays& xrays) const {
     const auto engine = read_engine_state(room_.file.results, room_.clock.file_time());
     for (const auto* sessions : {&engine->state.waiting, &engine->state.chosen})
@@ -64,6 +72,12 @@ class WatchChoices : public testing::Test {
     choice.reason = "the panel had failed";
     ResultsTree(room_.file.results).choose(choice);
   }
+  void withdraw(const Xrays& xrays) {
+    ResultsTree tree(room_.file.results);
+    Choice withdrawn = tree.choice(session_name(xrays)).value();
+    withdrawn.is_withdrawn = true;
+    tree.choose(withdrawn);
+  }
   std::string objection(const Xrays& xrays) const {
     return ResultsTree(room_.file.results).objection(session_name(xrays)).words;
   }
@@ -72,11 +86,7 @@ class WatchChoices : public testing::Test {
 };
 
 TEST_F(WatchChoices, OfTwoPlans) {
-  bring_ct("ct");
-  bring_plan("A");
-  bring_plan("B");
-  bring_pair(second_of(10, 15), second_of(10, 15, 10));
-  room_.pass(60s);
+  wait_with_two_plans();
   ASSERT_THAT(room_.runs(), IsEmpty());
   EXPECT_THAT(room_.index(), HasSubstr("2 RT Plans"));
   const SessionOptions options = this->options({"ap", "lat"});
@@ -241,11 +251,7 @@ TEST_F(WatchChoices, OfAGroupNewXraysCountAndThoseInTheReportDoNot) {
 }
 
 TEST_F(WatchChoices, AChoiceIsMadeAgainAfterTheRegistration) {
-  bring_ct("ct");
-  bring_plan("A");
-  bring_plan("B");
-  bring_pair(second_of(10, 15), second_of(10, 15, 10));
-  room_.pass(60s);
+  wait_with_two_plans();
   const Xrays both{"ap", "lat"};
   choose(both, {.xrays = both, .plan = "A"});
   room_.pass(60s);
@@ -261,11 +267,7 @@ TEST_F(WatchChoices, AChoiceIsMadeAgainAfterTheRegistration) {
 }
 
 TEST_F(WatchChoices, AChoiceDuringTheRegistrationCountsAfterIt) {
-  bring_ct("ct");
-  bring_plan("A");
-  bring_plan("B");
-  bring_pair(second_of(10, 15), second_of(10, 15, 10));
-  room_.pass(60s);
+  wait_with_two_plans();
   const Xrays both{"ap", "lat"};
   const SessionOptions options = this->options(both);
   room_.runner.length = 20s;
@@ -308,10 +310,7 @@ TEST_F(WatchChoices, AWithdrawnChoiceLeavesTheXraysAsTheyWere) {
   choose({"ap"}, {.xrays = both});
   room_.pass(60s);
   EXPECT_THAT(room_.index(), HasSubstr("the table moved"));
-  ResultsTree tree(room_.file.results);
-  Choice withdrawn = tree.choice(session_name(both)).value();
-  withdrawn.is_withdrawn = true;
-  tree.choose(withdrawn);
+  withdraw(both);
   room_.pass(60s);
   EXPECT_THAT(room_.index(), Not(HasSubstr("the table moved")));
   EXPECT_THAT(options({"ap"}).other_xrays, SizeIs(1));
@@ -319,25 +318,18 @@ TEST_F(WatchChoices, AWithdrawnChoiceLeavesTheXraysAsTheyWere) {
 }
 
 TEST_F(WatchChoices, AfterAWithdrawnChoiceWithAResultAPersonChoosesAgain) {
-  bring_ct("ct");
-  bring_plan("A");
-  bring_plan("B");
-  bring_pair(second_of(10, 15), second_of(10, 15, 10));
-  room_.pass(60s);
+  wait_with_two_plans();
   const Xrays both{"ap", "lat"};
   choose(both, {.xrays = both, .plan = "A"});
   room_.pass(60s);
-  ResultsTree tree(room_.file.results);
-  Choice withdrawn = tree.choice(session_name(both)).value();
-  withdrawn.is_withdrawn = true;
-  tree.choose(withdrawn);
+  withdraw(both);
   room_.pass(60s);
   EXPECT_THAT(objection(both), testing::AllOf(HasSubstr("jdoe withdrew on "), HasSubstr("2 RT Plans")));
   choose(both, {.xrays = both, .plan = "A"}, "rroe");
   room_.pass(60s);
   ASSERT_THAT(room_.runner.runs(), SizeIs(2)) << "by another person, of the same plan";
   EXPECT_THAT(room_.runner.runs()[1].doubts[0], HasSubstr("rroe chose on "));
-  EXPECT_EQ(tree.objection(session_name(both) + "-2").words, "");
+  EXPECT_EQ(ResultsTree(room_.file.results).objection(session_name(both) + "-2").words, "");
   room_.pass(600s);
   room_.start();
   room_.pass(60s);
@@ -361,11 +353,7 @@ TEST_F(WatchChoices, OfASecondPlanThatCameAfterTheResult) {
 }
 
 TEST_F(WatchChoices, APlanThatComesAfterTheChoiceSpeaksAgainstItsResult) {
-  bring_ct("ct");
-  bring_plan("A");
-  bring_plan("B");
-  bring_pair(second_of(10, 15), second_of(10, 15, 10));
-  room_.pass(60s);
+  wait_with_two_plans();
   const Xrays both{"ap", "lat"};
   choose(both, {.xrays = both, .plan = "A"});
   room_.pass(60s);
@@ -381,11 +369,7 @@ TEST_F(WatchChoices, APlanThatComesAfterTheChoiceSpeaksAgainstItsResult) {
 }
 
 TEST_F(WatchChoices, ALostChoiceIsSaidAndMadeAgain) {
-  bring_ct("ct");
-  bring_plan("A");
-  bring_plan("B");
-  bring_pair(second_of(10, 15), second_of(10, 15, 10));
-  room_.pass(60s);
+  wait_with_two_plans();
   const Xrays both{"ap", "lat"};
   room_.runner.failure = {.why = "error: out of memory", .may_be_over_soon = false};
   choose(both, {.xrays = both, .plan = "A"});
@@ -443,11 +427,7 @@ TEST_F(WatchChoices, AChoiceWithoutAResultIsDeletedOnRequest) {
 }
 
 TEST_F(WatchChoices, AForgedChoiceDoesNotCount) {
-  bring_ct("ct");
-  bring_plan("A");
-  bring_plan("B");
-  bring_pair(second_of(10, 15), second_of(10, 15, 10));
-  room_.pass(60s);
+  wait_with_two_plans();
   Choice forged = chosen_from(options({"ap", "lat"}), {.xrays = {"ap", "lat"}, .plan = "B"});
   replace_text(room_.file.results / "chosen" / (forged.session + ".1.json"), json_of(forged).dump());
   room_.pass(60s);
@@ -456,11 +436,7 @@ TEST_F(WatchChoices, AForgedChoiceDoesNotCount) {
 }
 
 TEST_F(WatchChoices, ChoicesAreDeletedWithTheirResults) {
-  bring_ct("ct");
-  bring_plan("A");
-  bring_plan("B");
-  bring_pair(second_of(10, 15), second_of(10, 15, 10));
-  room_.pass(60s);
+  wait_with_two_plans();
   const Xrays both{"ap", "lat"};
   choose(both, {.xrays = both, .plan = "B"});
   room_.pass(60s);
