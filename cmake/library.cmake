@@ -2,8 +2,8 @@
 #
 # Headers that most sources include are compiled once for all boxes, and several sources of a box are compiled together
 # (CMAKE_UNITY_BUILD in the presets); bench/results/build-time.md has what that saves. So the anonymous
-# namespaces of a box hold no name twice; drr/ and io/report/, where they do, say so. Sources include what they use all the
-# same: ./dev lint reads each by itself, without either.
+# namespaces of a box hold no name twice; drr/ and io/report/, where they do, say so. Each test file has a namespace of
+# its own. Sources include what they use all the same: ./dev lint reads each by itself, without either.
 option(ISOSHIFT_PCH "Precompile the headers that most sources include" ON)
 
 set(isoshift_common_headers

@@ -9,7 +9,7 @@
 #include "base/error.h"
 #include "tests/support/temporary_folder.h"
 
-namespace isoshift {
+namespace isoshift::output_folder_test {
 namespace {
 
 std::string content(const std::filesystem::path& path) {
@@ -102,4 +102,4 @@ TEST(OutputFolder, TakesTheParentsItMadeAwayAgain) {
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::output_folder_test

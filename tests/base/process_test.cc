@@ -10,7 +10,7 @@
 
 #include "base/error.h"
 
-namespace isoshift {
+namespace isoshift::process_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -135,4 +135,4 @@ TEST(Channel, SendingToOneThatDoesNotReadEnds) {
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::process_test

@@ -8,7 +8,7 @@
 #include <cstdlib>
 #include <fstream>
 
-namespace isoshift {
+namespace isoshift::system_user_test {
 namespace {
 
 constexpr int kKernelRefuses = 2;
@@ -44,4 +44,4 @@ TEST(SystemUserTest, SudoSaysWhoItWasWhereTheKernelDoesNot) {
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::system_user_test

@@ -12,7 +12,7 @@
 #include "bodies/distance.h"
 #include "tests/support/phantom_ct.h"
 
-namespace isoshift {
+namespace isoshift::body_map_test {
 namespace {
 
 Eigen::Affine3d lattice_of(double edge_mm) {
@@ -151,4 +151,4 @@ TEST(Bodies, OfACtOfAirAreNone) {
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::body_map_test

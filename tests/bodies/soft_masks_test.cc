@@ -7,7 +7,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace isoshift {
+namespace isoshift::soft_masks_test {
 namespace {
 
 // Two cubes of 20 mm, 40 mm apart along x, and a couch, in voxels of 2 mm.
@@ -75,4 +75,4 @@ TEST(SoftMasks, LieWhereTheLabelsDo) {
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::soft_masks_test

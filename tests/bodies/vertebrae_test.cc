@@ -9,7 +9,7 @@
 #include "bodies/lattice.h"
 #include "tests/support/phantom_ct.h"
 
-namespace isoshift {
+namespace isoshift::vertebrae_test {
 namespace {
 
 struct Count {
@@ -124,4 +124,4 @@ TEST(Vertebrae, AreNotFoundInAShellOrABlock) {
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::vertebrae_test

@@ -16,7 +16,7 @@
 #include "workflow/batch/batch_folder.h"
 #include "workflow/batch/batch_manifest.h"
 
-namespace isoshift {
+namespace isoshift::batch_command_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -363,4 +363,4 @@ TEST_F(ManifestTest, MistakesAreNamed) {
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::batch_command_test

@@ -11,7 +11,7 @@
 #include "tests/support/small_study.h"
 #include "tests/support/testdata.h"
 
-namespace isoshift {
+namespace isoshift::check_command_test {
 namespace {
 
 using testing::HasSubstr;
@@ -429,4 +429,4 @@ TEST_F(CheckCommandTest, TheShiftNeedsIsocenterAndPosition) {
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::check_command_test

@@ -10,7 +10,7 @@
 #include "tests/support/command.h"
 #include "tests/support/small_study.h"
 
-namespace isoshift {
+namespace isoshift::error_messages_test {
 namespace {
 
 using testing::HasSubstr;
@@ -306,4 +306,4 @@ TEST_F(ErrorMessagesTest, RegisteringAnEmptyDrrIsAnErrorToo) {
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::error_messages_test

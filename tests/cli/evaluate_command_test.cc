@@ -10,7 +10,7 @@
 #include "cli/commands/commands.h"
 #include "tests/support/small_study.h"
 
-namespace isoshift {
+namespace isoshift::evaluate_command_test {
 namespace {
 
 using testing::ElementsAre;
@@ -267,4 +267,4 @@ TEST(RegionOptionsTest, ADistanceThatIsNoneIsAUsageError) {
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::evaluate_command_test

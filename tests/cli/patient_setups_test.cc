@@ -12,7 +12,7 @@
 #include "tests/support/small_study.h"
 #include "workflow/register/truth.h"
 
-namespace isoshift {
+namespace isoshift::patient_setups_test {
 namespace {
 
 struct Setup {
@@ -88,4 +88,4 @@ TEST(PatientSetupsByHand, CouchPitchAndRollAreNoSetupErrorOnceSupplied) {
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::patient_setups_test

@@ -11,7 +11,7 @@
 #include "tests/support/command.h"
 #include "tests/support/temporary_folder.h"
 
-namespace isoshift {
+namespace isoshift::phantom_command_test {
 namespace {
 
 CommandOutcome make_phantom(const std::filesystem::path& folder, std::vector<std::string> more = {}) {
@@ -90,4 +90,4 @@ TEST(PhantomCommand, RefusesNonsense) {
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::phantom_command_test

@@ -3,7 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-namespace isoshift {
+namespace isoshift::region_switches_test {
 namespace {
 
 using testing::ElementsAre;
@@ -22,4 +22,4 @@ TEST(RegionSwitches, TakeNamesAsTheyAre) {
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::region_switches_test

@@ -11,7 +11,7 @@
 #include "tests/support/small_study.h"
 #include "workflow/register/truth.h"
 
-namespace isoshift {
+namespace isoshift::register_command_test {
 namespace {
 
 using testing::HasSubstr;
@@ -510,4 +510,4 @@ TEST_F(RegisterCommandTest, FilesWithoutAHeaderAreReadToo) {
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::register_command_test

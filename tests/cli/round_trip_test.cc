@@ -10,7 +10,7 @@
 #include "tests/support/command.h"
 #include "tests/support/small_study.h"
 
-namespace isoshift {
+namespace isoshift::round_trip_test {
 namespace {
 
 nlohmann::json setup_error_of(const std::filesystem::path& result) {
@@ -51,4 +51,4 @@ TEST_P(GdcmRoundTrip, ACompressedStudyRegistersTheSame) {
 INSTANTIATE_TEST_SUITE_P(All, GdcmRoundTrip, testing::Values("--jpegls", "--rle", "--jpeg"));
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::round_trip_test

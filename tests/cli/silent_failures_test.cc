@@ -10,7 +10,7 @@
 #include "tests/support/pose_near.h"
 #include "tests/support/small_study.h"
 
-namespace isoshift {
+namespace isoshift::silent_failures_test {
 namespace {
 
 using testing::HasSubstr;
@@ -94,4 +94,4 @@ TEST_F(SilentFailures, TheRegistrationObjectGivesThePoseOnTheWayBackAndNotItsInv
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::silent_failures_test

@@ -15,7 +15,7 @@
 #include "base/graceful_end.h"
 #include "tests/support/small_study.h"
 
-namespace isoshift {
+namespace isoshift::track_command_test {
 namespace {
 
 using testing::HasSubstr;
@@ -268,4 +268,4 @@ TEST_F(SpoiledTrackTest, ATargetThatIsNeverFoundIsAnError) {
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::track_command_test

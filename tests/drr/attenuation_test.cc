@@ -4,7 +4,7 @@
 
 #include "base/error.h"
 
-namespace isoshift {
+namespace isoshift::attenuation_test {
 namespace {
 
 TEST(Attenuation, PhysicalCurveIsThatOfAlgorithmsMd) {
@@ -34,4 +34,4 @@ TEST(Attenuation, WindowedCurveRisesFromLowToHigh) {
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::attenuation_test

@@ -11,7 +11,7 @@
 #include "tests/drr/test_views.h"
 #include "tests/support/bent_scene.h"
 
-namespace isoshift {
+namespace isoshift::bodies_test {
 namespace {
 
 using Eigen::Vector3d;
@@ -167,4 +167,4 @@ TEST_F(BodiesTest, SharesMayHaveALatticeOfTheirOwn) {
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::bodies_test

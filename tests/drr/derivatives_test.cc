@@ -8,7 +8,7 @@
 #include "drr/renderer.h"
 #include "tests/drr/test_views.h"
 
-namespace isoshift {
+namespace isoshift::derivatives_test {
 namespace {
 
 using Eigen::Vector3d;
@@ -104,4 +104,4 @@ TEST(Derivatives, ARendererWithoutThemSaysSo) {
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::derivatives_test

@@ -8,7 +8,7 @@
 #include "tests/drr/test_views.h"
 #include "tests/support/pose_near.h"
 
-namespace isoshift {
+namespace isoshift::renderer_pyramid_test {
 namespace {
 
 using Eigen::Vector3d;
@@ -163,4 +163,4 @@ TEST(RendererPyramid, EveryLevelIsOfTheKindAskedFor) {
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::renderer_pyramid_test

@@ -12,7 +12,7 @@
 #include "drr/renderer.h"
 #include "tests/drr/test_views.h"
 
-namespace isoshift {
+namespace isoshift::splat_test {
 namespace {
 
 using Eigen::Vector3d;
@@ -169,4 +169,4 @@ TEST(SplatOptions, BadOnesAreRefused) {
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::splat_test

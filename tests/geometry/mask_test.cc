@@ -7,7 +7,7 @@
 
 #include "base/error.h"
 
-namespace isoshift {
+namespace isoshift::mask_test {
 namespace {
 
 // Every pair of voxels: slow, and as plain as the definition.
@@ -67,4 +67,4 @@ TEST(Mask, AMarginIsAFiniteLength) {
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::mask_test

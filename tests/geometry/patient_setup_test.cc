@@ -4,7 +4,7 @@
 
 #include "tests/support/pose_near.h"
 
-namespace isoshift {
+namespace isoshift::patient_setup_test {
 namespace {
 
 TEST(PatientSetup, AxesOfEveryPositionAreARotation) {
@@ -38,4 +38,4 @@ TEST(PatientSetup, PlannedPosePutsTheIsocenterAtTheOrigin) {
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::patient_setup_test

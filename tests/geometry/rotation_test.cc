@@ -7,7 +7,7 @@
 
 #include "tests/support/pose_near.h"
 
-namespace isoshift {
+namespace isoshift::rotation_test {
 namespace {
 
 TEST(Rotation, IsRightHandedAboutEveryAxis) {
@@ -59,4 +59,4 @@ TEST(Rotation, AMatrixIsARigidMotionOrNothing) {
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::rotation_test

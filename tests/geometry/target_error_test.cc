@@ -8,7 +8,7 @@
 
 #include "tests/drr/test_views.h"
 
-namespace isoshift {
+namespace isoshift::target_error_test {
 namespace {
 
 using Eigen::Isometry3d;
@@ -121,4 +121,4 @@ TEST(TargetError, RotationShareTellsTranslationFromRotation) {
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::target_error_test

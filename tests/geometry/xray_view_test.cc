@@ -11,7 +11,7 @@
 #include "geometry/patient_setup.h"
 #include "tests/support/pose_near.h"
 
-namespace isoshift {
+namespace isoshift::xray_view_test {
 namespace {
 
 using Eigen::Vector2d;
@@ -226,4 +226,4 @@ TEST(XrayView, AMatrixOfImpossiblePixelsIsRefused) {
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::xray_view_test

@@ -14,7 +14,7 @@
 #include "tests/support/pose_near.h"
 #include "tests/support/temporary_folder.h"
 
-namespace isoshift {
+namespace isoshift::bends_test {
 namespace {
 
 using Anatomy = PhantomOptions::Anatomy;
@@ -268,4 +268,4 @@ TEST(PhantomBends, PlanNamesTheTargetAtTheIsocenter) {
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::bends_test

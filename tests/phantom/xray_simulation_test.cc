@@ -8,7 +8,7 @@
 #include "base/error.h"
 #include "tests/support/pose_near.h"
 
-namespace isoshift {
+namespace isoshift::xray_simulation_test {
 namespace {
 
 using Eigen::Vector2d;
@@ -123,4 +123,4 @@ TEST(Shapes, CtHoldsWaterAndBone) {
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::xray_simulation_test

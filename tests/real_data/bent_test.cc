@@ -10,7 +10,7 @@
 #include "tests/support/temporary_folder.h"
 #include "workflow/register/truth.h"
 
-namespace isoshift {
+namespace isoshift::bent_test {
 namespace {
 
 class Bent : public testing::TestWithParam<const char*> {};
@@ -41,4 +41,4 @@ INSTANTIATE_TEST_SUITE_P(All, Bent,
                          });
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::bent_test

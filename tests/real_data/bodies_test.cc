@@ -10,7 +10,7 @@
 #include "io/study/study_files.h"
 #include "tests/support/real_data.h"
 
-namespace isoshift {
+namespace isoshift::bodies_test {
 namespace {
 
 CtSeries ct_in(const std::filesystem::path& folder) {
@@ -72,4 +72,4 @@ TEST(BodiesOfAPlasticHead, AreBonesWithoutVertebrae) {
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::bodies_test

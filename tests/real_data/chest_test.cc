@@ -11,7 +11,7 @@
 #include "io/study/study.h"
 #include "tests/support/real_data.h"
 
-namespace isoshift {
+namespace isoshift::chest_test {
 namespace {
 
 const std::filesystem::path kChest = real_data() / "chest";
@@ -45,4 +45,4 @@ TEST(Chest, TheSpineIsTheCylinderThatWasDrawn) {
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::chest_test

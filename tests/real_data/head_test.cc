@@ -23,7 +23,7 @@
 #include "tests/support/temporary_folder.h"
 #include "workflow/register/truth.h"
 
-namespace isoshift {
+namespace isoshift::head_test {
 namespace {
 
 const std::filesystem::path kHead = real_data() / "head";
@@ -133,4 +133,4 @@ TEST(HeadRenderers, AreWithinHalfAPercentOfTheirOracle) {
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::head_test

@@ -8,7 +8,7 @@
 #include "tests/support/real_data.h"
 #include "tests/support/small_study.h"
 
-namespace isoshift {
+namespace isoshift::rt_image_dialects_test {
 namespace {
 
 using testing::HasSubstr;
@@ -71,4 +71,4 @@ TEST_F(RtImageDialects, InspectPrintsGeometryAndMissingTagsOfEach) {
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::rt_image_dialects_test

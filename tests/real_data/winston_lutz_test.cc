@@ -14,7 +14,7 @@
 #include "tests/support/temporary_folder.h"
 #include "workflow/register/truth.h"
 
-namespace isoshift {
+namespace isoshift::winston_lutz_test {
 namespace {
 
 class WinstonLutz : public testing::Test {
@@ -97,4 +97,4 @@ TEST_F(WinstonLutz, TheReceptorTranslationHasTheSignOfTheImageContent) {
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::winston_lutz_test

@@ -9,7 +9,7 @@
 #include "geometry/rotation.h"
 #include "tests/support/registration_scene.h"
 
-namespace isoshift {
+namespace isoshift::alternatives_test {
 namespace {
 
 RegistrationScene asymmetric_scene() {
@@ -105,4 +105,4 @@ TEST(Alternatives, OfOneViewAreItsOwn) {
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::alternatives_test

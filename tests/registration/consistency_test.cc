@@ -8,7 +8,7 @@
 #include "tests/support/pose_near.h"
 #include "tests/support/registration_scene.h"
 
-namespace isoshift {
+namespace isoshift::consistency_test {
 namespace {
 
 using Eigen::Vector2d;
@@ -132,4 +132,4 @@ TEST(Consistency, PartsWithoutAnythingToSeeHaveNoSignal) {
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::consistency_test

@@ -13,7 +13,7 @@
 #include "registration/register_views.h"
 #include "tests/support/registration_scene.h"
 
-namespace isoshift {
+namespace isoshift::contradiction_test {
 namespace {
 
 using Eigen::Vector3d;
@@ -152,4 +152,4 @@ TEST(Contradiction, IsTheSameForARendererWithoutDerivatives) {
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::contradiction_test

@@ -8,7 +8,7 @@
 #include "geometry/rotation.h"
 #include "tests/support/registration_scene.h"
 
-namespace isoshift {
+namespace isoshift::cross_checks_test {
 namespace {
 
 using Eigen::Vector3d;
@@ -91,4 +91,4 @@ TEST(CompareVertebrae, OfABodyWithoutThemIsNothingAsGood) {
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::cross_checks_test

@@ -11,7 +11,7 @@
 #include "geometry/target_error.h"
 #include "tests/support/pose_near.h"
 
-namespace isoshift {
+namespace isoshift::evaluate_test {
 namespace {
 
 using Eigen::Isometry3d;
@@ -267,4 +267,4 @@ TEST(EvaluationSummary, OfNoRunsIsEmpty) {
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::evaluate_test

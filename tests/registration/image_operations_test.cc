@@ -8,7 +8,7 @@
 
 #include "tests/support/pose_near.h"
 
-namespace isoshift {
+namespace isoshift::image_operations_test {
 namespace {
 
 // Round blobs, bright and dark, that no shift of some pixels leaves alike.
@@ -143,4 +143,4 @@ TEST(ImageOperations, AConstantSquareMatchesNowhere) {
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::image_operations_test

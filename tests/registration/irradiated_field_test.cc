@@ -10,7 +10,7 @@
 #include "registration/preprocess/preprocess.h"
 #include "tests/support/collimated_xray.h"
 
-namespace isoshift {
+namespace isoshift::irradiated_field_test {
 namespace {
 
 using Origin = IrradiatedField::Origin;
@@ -280,4 +280,4 @@ TEST(IrradiatedField, DisplayedImagesShowTheirFieldToo) {
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::irradiated_field_test

@@ -7,7 +7,7 @@
 #include "base/error.h"
 #include "tests/support/batched.h"
 
-namespace isoshift {
+namespace isoshift::levenberg_marquardt_test {
 namespace {
 
 OptimizerOptions from(std::vector<double> start) {
@@ -115,4 +115,4 @@ TEST(LevenbergMarquardt, FailuresPassThrough) {
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::levenberg_marquardt_test

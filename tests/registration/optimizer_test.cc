@@ -8,7 +8,7 @@
 #include "base/error.h"
 #include "tests/support/batched.h"
 
-namespace isoshift {
+namespace isoshift::optimizer_test {
 namespace {
 
 OptimizerOptions two_parameters(OptimizerKind kind = OptimizerKind::kBobyqa) {
@@ -107,4 +107,4 @@ TEST(Optimizer, SaysWhenTheEvaluationsRanOut) {
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::optimizer_test

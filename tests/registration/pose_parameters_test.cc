@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace isoshift {
+namespace isoshift::pose_parameters_test {
 namespace {
 
 // The motion between two poses that lie close together: translation in mm, rotation vector in rad.
@@ -32,4 +32,4 @@ TEST(PoseParameters, MotionsAreTheDifferencesOfPoses) {
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::pose_parameters_test

@@ -15,7 +15,7 @@
 #include "registration/motion/score.h"
 #include "tests/support/pose_near.h"
 
-namespace isoshift {
+namespace isoshift::predictor_test {
 namespace {
 
 using Eigen::MatrixXd;
@@ -240,4 +240,4 @@ TEST(Score, LatenciesOffTheGridAreLearnedAsFarAsTheyReach) {
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::predictor_test

@@ -7,7 +7,7 @@
 #include "geometry/rotation.h"
 #include "tests/drr/test_views.h"
 
-namespace isoshift {
+namespace isoshift::preprocess_test {
 namespace {
 
 constexpr int kPixels = 200;  // of 2 mm on the panel: 1.33 mm at the isocenter
@@ -130,4 +130,4 @@ TEST(Preprocess, ARectangleLimitsTheFieldAndIncludesItsBounds) {
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::preprocess_test

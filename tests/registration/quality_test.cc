@@ -11,7 +11,7 @@
 #include "tests/drr/test_views.h"
 #include "tests/support/pose_near.h"
 
-namespace isoshift {
+namespace isoshift::quality_test {
 namespace {
 
 using testing::AllOf;
@@ -444,4 +444,4 @@ TEST(Quality, ViewsThirtyDegreesApartSeeAllAxes) {
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::quality_test

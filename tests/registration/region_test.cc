@@ -12,7 +12,7 @@
 #include "tests/support/pose_near.h"
 #include "tests/support/registration_scene.h"
 
-namespace isoshift {
+namespace isoshift::region_test {
 namespace {
 
 using Eigen::Vector3d;
@@ -290,4 +290,4 @@ TEST(Region, APatientThickerThanTheCtIsRegistered) {
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::region_test

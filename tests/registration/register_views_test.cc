@@ -13,7 +13,7 @@
 #include "tests/drr/test_views.h"
 #include "tests/support/pose_near.h"
 
-namespace isoshift {
+namespace isoshift::register_views_test {
 namespace {
 
 struct Scene {
@@ -201,4 +201,4 @@ TEST(RegisterViews, AShiftThatUndoesTheErrorRestoresThePlannedView) {
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::register_views_test

@@ -11,7 +11,7 @@
 #include "tests/support/pose_near.h"
 #include "tests/support/registration_scene.h"
 
-namespace isoshift {
+namespace isoshift::search_test {
 namespace {
 
 using Eigen::Vector3d;
@@ -269,4 +269,4 @@ TEST(FixedViews, KeepSmallFieldsResolved) {
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::search_test

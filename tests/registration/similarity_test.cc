@@ -9,7 +9,7 @@
 #include <random>
 #include <vector>
 
-namespace isoshift {
+namespace isoshift::similarity_test {
 namespace {
 
 using testing::ElementsAre;
@@ -324,4 +324,4 @@ TEST_P(SimilarityModels, BendAsTheSimilarityDoesAtItsTop) {
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::similarity_test

@@ -12,7 +12,7 @@
 #include "registration/preprocess/preprocess.h"
 #include "tests/support/collimated_xray.h"
 
-namespace isoshift {
+namespace isoshift::small_field_test {
 namespace {
 
 using Origin = IrradiatedField::Origin;
@@ -159,4 +159,4 @@ TEST(SmallField, LargeFieldsAreNoSmallOnes) {
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::small_field_test

@@ -7,7 +7,7 @@
 #include "registration/preprocess/preprocess.h"
 #include "tests/drr/test_views.h"
 
-namespace isoshift {
+namespace isoshift::tiles_test {
 namespace {
 
 // 20 x 20 pixels; the edge is that of 8 of them.
@@ -41,4 +41,4 @@ TEST_F(TilesTest, NumberThePixelsThatAreCompared) {
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::tiles_test

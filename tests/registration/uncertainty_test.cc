@@ -11,7 +11,7 @@
 #include "tests/drr/test_views.h"
 #include "tests/support/registration_scene.h"
 
-namespace isoshift {
+namespace isoshift::uncertainty_test {
 namespace {
 
 using Eigen::Vector3d;
@@ -170,4 +170,4 @@ TEST(Uncertainty, OneViewIsLessCertainAlongItsRays) {
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::uncertainty_test

@@ -16,7 +16,7 @@
 #include "tests/support/command.h"
 #include "tests/support/temporary_folder.h"
 
-namespace isoshift {
+namespace isoshift::http_server_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -223,4 +223,4 @@ TEST(HttpServerWithTls, SaysWhatIsWrongWithItsFiles) {
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::http_server_test

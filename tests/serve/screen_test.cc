@@ -16,7 +16,7 @@
 #include "tests/support/results_tree.h"
 #include "tests/support/small_study.h"
 
-namespace isoshift {
+namespace isoshift::screen_test {
 namespace {
 
 using testing::HasSubstr;
@@ -468,4 +468,4 @@ TEST_F(ScreenWithPasswords, NamesThatNobodyHasAreNotEvenLogged) {
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::screen_test

@@ -9,7 +9,7 @@
 #include "tests/support/command.h"
 #include "tests/support/temporary_folder.h"
 
-namespace isoshift {
+namespace isoshift::serve_test {
 namespace {
 
 TEST(Serve, IsUsedInTwoBrowsersWhileSessionsCome) {
@@ -34,4 +34,4 @@ TEST(Serve, PamLetsNobodyInWithAWrongPassword) {
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::serve_test

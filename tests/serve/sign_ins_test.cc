@@ -6,7 +6,7 @@
 #include <future>
 #include <thread>
 
-namespace isoshift {
+namespace isoshift::sign_ins_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -134,4 +134,4 @@ TEST(SignInsByProxy, OnlyTheProxyNamesUsers) {
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::sign_ins_test

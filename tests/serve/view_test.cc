@@ -13,7 +13,7 @@
 #include "tests/support/testdata.h"
 #include "workflow/register/truth.h"
 
-namespace isoshift {
+namespace isoshift::view_test {
 namespace {
 
 using Json = nlohmann::json;
@@ -240,4 +240,4 @@ TEST(View, IsUsedInABrowser) {
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::view_test

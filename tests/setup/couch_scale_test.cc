@@ -4,7 +4,7 @@
 
 #include "tests/support/pose_near.h"
 
-namespace isoshift {
+namespace isoshift::couch_scale_test {
 namespace {
 
 using Eigen::Vector3d;
@@ -47,4 +47,4 @@ TEST(CouchScale, SignsAreThoseOfTheReadOuts) {
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::couch_scale_test

@@ -6,7 +6,7 @@
 
 #include "tests/support/pose_near.h"
 
-namespace isoshift {
+namespace isoshift::couch_shift_test {
 namespace {
 
 using Eigen::Vector3d;
@@ -138,4 +138,4 @@ TEST(CouchShift, MerelyNegatedAnglesWouldFail) {
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::couch_shift_test

@@ -4,7 +4,7 @@
 
 #include <gtest/gtest.h>
 
-namespace isoshift {
+namespace isoshift::irradiated_field_test {
 namespace {
 
 TEST(IrradiatedFieldSides, APlaceLiesInsideOrOutside) {
@@ -24,4 +24,4 @@ TEST(IrradiatedFieldSides, LeavesMayMakeABay) {
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::irradiated_field_test

@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-namespace isoshift {
+namespace isoshift::setup_errors_test {
 namespace {
 
 // Two patients with two fractions each, worked by hand: x of the first is 1 and 3, of the second -2 and 0.
@@ -30,4 +30,4 @@ TEST(SetupErrors, OneFractionHasNoRandomError) {
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::setup_errors_test

@@ -26,7 +26,7 @@
 #include "tests/support/testdata.h"
 #include "workflow/register/truth.h"
 
-namespace isoshift {
+namespace isoshift::testdata_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -270,4 +270,4 @@ INSTANTIATE_TEST_SUITE_P(All, TestdataResults, testing::ValuesIn(names_in(testda
 });
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::testdata_test

@@ -52,8 +52,8 @@ Meeting meeting(std::span<const XrayView> views, const std::vector<std::optional
 
 bool are_on_a_line(const Eigen::Matrix3Xd& points) {
   const Eigen::Matrix3Xd centered = points.colwise() - points.rowwise().mean().eval();
-  const Eigen::Vector3d spread = Eigen::JacobiSVD<Eigen::Matrix3Xd>(centered).singularValues().head<3>();
-  return spread[1] < kLeastBesideMm * std::sqrt(static_cast<double>(points.cols()));
+  const Eigen::Matrix3d spread = centered * centered.transpose() / static_cast<double>(points.cols());
+  return Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(spread).eigenvalues()[1] < kLeastBesideMm * kLeastBesideMm;
 }
 
 // The columns of `to` from those of `from`.

@@ -14,7 +14,7 @@
 #include "tests/support/small_study.h"
 #include "workflow/register/truth.h"
 
-namespace isoshift {
+namespace isoshift::machine_profile_test {
 namespace {
 
 using testing::ElementsAre;
@@ -275,4 +275,4 @@ TEST_F(OtherXrayTest, AMatrixThatCannotBeIsRefused) {
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::machine_profile_test

@@ -8,7 +8,7 @@
 #include "base/error.h"
 #include "tests/support/temporary_folder.h"
 
-namespace isoshift {
+namespace isoshift::serve_file_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -75,4 +75,4 @@ TEST_F(ServeFileTest, ErrorsNameTheMistake) {
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::serve_file_test

@@ -10,7 +10,7 @@
 #include "tests/support/command.h"
 #include "tests/support/temporary_folder.h"
 
-namespace isoshift {
+namespace isoshift::site_file_test {
 namespace {
 
 using testing::HasSubstr;
@@ -111,4 +111,4 @@ TEST_F(SiteFileTest, AnAnatomyItDoesNotKnowIsRefused) {
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::site_file_test

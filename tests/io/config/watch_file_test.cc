@@ -9,7 +9,7 @@
 #include "base/error.h"
 #include "tests/support/temporary_folder.h"
 
-namespace isoshift {
+namespace isoshift::watch_file_test {
 namespace {
 
 using testing::EndsWith;
@@ -128,4 +128,4 @@ TEST_F(WatchFileTest, TheExampleOfThePackageIsOne) {
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::watch_file_test

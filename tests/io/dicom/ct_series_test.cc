@@ -14,7 +14,7 @@
 #include "tests/support/pose_near.h"
 #include "tests/support/small_study.h"
 
-namespace isoshift {
+namespace isoshift::ct_series_test {
 namespace {
 
 // A CT of 8 x 6 pixels whose value at (i, j, k) is 100 k + 10 j + i, changed slice by slice.
@@ -335,4 +335,4 @@ TEST_F(CtSeriesTest, CompressionWithLossIsWarnedOf) {
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::ct_series_test

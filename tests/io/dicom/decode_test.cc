@@ -16,7 +16,7 @@
 #include "tests/support/command.h"
 #include "tests/support/small_study.h"
 
-namespace isoshift {
+namespace isoshift::decode_test {
 namespace {
 
 std::string read_text(const std::filesystem::path& path) {
@@ -216,4 +216,4 @@ TEST_F(DecodeTest, ADamagedFileIsRefusedAndTheNextOneRead) {
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::decode_test

@@ -6,7 +6,7 @@
 #include "base/error.h"
 #include "tests/support/message_line.h"
 
-namespace isoshift {
+namespace isoshift::decoder_messages_test {
 namespace {
 
 using testing::HasSubstr;
@@ -42,4 +42,4 @@ TEST(DecoderMessages, DamagedAndUnknownOnesAreErrorsThatNameTheSender) {
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::decoder_messages_test

@@ -13,7 +13,7 @@
 #include "tests/support/small_study.h"
 #include "tests/support/temporary_folder.h"
 
-namespace isoshift {
+namespace isoshift::dicom_dataset_test {
 namespace {
 
 double parsed(const std::string& text) {
@@ -164,4 +164,4 @@ TEST(DicomDataset, SequencesNestedWithoutEndAreRefusedInDeflatedFilesToo) {
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::dicom_dataset_test

@@ -8,7 +8,7 @@
 #include "tests/support/pose_near.h"
 #include "tests/support/small_study.h"
 
-namespace isoshift {
+namespace isoshift::jaws_test {
 namespace {
 
 using testing::ElementsAre;
@@ -182,4 +182,4 @@ TEST_F(JawsTest, TheOutlineIsProjectedOntoTheImage) {
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::jaws_test

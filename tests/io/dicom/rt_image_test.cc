@@ -8,7 +8,7 @@
 #include "tests/support/pose_near.h"
 #include "tests/support/small_study.h"
 
-namespace isoshift {
+namespace isoshift::rt_image_test {
 namespace {
 
 using testing::ElementsAre;
@@ -362,4 +362,4 @@ TEST_F(RtImageTest, FramesWithoutExposuresShareTheGeometryOfTheFile) {
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::rt_image_test

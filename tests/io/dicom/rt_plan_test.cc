@@ -7,7 +7,7 @@
 #include "tests/support/pose_near.h"
 #include "tests/support/small_study.h"
 
-namespace isoshift {
+namespace isoshift::rt_plan_test {
 namespace {
 
 using testing::HasSubstr;
@@ -125,4 +125,4 @@ TEST_F(RtPlanTest, AnIsocenterThatMovesIsRefused) {
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::rt_plan_test

@@ -12,7 +12,7 @@
 #include "tests/support/pose_near.h"
 #include "tests/support/small_study.h"
 
-namespace isoshift {
+namespace isoshift::rt_structures_test {
 namespace {
 
 using testing::Contains;
@@ -206,4 +206,4 @@ TEST_F(RtStructuresTest, StructuresOfAnotherPatientAreRefused) {
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::rt_structures_test

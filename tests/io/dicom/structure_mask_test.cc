@@ -8,7 +8,7 @@
 #include "base/error.h"
 #include "tests/support/small_study.h"
 
-namespace isoshift {
+namespace isoshift::structure_mask_test {
 namespace {
 
 using testing::ElementsAre;
@@ -180,4 +180,4 @@ TEST(StructureMask, AStructureBesideTheVolumeIsRefused) {
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::structure_mask_test

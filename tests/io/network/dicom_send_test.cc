@@ -18,7 +18,7 @@
 #include "tests/support/certificates.h"
 #include "tests/support/small_study.h"
 
-namespace isoshift {
+namespace isoshift::dicom_send_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -207,4 +207,4 @@ TEST_F(DicomSendTest, ACipherThatBcp195DoesNotAllowIsRefused) {
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::dicom_send_test

@@ -11,7 +11,7 @@
 #include "tests/support/certificates.h"
 #include "tests/support/temporary_folder.h"
 
-namespace isoshift {
+namespace isoshift::orthanc_test {
 namespace {
 
 using testing::AllOf;
@@ -61,4 +61,4 @@ TEST_F(OrthancTest, TheCertificateOfTheServerIsChecked) {
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::orthanc_test

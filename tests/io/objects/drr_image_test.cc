@@ -7,7 +7,7 @@
 #include "io/dicom/decode.h"
 #include "tests/support/small_study.h"
 
-namespace isoshift {
+namespace isoshift::drr_image_test {
 namespace {
 
 using testing::HasSubstr;
@@ -85,4 +85,4 @@ TEST_F(DrrImageTest, IsRefusedAsAnXrayUnlessAllowed) {
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::drr_image_test

@@ -9,7 +9,7 @@
 #include "io/objects/spatial_registration.h"
 #include "tests/support/small_study.h"
 
-namespace isoshift {
+namespace isoshift::registration_check_test {
 namespace {
 
 using testing::HasSubstr;
@@ -240,4 +240,4 @@ TEST(RegistrationDifference, IsWhereTheIsocentersLieAndHowTheyAreTurned) {
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::registration_check_test

@@ -9,7 +9,7 @@
 #include "tests/support/pose_near.h"
 #include "tests/support/small_study.h"
 
-namespace isoshift {
+namespace isoshift::spatial_registration_test {
 namespace {
 
 using Eigen::Vector3d;
@@ -210,4 +210,4 @@ TEST_F(SpatialRegistrationFileTest, ImagesThatAgreeOnNoFrameGetANewOneOfDicomMd4
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::spatial_registration_test

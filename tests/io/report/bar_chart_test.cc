@@ -11,7 +11,7 @@
 #include "tests/support/command.h"
 #include "tests/support/temporary_folder.h"
 
-namespace isoshift {
+namespace isoshift::bar_chart_test {
 namespace {
 
 using testing::HasSubstr;
@@ -85,4 +85,4 @@ TEST(BarChart, BarsOfNothingAreDrawnToo) {
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::bar_chart_test

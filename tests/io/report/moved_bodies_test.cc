@@ -8,7 +8,7 @@
 #include "io/report/formats.h"
 #include "tests/support/oblique_report.h"
 
-namespace isoshift {
+namespace isoshift::moved_bodies_test {
 namespace {
 
 using testing::HasSubstr;
@@ -133,4 +133,4 @@ TEST(MovedBodies, RejectedResultsAndWholePatientsHaveNone) {
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::moved_bodies_test

@@ -21,7 +21,7 @@
 #include "tests/support/oblique_report.h"
 #include "tests/support/temporary_folder.h"
 
-namespace isoshift {
+namespace isoshift::report_test {
 namespace {
 
 using testing::HasSubstr;
@@ -425,4 +425,4 @@ TEST(Report, FirstPageHoldsAllThatIsSigned) {
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::report_test

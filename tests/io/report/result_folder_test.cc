@@ -16,7 +16,7 @@
 #include "tests/support/oblique_report.h"
 #include "tests/support/temporary_folder.h"
 
-namespace isoshift {
+namespace isoshift::result_folder_test {
 namespace {
 
 using testing::HasSubstr;
@@ -172,4 +172,4 @@ TEST_F(ResultFolderTest, ThePageWorksInABrowser) {
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::result_folder_test

@@ -6,7 +6,7 @@
 
 #include "io/report/canvas.h"
 
-namespace isoshift {
+namespace isoshift::view_picture_test {
 namespace {
 
 TEST(ViewPicture, DirectionsAreTheStrongestFirst) {
@@ -54,4 +54,4 @@ TEST(ViewPicture, ADrrHasTheGraysOfAnXrayThatWasHardened) {
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::view_picture_test

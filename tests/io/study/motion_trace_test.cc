@@ -12,7 +12,7 @@
 #include "tests/support/command.h"
 #include "tests/support/temporary_folder.h"
 
-namespace isoshift {
+namespace isoshift::motion_trace_test {
 namespace {
 
 using testing::HasSubstr;
@@ -87,4 +87,4 @@ TEST_F(MotionTraceTest, PredictScoresTracesAndWritesAChart) {
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::motion_trace_test

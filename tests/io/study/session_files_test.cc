@@ -9,7 +9,7 @@
 #include "base/output_folder.h"
 #include "tests/support/temporary_folder.h"
 
-namespace isoshift {
+namespace isoshift::session_files_test {
 namespace {
 
 StudyFiles::Image image(const std::string& uid, const std::string& label, std::optional<double> at_s,
@@ -363,4 +363,4 @@ TEST(Sessions, WhatIsReferredToAndNotThereIsMissing) {
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::session_files_test

@@ -6,7 +6,7 @@
 #include "base/error.h"
 #include "tests/support/small_study.h"
 
-namespace isoshift {
+namespace isoshift::study_files_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -221,4 +221,4 @@ TEST_F(StudyFilesTest, WhatWasNamedIsWhatTheMessageNames) {
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::study_files_test

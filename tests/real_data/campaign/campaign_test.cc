@@ -13,7 +13,7 @@
 #include "tests/support/pose_near.h"
 #include "tests/support/temporary_folder.h"
 
-namespace isoshift::campaign {
+namespace isoshift::campaign::campaign_test {
 namespace {
 
 using Eigen::Vector2d;
@@ -141,4 +141,4 @@ TEST(Campaign, SeriesGoInSteps) {
 }
 
 }  // namespace
-}  // namespace isoshift::campaign
+}  // namespace isoshift::campaign::campaign_test

@@ -8,7 +8,7 @@
 #include "registration/bodies/body_objective.h"
 #include "tests/support/bent_scene.h"
 
-namespace isoshift {
+namespace isoshift::body_search_test {
 namespace {
 
 using Eigen::Vector3d;
@@ -146,4 +146,4 @@ TEST(BodyObjective, GradientsAreDifferencesOfTheValue) {
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::body_search_test

@@ -9,7 +9,7 @@
 #include "tests/drr/test_views.h"
 #include "tests/support/bent_scene.h"
 
-namespace isoshift {
+namespace isoshift::moving_bodies_test {
 namespace {
 
 using Eigen::Vector3d;
@@ -70,4 +70,4 @@ TEST_F(MovingBodiesTest, DerivativesBetweenPixelsAreThoseOfTheBodyAlone) {
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::moving_bodies_test

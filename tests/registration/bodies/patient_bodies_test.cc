@@ -6,7 +6,7 @@
 
 #include "registration/bodies/carriers.h"
 
-namespace isoshift {
+namespace isoshift::patient_bodies_test {
 namespace {
 
 using Eigen::Vector3d;
@@ -168,4 +168,4 @@ TEST(Carriers, MoveTheTargetAsTheyMove) {
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::patient_bodies_test

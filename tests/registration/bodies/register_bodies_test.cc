@@ -8,7 +8,7 @@
 #include "tests/drr/test_views.h"
 #include "tests/support/bent_scene.h"
 
-namespace isoshift {
+namespace isoshift::register_bodies_test {
 namespace {
 
 using Eigen::Vector3d;
@@ -166,4 +166,4 @@ TEST(RegisterBodies, AWholeThatDoesNotShowTheTargetMayHaveBent) {
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::register_bodies_test

@@ -6,7 +6,7 @@
 
 #include "tests/support/bent_scene.h"
 
-namespace isoshift {
+namespace isoshift::target_match_test {
 namespace {
 
 using Eigen::Vector3d;
@@ -102,4 +102,4 @@ TEST(TargetMatch, OfAWholeIsThatOfBodiesThatDidNotMoveApart) {
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::target_match_test

@@ -6,7 +6,7 @@
 
 #include "tests/support/bent_scene.h"
 
-namespace isoshift {
+namespace isoshift::target_search_test {
 namespace {
 
 using Eigen::Vector3d;
@@ -67,4 +67,4 @@ TEST(TargetSearch, BeginsElsewhereOnlyAlongTheSpine) {
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::target_search_test

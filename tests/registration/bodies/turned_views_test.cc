@@ -7,7 +7,7 @@
 #include "geometry/rotation.h"
 #include "tests/support/bent_scene.h"
 
-namespace isoshift {
+namespace isoshift::turned_views_test {
 namespace {
 
 using Eigen::Vector3d;
@@ -62,4 +62,4 @@ TEST(TurnedViews, DoNotExplainABentSpine) {
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::turned_views_test

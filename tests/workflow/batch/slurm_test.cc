@@ -8,7 +8,7 @@
 
 #include "tests/support/small_study.h"
 
-namespace isoshift {
+namespace isoshift::slurm_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -43,4 +43,4 @@ TEST(Slurm, RunsABatchAsAJobArray) {
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::slurm_test

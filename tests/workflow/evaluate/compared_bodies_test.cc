@@ -11,7 +11,7 @@
 #include "workflow/evaluate/evaluation_files.h"
 #include "workflow/register/truth.h"
 
-namespace isoshift {
+namespace isoshift::compared_bodies_test {
 namespace {
 
 using Eigen::Vector3d;
@@ -112,4 +112,4 @@ TEST_F(BodyFilesTest, BodiesAreReadBackWithTheirRuns) {
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::compared_bodies_test

@@ -6,7 +6,7 @@
 #include "base/error.h"
 #include "geometry/rotation.h"
 
-namespace isoshift {
+namespace isoshift::landmarks_test {
 namespace {
 
 using Eigen::Vector3d;
@@ -104,4 +104,4 @@ TEST_F(LandmarksTest, WhatDoesNotDetermineAPoseIsRefused) {
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::landmarks_test

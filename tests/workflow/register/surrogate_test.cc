@@ -9,7 +9,7 @@
 #include "tests/support/phantom_ct.h"
 #include "tests/support/small_study.h"
 
-namespace isoshift {
+namespace isoshift::surrogate_test {
 namespace {
 
 using Eigen::Vector3d;
@@ -182,4 +182,4 @@ TEST(Surrogate, IsTheStructureThatTheSiteNames) {
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::surrogate_test

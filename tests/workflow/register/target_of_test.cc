@@ -9,7 +9,7 @@
 #include "base/error.h"
 #include "tests/support/small_study.h"
 
-namespace isoshift {
+namespace isoshift::target_of_test {
 namespace {
 
 using Eigen::Vector3d;
@@ -182,4 +182,4 @@ TEST(TargetOf, ANameThatIsNotThereIsAnError) {
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::target_of_test

@@ -6,7 +6,7 @@
 
 #include "tests/drr/test_views.h"
 
-namespace isoshift {
+namespace isoshift::view_pictures_test {
 namespace {
 
 using Eigen::Vector2d;
@@ -51,4 +51,4 @@ TEST(MotionArrows, AreOnlyOfWhatIsKnownAndSeen) {
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::view_pictures_test

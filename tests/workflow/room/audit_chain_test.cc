@@ -12,7 +12,7 @@
 #include "tests/support/temporary_folder.h"
 #include "workflow/room/audit_log.h"
 
-namespace isoshift {
+namespace isoshift::audit_chain_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -166,4 +166,4 @@ TEST_F(AuditChainTest, LongLinesAreLinked) {
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::audit_chain_test

@@ -16,7 +16,7 @@
 #include "tests/support/temporary_folder.h"
 #include "workflow/room/audit_chain.h"
 
-namespace isoshift {
+namespace isoshift::audit_log_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -162,4 +162,4 @@ TEST_F(AuditLogTest, ATextThatIsNoTextLocksNobodyOut) {
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::audit_log_test

@@ -6,7 +6,7 @@
 #include "tests/support/command.h"
 #include "tests/support/results_tree.h"
 
-namespace isoshift {
+namespace isoshift::audit_message_test {
 namespace {
 
 using Json = nlohmann::ordered_json;
@@ -70,4 +70,4 @@ TEST_F(AuditMirror, HearsOfEveryLineThatWasWritten) {
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::audit_message_test

@@ -13,7 +13,7 @@
 #include "tests/support/temporary_folder.h"
 #include "workflow/register/registration_messages.h"
 
-namespace isoshift {
+namespace isoshift::child_runner_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -116,4 +116,4 @@ TEST_F(ChildRunnerTest, WhatIsGivenUpEnds) {
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::child_runner_test

@@ -5,7 +5,7 @@
 
 #include "tests/support/treatment_room.h"
 
-namespace isoshift {
+namespace isoshift::clock_comparison_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -109,4 +109,4 @@ TEST(WatchComparesClocks, AndSaysSoOnItsPage) {
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::clock_comparison_test

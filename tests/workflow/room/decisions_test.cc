@@ -10,7 +10,7 @@
 #include "io/report/result_folder.h"
 #include "tests/support/results_tree.h"
 
-namespace isoshift {
+namespace isoshift::decisions_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -224,4 +224,4 @@ TEST_F(DecisionsTest, AnOrderIsKeptForEveryResultOfTheSameXrays) {
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::decisions_test

@@ -11,7 +11,7 @@
 #include "tests/support/command.h"
 #include "tests/support/watch_releases.h"
 
-namespace isoshift {
+namespace isoshift::deletion_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -149,4 +149,4 @@ TEST_F(DeletionTest, TheCommandDeletesAllOfAPatient) {
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::deletion_test

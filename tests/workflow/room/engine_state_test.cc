@@ -7,7 +7,7 @@
 #include "base/error.h"
 #include "tests/support/temporary_folder.h"
 
-namespace isoshift {
+namespace isoshift::engine_state_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -79,4 +79,4 @@ TEST_F(EngineFileTest, AnotherFileIsNotTakenForAnEngines) {
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::engine_state_test

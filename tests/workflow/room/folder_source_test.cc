@@ -8,7 +8,7 @@
 #include "tests/support/small_study.h"
 #include "tests/support/treatment_room.h"
 
-namespace isoshift {
+namespace isoshift::folder_source_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -182,4 +182,4 @@ TEST_F(FolderSourceTest, AnotherContentUnderANameReplacesTheFirst) {
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::folder_source_test

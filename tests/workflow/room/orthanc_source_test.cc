@@ -13,7 +13,7 @@
 #include "tests/support/small_study.h"
 #include "tests/support/treatment_room.h"
 
-namespace isoshift {
+namespace isoshift::orthanc_source_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -226,4 +226,4 @@ TEST_F(OrthancSourceTest, WhatWasForgottenIsFetchedAgainWhenItIsAskedFor) {
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::orthanc_source_test

@@ -18,7 +18,7 @@
 #include "tests/support/results_tree.h"
 #include "tests/support/temporary_folder.h"
 
-namespace isoshift {
+namespace isoshift::results_tree_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -423,4 +423,4 @@ TEST_F(ResultsTreeTest, WhatAKilledProcessLeftIsNoSession) {
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::results_tree_test

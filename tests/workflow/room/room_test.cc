@@ -9,7 +9,7 @@
 
 #include "tests/support/small_study.h"
 
-namespace isoshift {
+namespace isoshift::room_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -93,4 +93,4 @@ TEST(Watch, FlagsOfTheFileAreCheckedAtStart) {
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::room_test

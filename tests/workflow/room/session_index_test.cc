@@ -11,7 +11,7 @@
 #include "tests/support/registered_session.h"
 #include "tests/support/temporary_folder.h"
 
-namespace isoshift {
+namespace isoshift::session_index_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -120,4 +120,4 @@ TEST_F(SessionIndexTest, AYearOfSessionsIsNotInOnePage) {
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::session_index_test

@@ -11,7 +11,7 @@
 #include "tests/support/command.h"
 #include "tests/support/results_tree.h"
 
-namespace isoshift {
+namespace isoshift::signed_releases_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -111,4 +111,4 @@ TEST_F(SignedReleasesTest, AKeyThatOthersCanReadOrOfAnotherKindIsRefused) {
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::signed_releases_test

@@ -5,7 +5,7 @@
 
 #include "tests/support/watch_releases.h"
 
-namespace isoshift {
+namespace isoshift::watch_changes_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -210,4 +210,4 @@ TEST_F(WatchChanges, APlanThatBelongsToAnotherPatientNowSpeaksAgainstResults) {
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::watch_changes_test

@@ -10,7 +10,7 @@
 #include "workflow/room/results_tree.h"
 #include "workflow/room/session_options.h"
 
-namespace isoshift {
+namespace isoshift::watch_choices_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -461,4 +461,4 @@ TEST_F(WatchChoices, OnlyWhatIsOfferedIsChosen) {
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::watch_choices_test

@@ -14,7 +14,7 @@
 #include "workflow/room/results_tree.h"
 #include "workflow/room/watch.h"
 
-namespace isoshift {
+namespace isoshift::watch_day_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -116,4 +116,4 @@ TEST(WatchDay, EverySessionIsRegisteredOnceAndEveryReleaseSentOnceToEveryPeer) {
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::watch_day_test

@@ -6,7 +6,7 @@
 #include "base/output_folder.h"
 #include "tests/support/watch_releases.h"
 
-namespace isoshift {
+namespace isoshift::watch_objections_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -234,4 +234,4 @@ TEST_F(WatchReleases, APeerReceivesTheNewestReleaseLast) {
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::watch_objections_test

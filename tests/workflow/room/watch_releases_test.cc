@@ -9,7 +9,7 @@
 #include "base/output_folder.h"
 #include "tests/support/watch_releases.h"
 
-namespace isoshift {
+namespace isoshift::watch_releases_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -222,4 +222,4 @@ TEST_F(WatchReleases, ASessionThatIsRegisteredAgainNeedsAReleaseOfItsOwn) {
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::watch_releases_test

@@ -6,7 +6,7 @@
 #include "base/output_folder.h"
 #include "tests/support/watch_releases.h"
 
-namespace isoshift {
+namespace isoshift::watch_sending_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -142,4 +142,4 @@ TEST_F(WatchSending, XraysWhoseClockAndOffsetContradictEachOtherMayBeNewer) {
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::watch_sending_test

@@ -8,7 +8,7 @@
 #include "io/report/result_folder.h"
 #include "tests/support/treatment_room.h"
 
-namespace isoshift {
+namespace isoshift::watch_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -284,4 +284,4 @@ TEST_F(WatchTest, ObjectsOfAPatientAreForgottenAfter60DaysAndAskedForAgain) {
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::watch_test
