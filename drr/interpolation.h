@@ -11,16 +11,23 @@ double voxel_or_zero(const Volume<T>& volume, const Eigen::Vector3i& at) {
   return inside ? volume.at(at.x(), at.y(), at.z()) : 0.0;
 }
 
-// The value at `fraction` of the way from voxel `corner` to the next one along each axis.
-template <class T>
-double interpolate(const Volume<T>& volume, const Eigen::Vector3i& corner, const Eigen::Vector3d& fraction) {
+// The value at `fraction` of the way from voxel `corner` to the next one along each axis, of voxels that a function
+// gives.
+template <class VoxelAt>
+double interpolate_between(VoxelAt&& voxel_at, const Eigen::Vector3i& corner, const Eigen::Vector3d& fraction) {
   double value = 0.0;
   for (int n = 0; n < 8; ++n) {
     const Eigen::Vector3i offset(n & 1, (n >> 1) & 1, n >> 2);
     const Eigen::Vector3d distance = (fraction - offset.cast<double>()).cwiseAbs();
-    value += (1.0 - distance.array()).prod() * voxel_or_zero(volume, corner + offset);
+    value += (1.0 - distance.array()).prod() * voxel_at(corner + offset);
   }
   return value;
+}
+
+// The same of a volume.
+template <class T>
+double interpolate(const Volume<T>& volume, const Eigen::Vector3i& corner, const Eigen::Vector3d& fraction) {
+  return interpolate_between([&](const Eigen::Vector3i& at) { return voxel_or_zero(volume, at); }, corner, fraction);
 }
 
 }  // namespace isoshift

@@ -7,6 +7,7 @@
 
 #include <Eigen/Geometry>
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -16,6 +17,7 @@
 #include <vector>
 
 #include "drr/attenuation.h"
+#include "drr/gl/device.h"
 #include "drr/quantized_volume.h"
 #include "geometry/image.h"
 #include "geometry/volume.h"
@@ -47,9 +49,6 @@ bool uses_gl(RendererKind kind);
 bool is_oracle(RendererKind kind);
 bool is_splatting(RendererKind kind);
 
-// Which OpenGL to render on: a GPU, or Mesa's llvmpipe on the CPU, which is used only if a person asks for it.
-enum class GlDevice { kHardware, kSoftware };
-
 // Wobbled splatting (docs/renderers.md, "Splatting").
 struct SplatOptions {
   enum class Wobble {
@@ -72,9 +71,12 @@ struct SplatOptions {
 double default_sigma_mm(SplatOptions::Wobble wobble, double largest_spacing_mm, const XrayView& view);
 
 struct RendererOptions {
-  GlDevice gl = GlDevice::kHardware;         // of the kinds that use OpenGL
+  GlChoice gl;                               // of the kinds that use OpenGL
   std::optional<VolumePrecision> precision;  // unset: u16. The oracles keep floats
-  int block_edge = 2;                        // of kRaycastCuberille, voxels
+  // Of kRaycast: many rays at once keep a GPU from everybody else, and drivers end what takes too long. What is
+  // rendered does not depend on it.
+  std::size_t rays_per_dispatch = std::size_t{1} << 24;
+  int block_edge = 2;  // of kRaycastCuberille, voxels
   SplatOptions splat;
 
   // Throws UsageError for what a renderer of this kind cannot do.
@@ -127,7 +129,7 @@ class RenderResult {
   std::vector<std::size_t> view_begins_;  // within one pose; the last entry is the pose's total
 };
 
-class RaycastGlRenderer;
+class ImagesOnGpu;
 
 class Renderer {
  public:
@@ -155,8 +157,8 @@ class Renderer {
   // there is no OpenGL.
   virtual std::optional<double> gpu_seconds() const { return std::nullopt; }
 
-  // The renderer that can leave its line integrals on the GPU, if this is one.
-  virtual RaycastGlRenderer* on_gpu() { return nullptr; }
+  // If it can leave its line integrals on the GPU: how (drr/images_on_gpu.h).
+  virtual ImagesOnGpu* on_gpu() { return nullptr; }
 };
 
 // A renderer for views of the given beam qualities; to render a view of another quality is a logic error. Keeps its own

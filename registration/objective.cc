@@ -10,7 +10,7 @@
 
 #include "base/error.h"
 #include "base/parallel.h"
-#include "drr/raycast/raycast.h"
+#include "drr/images_on_gpu.h"
 #include "registration/similarity/gl_similarity.h"
 
 namespace isoshift {
@@ -98,7 +98,7 @@ Objective::Objective(Renderer& renderer, std::span<const FixedImage> images, con
     const RenderResult drr = renderer.render(std::span(&image.view, 1), std::span(&about, 1), PixelSet::all());
     add_view(image, strongest_pixels(field, image_of(image.view, drr.line_integrals(0, 0)), options), about);
   }
-  if (RaycastGlRenderer* gl = renderer_.on_gpu(); gl != nullptr && !comparisons_.empty())
+  if (ImagesOnGpu* gl = renderer_.on_gpu(); gl != nullptr && !comparisons_.empty())
     gl_similarity_ = std::make_unique<GlSimilarity>(gl->context(), comparisons_);
 }
 
@@ -149,7 +149,7 @@ std::vector<std::vector<double>> Objective::per_view(std::span<const Eigen::Isom
 }
 
 std::vector<std::vector<double>> Objective::per_view_on_gpu(std::span<const Eigen::Isometry3d> room_from_patient) {
-  RaycastGlRenderer& gl = *renderer_.on_gpu();
+  ImagesOnGpu& gl = *renderer_.on_gpu();
   std::size_t pixels_per_pose = 0;
   for (const auto& of_view : pixels_.of_view) pixels_per_pose += of_view.size();
   const std::size_t at_once = gl.poses_at_once(pixels_per_pose);
@@ -163,7 +163,7 @@ std::vector<std::vector<double>> Objective::per_view_on_gpu(std::span<const Eige
     similarity.insert(similarity.end(), part.begin(), part.end());
     // By now its clock can be read without waiting; glFinish() in between would keep the GPU idle.
     const double all = seconds_since(begin);
-    rendering = std::min(all, rendering + gl.gpu_seconds().value_or(0.0));
+    rendering = std::min(all, rendering + renderer_.gpu_seconds().value_or(0.0));
     seconds_.rendering += rendering;
     seconds_.similarity += all - rendering;
   }

@@ -138,6 +138,7 @@ struct Registration {
   Verdict verdict = Verdict::kRejected;
   std::vector<std::string> reasons = {"not run"};  // why the verdict is not `accepted`
   std::string renderer, device;                    // what rendered the DRRs
+  std::string compared_with_cpu;                   // how well rays of the DRRs from a GPU agree with those of the CPU
   Eigen::Isometry3d actual_room_from_patient = Eigen::Isometry3d::Identity();
   std::vector<Eigen::Vector3d> unobservable_room;  // unit directions along which the views cannot tell
   std::optional<Uncertainty> uncertainty;          // nothing: the images do not determine the pose

@@ -104,7 +104,7 @@ std::string processor_name() {
 
 struct BenchDrrOptions {
   std::filesystem::path ct;
-  std::optional<std::string> gl;
+  std::optional<std::string> gl, gpu;
   std::vector<std::string> renderers;  // empty: all
   int every = 997;                     // not a divisor of 27,000: all axes turn
   int pixels = 512;
@@ -139,9 +139,10 @@ Json bench_cell(const BenchDrrOptions& options, const BenchVolume& volume, doubl
     if (!options.wants(method.kind)) continue;
     if (made_for == nullptr || made_for->kind != method.kind || made_for->block_edge != method.block_edge) {
       renderer.reset();
-      renderer = make_renderer(
-          method.kind, volume.hu, paper_model(threshold_hu), std::array{view.beam},
-          {.gl = gl_device_from(options.gl), .precision = VolumePrecision::kU8, .block_edge = method.block_edge});
+      renderer = make_renderer(method.kind, volume.hu, paper_model(threshold_hu), std::array{view.beam},
+                               {.gl = gl_choice_from(options.gl, options.gpu),
+                                .precision = VolumePrecision::kU8,
+                                .block_edge = method.block_edge});
       made_for = &method;
     }
     const PixelSet pixels = method.pixel_share == 1.0
@@ -193,7 +194,7 @@ void run_bench_drr(const BenchDrrOptions& options, Console& console) {
 
 struct BenchFiguresOptions {
   std::filesystem::path ct, output;
-  std::optional<std::string> gl;
+  std::optional<std::string> gl, gpu;
   bool overwrite = false;
 };
 
@@ -213,7 +214,7 @@ Image<Rgb> colored(const Image<std::array<float, 3>>& positions) {
 void run_bench_figures(const BenchFiguresOptions& options, Console& console) {
   OutputFolder output(options.output, options.overwrite);
   ProgressBar bar(console, "Rendering");
-  const GlDevice gl = gl_device_from(options.gl);
+  const GlChoice gl = gl_choice_from(options.gl, options.gpu);
   const BenchVolume volume = bench_head(options.ct);
   const XrayView view = table1_view(512, 370.0);
   Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();  // head up, turned a little to its side
@@ -286,7 +287,7 @@ void add_bench_command(CLI::App& app, Console& console, int&) {
       ->check(CLI::Range(16, 4096))
       ->capture_default_str()
       ->type_name("N");
-  add_gl_option(*drr_command, drr->gl);
+  add_gl_options(*drr_command, drr->gl, drr->gpu);
   drr_command->add_flag("--json", drr->json, "Print JSON instead of tables");
   drr_command->callback([drr, &console] { run_bench_drr(*drr, console); });
 
@@ -295,7 +296,7 @@ void add_bench_command(CLI::App& app, Console& console, int&) {
   figures_command->footer("\nExample:\n  isoshift bench figures --ct planning_ct/ -o figures --gl software");
   figures_command->add_option("-o,--output", figures->output, "Folder to make")->required()->type_name("FOLDER");
   add_ct_option(*figures_command, figures->ct);
-  add_gl_option(*figures_command, figures->gl);
+  add_gl_options(*figures_command, figures->gl, figures->gpu);
   figures_command->add_flag("--overwrite", figures->overwrite, "Replace an earlier output in that folder");
   figures_command->callback([figures, &console] { run_bench_figures(*figures, console); });
 }

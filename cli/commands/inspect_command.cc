@@ -9,6 +9,8 @@
 #include "cli/commands/inspect_bodies.h"
 #include "drr/gl/context.h"
 #include "io/study/study.h"
+#include "registration/gpu_check.h"
+#include "workflow/register/rendering_options.h"
 #include "workflow/register/study_bodies.h"
 
 namespace isoshift {
@@ -207,6 +209,36 @@ void run_inspect(const std::vector<std::filesystem::path>& paths, const std::opt
     throw Error(fmt::format("{}: holds nothing that isoshift can read", paths.front().string()));
 }
 
+// A device as --gl and --device would open it: its driver, its limits, and whether it can be trusted.
+void print_device(const GlChoice& choice, Console& console) {
+  const bool is_gpu = choice.kind == GlDevice::kHardware;
+  try {
+    const GlContext& context = gl_context(choice);
+    console.out << fmt::format("OpenGL, {}: {}, {}, OpenGL {}{}\n", is_gpu ? "hardware" : "software",
+                               context.device_name(), context.renderer(), context.version(),
+                               is_gpu ? "" : " (only with --gl software)");
+    if (is_gpu) console.out << fmt::format("  UUID: {}\n", context.uuid().empty() ? "not told" : context.uuid());
+    console.out << fmt::format("  Limits: volumes of {} voxels along an edge, {} MB of images at once\n",
+                               context.largest_volume_edge(), context.largest_buffer_bytes() / 1'000'000)
+                << fmt::format("  A lost context: {}\n", context.is_robust() ? "is an error" : "may not be told")
+                << fmt::format("  Self-check: {} ({:.0f} ms)\n", gpu_check(choice).words(),
+                               gpu_check(choice).milliseconds);
+  } catch (const Error& error) {
+    const std::string reason = error.what();
+    console.out << fmt::format("OpenGL, {}: none; {}\n", is_gpu ? "hardware" : "software",
+                               reason.substr(0, reason.find('\n')));
+  }
+}
+
+void run_inspect_devices(Console& console) {
+  const int gpus = count_gpus();
+  for (int gpu = 0; gpu < gpus; ++gpu) print_device({GlDevice::kHardware, std::to_string(gpu)}, console);
+  if (gpus == 0) print_device(GlDevice::kHardware, console);
+  print_device(GlDevice::kSoftware, console);
+  const std::optional<std::string> why_cpu = RenderingOptions().why_cpu();
+  console.out << (why_cpu ? fmt::format("--renderer auto is cpu: {}\n", *why_cpu) : "--renderer auto is raycast\n");
+}
+
 }  // namespace
 
 void add_inspect_command(CLI::App& app, Console& console, int&) {
@@ -241,8 +273,7 @@ void add_inspect_command(CLI::App& app, Console& console, int&) {
       return run_inspect(
           options->paths,
           options->machine.empty() ? std::nullopt : std::optional(read_machine_profile(options->machine)), console);
-    for (const std::string& line : describe_gl_devices()) console.out << "OpenGL, " << line << "\n";
-    console.out << fmt::format("--renderer auto is {}\n", has_hardware_gl() ? "raycast" : "cpu");
+    run_inspect_devices(console);
   });
 }
 

@@ -22,7 +22,7 @@ void add_rendering_options(CLI::App& command, RenderingOptions& options) {
       ->check(CLI::IsMember(names))
       ->capture_default_str()
       ->group(kGroup);
-  add_gl_option(command, options.gl);
+  add_gl_options(command, options.gl, options.gpu);
   command
       .add_option("--attenuation", options.attenuation,
                   "From HU to attenuation: a physical curve, or the HU window [physical]")
@@ -64,9 +64,15 @@ void add_rendering_options(CLI::App& command, RenderingOptions& options) {
       ->group(kGroup);
 }
 
-void add_gl_option(CLI::App& command, std::optional<std::string>& gl) {
+void add_gl_options(CLI::App& command, std::optional<std::string>& gl, std::optional<std::string>& gpu) {
   command.add_option("--gl", gl, "For OpenGL renderers: a GPU, or Mesa's llvmpipe on the CPU [hardware]")
       ->check(CLI::IsMember({"hardware", "software"}))
+      ->group(kGroup);
+  command
+      .add_option("--device", gpu,
+                  "For OpenGL renderers: which of several GPUs, by its number or UUID (isoshift inspect --devices) "
+                  "[the first that works]")
+      ->type_name("N|UUID")
       ->group(kGroup);
 }
 

@@ -8,6 +8,6 @@
 namespace isoshift {
 
 void add_rendering_options(CLI::App& command, RenderingOptions& options);
-void add_gl_option(CLI::App& command, std::optional<std::string>& gl);
+void add_gl_options(CLI::App& command, std::optional<std::string>& gl, std::optional<std::string>& gpu);
 
 }  // namespace isoshift

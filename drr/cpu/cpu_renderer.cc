@@ -18,11 +18,6 @@ namespace {
 constexpr int kTileEdge = 16;  // neighboring rays read the same voxels: a tile of them stays in the cache
 constexpr int kGroup = kTileEdge * kTileEdge;
 
-VoxelRay ray_to(int column, int row, const Camera& camera, const Eigen::Matrix3d& mm_from_voxel_axes) {
-  const Eigen::Vector3d way = camera.way_voxel_from_pixel * Eigen::Vector3d(column, row, 1.0);
-  return {.source = camera.source_voxel, .way = way, .length_mm = (mm_from_voxel_axes * way).norm()};
-}
-
 // Pixel n of a tile, relative to its first: blocks of 4 x 4 one after the other, because rays that follow each other
 // are taken together.
 struct PixelInTile {
@@ -79,6 +74,11 @@ MotionDerivatives motion_derivatives(const RayGradient& gradient, int column, in
 }
 
 }  // namespace
+
+VoxelRay ray_to(int column, int row, const Camera& camera, const Eigen::Matrix3d& mm_from_voxel_axes) {
+  const Eigen::Vector3d way = camera.way_voxel_from_pixel * Eigen::Vector3d(column, row, 1.0);
+  return {.source = camera.source_voxel, .way = way, .length_mm = (mm_from_voxel_axes * way).norm()};
+}
 
 std::string CpuRenderer::device() const {
   return fmt::format("CPU, {} threads", tbb::this_task_arena::max_concurrency());

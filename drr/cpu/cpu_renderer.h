@@ -16,6 +16,8 @@ struct VoxelRay {
   double length_mm = 0.0;
 };
 
+VoxelRay ray_to(int column, int row, const Camera& camera, const Eigen::Matrix3d& mm_from_voxel_axes);
+
 // How a line integral changes with the source and with the way of its ray, in voxels, if the length in mm stays.
 struct RayGradient {
   Eigen::Vector3d by_source = Eigen::Vector3d::Zero();

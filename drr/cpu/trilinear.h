@@ -4,7 +4,10 @@
 // step size, no step error. Outside the outermost voxel centers the value falls linearly to 0 one voxel further out, as
 // a texture with a border of zeros does, so that the volume's total attenuation equals that of the Siddon oracle.
 
+#include <cstdint>
 #include <map>
+#include <span>
+#include <vector>
 
 #include "drr/cpu/cpu_renderer.h"
 
@@ -23,5 +26,11 @@ class TrilinearRenderer final : public CpuRenderer {
 
   AttenuationByBeam attenuation_per_mm_;
 };
+
+// The line integrals of listed pixels (row * columns + column), as this renderer's but without a copy of the CT: for a
+// few rays of it.
+std::vector<double> exact_line_integrals(const Volume<float>& ct_hu, const AttenuationModel& model,
+                                         const XrayView& view, const Eigen::Isometry3d& room_from_patient,
+                                         std::span<const std::uint32_t> pixels);
 
 }  // namespace isoshift

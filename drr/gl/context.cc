@@ -1,53 +1,51 @@
 #include "drr/gl/context.h"
 
-#include <dlfcn.h>
-#include <epoxy/egl.h>
 #include <epoxy/gl.h>
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
-#include <cstring>
-#include <optional>
+#include <exception>
 
 #include "base/error.h"
+#include "drr/gl/egl.h"
 
 namespace isoshift {
 namespace {
 
 constexpr const char* kInstead = "\n       Use --renderer cpu, which needs no OpenGL";
 
-// libepoxy ends the process when libEGL is missing, so look before it does.
-bool has_egl_library() {
-  static const bool found = ::dlopen("libEGL.so.1", RTLD_LAZY | RTLD_LOCAL) != nullptr;
-  return found;
-}
-
-bool has_word(const char* list, const char* word) {
-  return list != nullptr && (" " + std::string(list) + " ").find(" " + std::string(word) + " ") != std::string::npos;
-}
-
-// Extensions of EGL itself, before there is a display.
-bool has_client_extension(const char* name) { return has_word(eglQueryString(EGL_NO_DISPLAY, EGL_EXTENSIONS), name); }
-
-std::vector<EGLDeviceEXT> hardware_devices() {
-  const bool can_enumerate =
-      has_client_extension("EGL_EXT_device_base") ||
-      (has_client_extension("EGL_EXT_device_enumeration") && has_client_extension("EGL_EXT_device_query"));
-  if (!can_enumerate || !has_client_extension("EGL_EXT_platform_device")) return {};
-  std::array<EGLDeviceEXT, 32> all{};
-  EGLint count = 0;
-  if (!eglQueryDevicesEXT(static_cast<EGLint>(all.size()), all.data(), &count)) return {};
-  std::vector<EGLDeviceEXT> hardware;
-  for (EGLint n = 0; n < count; ++n)
-    if (!has_word(eglQueryDeviceStringEXT(all[n], EGL_EXTENSIONS), "EGL_MESA_device_software"))
-      hardware.push_back(all[n]);
-  return hardware;
-}
-
 bool names_software(const std::string& renderer) {
-  for (const char* name : {"llvmpipe", "softpipe", "swrast", "SwiftShader"})
-    if (renderer.find(name) != std::string::npos) return true;
-  return false;
+  return std::ranges::any_of(std::array{"llvmpipe", "softpipe", "swrast", "SwiftShader"},
+                             [&](const char* name) { return renderer.find(name) != std::string::npos; });
+}
+
+std::string gl_string(GLenum name) {
+  const auto* text = reinterpret_cast<const char*>(glGetString(name));
+  return text == nullptr ? "" : text;
+}
+
+std::string device_uuid() {
+  if (!epoxy_has_gl_extension("GL_EXT_memory_object")) return {};
+  std::array<GLubyte, GL_UUID_SIZE_EXT> bytes{};
+  glGetUnsignedBytei_vEXT(GL_DEVICE_UUID_EXT, 0, bytes.data());
+  return glGetError() == GL_NO_ERROR ? fmt::format("{:02x}", fmt::join(bytes, "")) : "";
+}
+
+// The devices among which a choice chooses, as EGL lists them.
+std::vector<EglDevice> candidates(const GlChoice& choice) {
+  std::vector<EglDevice> devices = egl_devices();
+  std::erase_if(devices,
+                [&](const EglDevice& device) { return device.is_software != (choice.kind == GlDevice::kSoftware); });
+  return devices;
+}
+
+std::string why_lost(GLenum status) {
+  switch (status) {
+    case GL_GUILTY_CONTEXT_RESET: return "what was running on it had to be ended";
+    case GL_INNOCENT_CONTEXT_RESET: return "another program on it had to be ended";
+    default: return "the driver does not say why";
+  }
 }
 
 }  // namespace
@@ -56,6 +54,9 @@ struct GlContext::Handles {
   EGLDisplay display = EGL_NO_DISPLAY;
   EGLContext context = EGL_NO_CONTEXT;
 
+  Handles() = default;
+  Handles(const Handles&) = delete;
+  Handles& operator=(const Handles&) = delete;
   ~Handles() {
     if (display == EGL_NO_DISPLAY) return;
     eglMakeCurrent(display, EGL_NO_SURFACE, EGL_NO_SURFACE, EGL_NO_CONTEXT);
@@ -63,26 +64,35 @@ struct GlContext::Handles {
     // The display is shared by all contexts of the process: terminating it here would end theirs.
   }
 
-  // Opens a display and makes an OpenGL 4.5 core context current on it; otherwise says why not.
-  std::optional<std::string> open(EGLenum platform, void* native) {
+  // Opens a display and makes an OpenGL 4.5 core context current on it, robust if that can be had; otherwise says why
+  // not.
+  std::optional<std::string> open(EGLenum platform, void* native, bool& is_robust) {
     display = eglGetPlatformDisplayEXT(platform, native, nullptr);
     EGLint major = 0, minor = 0;
     if (display == EGL_NO_DISPLAY || !eglInitialize(display, &major, &minor)) {
       display = EGL_NO_DISPLAY;
-      return "its EGL display cannot be opened";
+      return fmt::format("its EGL display cannot be opened: {}", egl_error());
     }
-    if (!eglBindAPI(EGL_OPENGL_API)) return "its EGL has no OpenGL";
+    if (!eglBindAPI(EGL_OPENGL_API)) return fmt::format("its EGL has no OpenGL: {}", egl_error());
     if (!epoxy_has_egl_extension(display, "EGL_KHR_surfaceless_context")) return "its EGL needs a window";
     const std::array<EGLint, 3> config_attributes = {EGL_RENDERABLE_TYPE, EGL_OPENGL_BIT, EGL_NONE};
     EGLConfig config = nullptr;
     EGLint configs = 0;
     if (!eglChooseConfig(display, config_attributes.data(), &config, 1, &configs) || configs < 1) config = nullptr;
-    const std::array<EGLint, 7> attributes = {
-        EGL_CONTEXT_MAJOR_VERSION,           4,       EGL_CONTEXT_MINOR_VERSION, 5, EGL_CONTEXT_OPENGL_PROFILE_MASK,
-        EGL_CONTEXT_OPENGL_CORE_PROFILE_BIT, EGL_NONE};
-    context = eglCreateContext(display, config, EGL_NO_CONTEXT, attributes.data());
-    if (context == EGL_NO_CONTEXT || !eglMakeCurrent(display, EGL_NO_SURFACE, EGL_NO_SURFACE, context))
-      return "it has no OpenGL 4.5";
+    const auto create = [&](std::vector<EGLint> attributes) {
+      attributes.insert(attributes.begin(), {EGL_CONTEXT_MAJOR_VERSION, 4, EGL_CONTEXT_MINOR_VERSION, 5,
+                                             EGL_CONTEXT_OPENGL_PROFILE_MASK, EGL_CONTEXT_OPENGL_CORE_PROFILE_BIT});
+      attributes.push_back(EGL_NONE);
+      context = eglCreateContext(display, config, EGL_NO_CONTEXT, attributes.data());
+      return context != EGL_NO_CONTEXT;
+    };
+    const bool has_robust_attributes = major > 1 || minor >= 5;
+    is_robust =
+        has_robust_attributes && create({EGL_CONTEXT_OPENGL_ROBUST_ACCESS, EGL_TRUE,
+                                         EGL_CONTEXT_OPENGL_RESET_NOTIFICATION_STRATEGY, EGL_LOSE_CONTEXT_ON_RESET});
+    if (!is_robust && !create({})) return fmt::format("it has no OpenGL 4.5: {}", egl_error());
+    if (!eglMakeCurrent(display, EGL_NO_SURFACE, EGL_NO_SURFACE, context))
+      return fmt::format("its OpenGL 4.5 cannot be used: {}", egl_error());
     // The version may be less than asked for where the driver's is overridden.
     if (epoxy_gl_version() < 45)
       return fmt::format("its OpenGL is {}.{}, expected 4.5", epoxy_gl_version() / 10, epoxy_gl_version() % 10);
@@ -90,46 +100,103 @@ struct GlContext::Handles {
   }
 };
 
-GlContext::GlContext(GlDevice device) : handles_(std::make_unique<Handles>()) {
-  if (!has_egl_library())
-    throw Error(fmt::format("no OpenGL: the library libEGL.so.1 is missing (Debian package libegl1).{}", kInstead));
-  std::optional<std::string> failure;
-  if (device == GlDevice::kHardware) {
-    failure = "there is no GPU that EGL knows";
-    for (const EGLDeviceEXT native : hardware_devices()) {
-      handles_ = std::make_unique<Handles>();
-      failure = handles_->open(EGL_PLATFORM_DEVICE_EXT, native);
-      if (!failure) break;
-    }
-  } else if (has_client_extension("EGL_MESA_platform_surfaceless")) {
-    failure = handles_->open(EGL_PLATFORM_SURFACELESS_MESA, EGL_DEFAULT_DISPLAY);
-  } else {
-    failure = "Mesa is missing (Debian packages libegl-mesa0 and libgl1-mesa-dri)";
+GlContext::GlContext(const GlChoice& choice) {
+  const char* kind = choice.kind == GlDevice::kHardware ? "hardware" : "software";
+  const auto fail = [&](const std::string& why) {
+    throw Error(fmt::format("no {} OpenGL: {}.{}{}", kind, why, kInstead,
+                            choice.kind == GlDevice::kHardware ? ", or --gl software to run this one on the CPU" : ""));
+  };
+  if (const auto missing = missing_gl_library()) throw Error(fmt::format("no OpenGL: {}.{}", *missing, kInstead));
+  const std::vector<EglDevice> devices = candidates(choice);
+  if (devices.empty())
+    fail(choice.kind == GlDevice::kHardware ? "there is no GPU that EGL knows"
+                                            : "Mesa is missing (Debian packages libegl-mesa0 and libgl1-mesa-dri)");
+  std::vector<std::string> names(devices.size());
+  std::ranges::transform(devices, names.begin(), &EglDevice::name);
+  try {
+    const std::size_t chosen = first_usable(names, [&](std::size_t n) -> std::optional<std::string> {
+      if (!choice.means_number(static_cast<int>(n))) return "is not the one asked for";
+      return open(choice, EGL_PLATFORM_DEVICE_EXT, devices[n].handle);
+    });
+    device_name_ = names[chosen];
+  } catch (const Error& none) {
+    fail(none.what());
   }
-  if (!failure) {
-    renderer_ = reinterpret_cast<const char*>(glGetString(GL_RENDERER));
-    version_ = reinterpret_cast<const char*>(glGetString(GL_VERSION));
-    is_software_ = names_software(renderer_);
-    if (device == GlDevice::kHardware && is_software_) failure = fmt::format("what it offers is {}", renderer_);
-  }
-  if (failure)
-    throw Error(fmt::format("no {} OpenGL: {}.{}{}", device == GlDevice::kHardware ? "hardware" : "software", *failure,
-                            kInstead,
-                            device == GlDevice::kHardware ? ", or --gl software to run this one on the CPU" : ""));
 }
 
-GlContext::~GlContext() = default;
+GlContext::~GlContext() { try_make_current(); }
+
+std::optional<std::string> GlContext::open(const GlChoice& choice, std::uint32_t platform, void* native) {
+  handles_ = std::make_unique<Handles>();
+  if (auto failure = handles_->open(platform, native, is_robust_)) return failure;
+  renderer_ = gl_string(GL_RENDERER);
+  version_ = gl_string(GL_VERSION);
+  uuid_ = device_uuid();
+  is_software_ = names_software(renderer_);
+  if (choice.kind == GlDevice::kHardware && is_software_) return fmt::format("what it offers is {}", renderer_);
+  if (!choice.means_uuid(uuid_)) return "is not the one asked for";
+  return std::nullopt;
+}
 
 void GlContext::make_current() const {
+  if (is_lost_) throw Error(fmt::format("OpenGL on {} was lost.{}", renderer_, kInstead));
   if (!eglMakeCurrent(handles_->display, EGL_NO_SURFACE, EGL_NO_SURFACE, handles_->context))
-    throw Error(fmt::format("OpenGL on {} cannot be used: EGL error {:#x}", renderer_, eglGetError()));
+    throw Error(fmt::format("OpenGL on {} cannot be used: {}.{}", renderer_, egl_error(), kInstead));
+}
+
+void GlContext::try_make_current() const noexcept {
+  if (handles_ && handles_->display != EGL_NO_DISPLAY)
+    eglMakeCurrent(handles_->display, EGL_NO_SURFACE, EGL_NO_SURFACE, handles_->context);
+}
+
+std::int64_t GlContext::largest_volume_edge() const {
+  make_current();
+  GLint64 texels = 0;
+  glGetInteger64v(GL_MAX_3D_TEXTURE_SIZE, &texels);
+  return texels;
+}
+
+std::int64_t GlContext::largest_buffer_bytes() const {
+  make_current();
+  GLint64 bytes = 0;
+  glGetInteger64v(GL_MAX_SHADER_STORAGE_BLOCK_SIZE, &bytes);
+  return bytes;
+}
+
+const Program& GlContext::program(const ShaderSource& compute) {
+  make_current();
+  const auto known = programs_.find(compute.text);
+  return known != programs_.end() ? known->second : programs_.emplace(compute.text, Program(compute)).first->second;
+}
+
+const Program& GlContext::program(const ShaderSource& vertex, const ShaderSource& fragment) {
+  make_current();
+  const std::string sources = vertex.text + fragment.text;
+  const auto known = programs_.find(sources);
+  return known != programs_.end() ? known->second : programs_.emplace(sources, Program(vertex, fragment)).first->second;
 }
 
 void GlContext::check(const char* doing) const {
+  if (const GLenum status = glGetGraphicsResetStatus(); status != GL_NO_ERROR) {
+    is_lost_ = true;
+    throw Error(fmt::format("{}: {}: the GPU was reset, {}.{}", renderer_, doing, why_lost(status), kInstead));
+  }
   if (const GLenum error = glGetError(); error != GL_NO_ERROR)
     throw Error(fmt::format(
         "{}: {}{}.{}", renderer_, doing,
         error == GL_OUT_OF_MEMORY ? ": out of its memory" : fmt::format(": OpenGL error {:#x}", error), kInstead));
+}
+
+GlContext& gl_context(const GlChoice& choice) {
+  struct Known {
+    GlChoice choice;
+    std::unique_ptr<GlContext> context;
+  };
+  // Never freed: drivers have ended before the last object of a process does.
+  static auto& known = *new std::vector<Known>;
+  for (const Known& one : known)
+    if (one.choice == choice && !one.context->is_lost()) return *one.context;
+  return *known.emplace_back(choice, std::make_unique<GlContext>(choice)).context;
 }
 
 std::optional<double> seconds_of(const GlTimer& timer, const GlContext& context) {
@@ -138,32 +205,18 @@ std::optional<double> seconds_of(const GlTimer& timer, const GlContext& context)
   return timer.seconds();
 }
 
-std::vector<std::string> describe_gl_devices() {
-  std::vector<std::string> lines;
-  for (const GlDevice device : {GlDevice::kHardware, GlDevice::kSoftware}) {
-    const char* kind = device == GlDevice::kHardware ? "hardware" : "software";
-    try {
-      const GlContext context(device);
-      lines.push_back(fmt::format("{}: {}, OpenGL {}{}", kind, context.renderer(), context.version(),
-                                  device == GlDevice::kHardware ? "" : " (only with --gl software)"));
-    } catch (const Error& error) {
-      const std::string reason = error.what();
-      lines.push_back(fmt::format("{}: none; {}", kind, reason.substr(0, reason.find('\n'))));
-    }
-  }
-  return lines;
-}
+int count_gpus() { return missing_gl_library() ? 0 : static_cast<int>(candidates(GlDevice::kHardware).size()); }
 
-bool has_hardware_gl() {
-  static const bool found = [] {
-    try {
-      const GlContext context(GlDevice::kHardware);
-      return true;
-    } catch (const Error&) {
-      return false;
+std::optional<std::string> why_no_gpu(const std::string& gpu) {
+  static std::map<std::string, std::optional<std::string>> known;
+  const auto [at, is_new] = known.try_emplace(gpu);
+  if (is_new) try {
+      gl_context({GlDevice::kHardware, gpu});
+    } catch (const Error& error) {
+      const std::string why = error.what();
+      at->second = why.substr(0, why.find(".\n"));
     }
-  }();
-  return found;
+  return at->second;
 }
 
 }  // namespace isoshift

@@ -1,5 +1,6 @@
 #include "drr/gl/objects.h"
 
+#include <epoxy/egl.h>
 #include <epoxy/gl.h>
 #include <fmt/format.h>
 
@@ -68,6 +69,10 @@ GlName compiled(GLenum stage, const ShaderSource& source) {
 
 }  // namespace
 
+GlName::~GlName() {
+  if (name_ != 0 && eglGetCurrentContext() != EGL_NO_CONTEXT) remove_(name_);
+}
+
 Buffer::Buffer() : name_(new_buffer()) {}
 
 void Buffer::reserve(std::size_t bytes) {
@@ -79,6 +84,10 @@ void Buffer::reserve(std::size_t bytes) {
 void Buffer::upload(std::span<const std::byte> bytes) {
   reserve(bytes.size());
   glNamedBufferSubData(name_.get(), 0, static_cast<GLsizeiptr>(bytes.size()), bytes.data());
+}
+
+void Buffer::fill(float value) {
+  if (capacity_ > 0) glClearNamedBufferData(name_.get(), GL_R32F, GL_RED, GL_FLOAT, &value);
 }
 
 void Buffer::download(std::span<std::byte> bytes) const {

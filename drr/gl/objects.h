@@ -1,6 +1,6 @@
 #pragma once
-// Move-only OpenGL objects: buffers, textures, a render target, programs, a timer. All need a current GlContext, also
-// when they are destroyed.
+// Move-only OpenGL objects: buffers, textures, a render target, programs, a timer. All need a current GlContext. Those
+// that end without one are left to the end of their context.
 
 #include <Eigen/Core>
 #include <cstddef>
@@ -24,9 +24,7 @@ class GlName {
     std::swap(remove_, other.remove_);
     return *this;
   }
-  ~GlName() {
-    if (name_ != 0) remove_(name_);
-  }
+  ~GlName();
   std::uint32_t get() const { return name_; }
 
  private:
@@ -40,6 +38,7 @@ class Buffer {
   Buffer();
   void upload(std::span<const std::byte> bytes);
   void reserve(std::size_t bytes);  // what it held is lost
+  void fill(float value);           // all of it
   void download(std::span<std::byte> bytes) const;
   void bind(std::uint32_t slot) const;  // as shader storage
   std::uint32_t get() const { return name_.get(); }

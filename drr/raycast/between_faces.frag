@@ -15,7 +15,7 @@ layout(location = 8) uniform float unit_per_mm;
 layout(location = 9) uniform uint columns;         // of the view
 layout(location = 10) uniform uint output_columns;
 layout(location = 11) uniform uint pixel_count;
-layout(location = 12) uniform bool has_pixel_list;
+layout(location = 12) uniform uint has_pixel_list;
 
 layout(location = 0) out float line_integral;
 
@@ -23,7 +23,7 @@ void main() {
   line_integral = 0.0;
   uint n = uint(gl_FragCoord.y) * output_columns + uint(gl_FragCoord.x);
   if (n >= pixel_count) return;
-  uint pixel = has_pixel_list ? pixels[n] : n;
+  uint pixel = has_pixel_list != 0u ? pixels[n] : n;
   ivec2 position = ivec2(pixel % columns, pixel / columns);
   vec4 first = texelFetch(front, position, 0);
   vec4 last = texelFetch(back, position, 0);

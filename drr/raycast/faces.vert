@@ -7,9 +7,9 @@ layout(location = 0) uniform mat4 clip_from_voxel;
 layout(location = 4) uniform vec3 source_voxel;
 layout(location = 5) uniform vec3 block_edge;    // voxels; block b covers the positions from b * edge - 1, as many again
 layout(location = 6) uniform vec3 highest;       // position beyond which there is nothing
-layout(location = 7) uniform bool toward_source;
+layout(location = 7) uniform uint toward_source;
 
-out vec3 position_voxel;
+layout(location = 0) out vec3 position_voxel;
 
 void main() {
   int axis = int(face.w) / 2;
@@ -21,5 +21,5 @@ void main() {
   position_voxel = min((vec3(face.xyz) + corner) * block_edge - 1.0, highest);
   float way_to_source = source_voxel[axis] - position_voxel[axis];
   bool looks_at_source = high ? way_to_source > 0.0 : way_to_source < 0.0;
-  gl_Position = looks_at_source == toward_source ? clip_from_voxel * vec4(position_voxel, 1.0) : vec4(2.0, 2.0, 2.0, 1.0);
+  gl_Position = looks_at_source == (toward_source != 0u) ? clip_from_voxel * vec4(position_voxel, 1.0) : vec4(2.0, 2.0, 2.0, 1.0);
 }

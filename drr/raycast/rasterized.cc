@@ -58,11 +58,11 @@ Eigen::Matrix4d clip_from_voxel(const XrayView& view, const Eigen::Isometry3d& r
 
 RasterizedRaycaster::RasterizedRaycaster(RendererKind kind, const Volume<float>& ct_hu, const AttenuationModel& model,
                                          std::span<const Beam> beams, const RendererOptions& options)
-    : context_(options.gl),
+    : context_(gl_context(options.gl)),
       kind_(kind),
-      faces_program_({kFacesVert, "drr/raycast/faces.vert"}, {kFacesFrag, "drr/raycast/faces.frag"}),
-      integral_program_({kScreenVert, "drr/raycast/screen.vert"},
-                        {kBetweenFacesFrag, "drr/raycast/between_faces.frag"}),
+      faces_program_(context_.program({kFacesVert, "drr/raycast/faces.vert"}, {kFacesFrag, "drr/raycast/faces.frag"})),
+      integral_program_(context_.program({kScreenVert, "drr/raycast/screen.vert"},
+                                         {kBetweenFacesFrag, "drr/raycast/between_faces.frag"})),
       front_(RenderTarget::Pixel::kFourFloats, RenderTarget::Depth::kFloat),
       back_(RenderTarget::Pixel::kFourFloats, RenderTarget::Depth::kFloat),
       result_(RenderTarget::Pixel::kOneFloat, RenderTarget::Depth::kNone),
@@ -123,7 +123,7 @@ void RasterizedRaycaster::draw_faces(const XrayView& view, const Eigen::Isometry
   set_uniform(kSourceVoxel, make_camera(view, room_from_patient, voxel_from_patient_).source_voxel);
   set_uniform(kEdge, block_edge_);
   set_uniform(kHighest, Eigen::Vector3d(size_.cast<double>()));
-  glUniform1i(kTowardSource, front ? 1 : 0);
+  glUniform1ui(kTowardSource, front ? 1U : 0U);
   glDisable(GL_BLEND);
   glEnable(GL_DEPTH_TEST);
   glDepthFunc(front ? GL_LESS : GL_GREATER);  // the first front face, the last back face
@@ -153,7 +153,7 @@ void RasterizedRaycaster::draw_line_integrals(const XrayView& view, const Eigen:
   glUniform1ui(kColumns, static_cast<GLuint>(view.columns));
   glUniform1ui(kOutputColumns, static_cast<GLuint>(columns));
   glUniform1ui(kPixelCount, static_cast<GLuint>(count));
-  glUniform1i(kHasPixelList, has_list ? 1 : 0);
+  glUniform1ui(kHasPixelList, has_list ? 1U : 0U);
   glDisable(GL_DEPTH_TEST);
   glDisable(GL_BLEND);
   glDrawArrays(GL_TRIANGLES, 0, 3);

@@ -20,7 +20,7 @@ class RasterizedRaycaster final : public Renderer {
   // where there is no OpenGL 4.5 of the kind asked for, or the volume exceeds its limits.
   RasterizedRaycaster(RendererKind kind, const Volume<float>& ct_hu, const AttenuationModel& model,
                       std::span<const Beam> beams, const RendererOptions& options);
-  ~RasterizedRaycaster() override { context_.make_current(); }
+  ~RasterizedRaycaster() override { context_.try_make_current(); }
 
   RenderResult render(std::span<const XrayView> views, std::span<const Eigen::Isometry3d> room_from_patient,
                       const PixelSet& pixels) override;
@@ -43,9 +43,9 @@ class RasterizedRaycaster final : public Renderer {
   void draw_line_integrals(const XrayView& view, const Eigen::Isometry3d& room_from_patient,
                            std::span<const std::uint32_t> pixel_list, std::size_t count);
 
-  GlContext context_;  // first: what follows lives in it
+  GlContext& context_;
   RendererKind kind_;
-  Program faces_program_, integral_program_;
+  const Program &faces_program_, &integral_program_;
   std::map<Beam, AttenuationTexture> attenuation_;
   std::map<Beam, Structure> structures_;
   RenderTarget front_, back_, result_;

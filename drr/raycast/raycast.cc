@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <limits>
 
 #include "base/error.h"
 #include "drr/camera.h"
@@ -17,7 +18,7 @@ namespace {
 constexpr std::uint32_t kKvTexture = 0, kMvTexture = 1, kOccupiedTexture = 2;
 constexpr std::uint32_t kCameras = 0, kViews = 1, kPixels = 2, kResult = 3;
 enum Uniform : int {
-  kPoseCount = 0,
+  kPoses = 0,
   kViewCount = 1,
   kPixelsPerPose = 2,
   kHasPixelList = 3,
@@ -26,6 +27,7 @@ enum Uniform : int {
   kBoxLow = 6,
   kBoxHigh = 7,
   kUnitPerMm = 8,
+  kRays = 9,
 };
 
 constexpr int kBlockEdge = 8;
@@ -36,6 +38,11 @@ struct GlView {
   std::uint32_t first_pixel, columns, is_mv, in_squares;
 };
 
+ShaderSource shader(Filtering filtering) {
+  const char* variant = filtering == Filtering::kEightBitWeights ? "#define EIGHT_BIT_WEIGHTS\n#line 1\n" : "";
+  return {variant + std::string(kRaycastComp), "drr/raycast/raycast.comp"};
+}
+
 template <class T>
 std::span<const std::byte> bytes_of(const std::vector<T>& values) {
   return std::as_bytes(std::span(values));
@@ -44,11 +51,12 @@ std::span<const std::byte> bytes_of(const std::vector<T>& values) {
 }  // namespace
 
 RaycastGlRenderer::RaycastGlRenderer(const Volume<float>& ct_hu, const AttenuationModel& model,
-                                     std::span<const Beam> beams, const RendererOptions& options)
-    : context_(options.gl),
-      program_(ShaderSource{kRaycastComp, "drr/raycast/raycast.comp"}),
+                                     std::span<const Beam> beams, const RendererOptions& options, Filtering filtering)
+    : context_(gl_context(options.gl)),
+      program_(context_.program(shader(filtering))),
       voxel_from_patient_(ct_hu.patient_from_voxel.inverse()),
-      step_mm_(ct_hu.spacing_mm().minCoeff()) {
+      step_mm_(ct_hu.spacing_mm().minCoeff()),
+      rays_per_dispatch_(std::max<std::size_t>(1, options.rays_per_dispatch)) {
   const VolumePrecision precision = options.precision.value_or(kDefaultPrecision);
   VoxelBox box{.first = ct_hu.size, .last = Eigen::Vector3i::Constant(-1)};
   BlockGrid blocks;
@@ -103,14 +111,17 @@ const Buffer& RaycastGlRenderer::render_on_gpu(std::span<const XrayView> views,
 
 // As many poses as one storage buffer can hold.
 std::size_t RaycastGlRenderer::poses_at_once(std::size_t pixels_per_pose) const {
-  context_.make_current();
-  GLint64 max_bytes = 0;
-  glGetInteger64v(GL_MAX_SHADER_STORAGE_BLOCK_SIZE, &max_bytes);
   const std::size_t pose_bytes = std::max<std::size_t>(1, pixels_per_pose * sizeof(float));
-  const std::size_t count = static_cast<std::size_t>(max_bytes) / pose_bytes;
+  const std::size_t count = static_cast<std::size_t>(context_.largest_buffer_bytes()) / pose_bytes;
   if (count == 0)
     throw Error("images of this size exceed the storage buffers of this OpenGL.\n       Use --renderer cpu");
   return count;
+}
+
+void RaycastGlRenderer::poison(std::size_t line_integrals) {
+  context_.make_current();
+  result_.reserve(line_integrals * sizeof(float));
+  result_.fill(std::numeric_limits<float>::quiet_NaN());
 }
 
 void RaycastGlRenderer::upload_views(std::span<const XrayView> views, const std::vector<std::size_t>& begins,
@@ -151,19 +162,27 @@ void RaycastGlRenderer::dispatch(std::span<const XrayView> views, std::span<cons
   views_.bind(kViews);
   pixels_.bind(kPixels);
   result_.bind(kResult);
-  glUniform1ui(kPoseCount, static_cast<GLuint>(poses.size()));
   glUniform1ui(kViewCount, static_cast<GLuint>(views.size()));
   glUniform1ui(kPixelsPerPose, static_cast<GLuint>(pixels_per_pose));
-  glUniform1i(kHasPixelList, has_pixel_list ? 1 : 0);
+  glUniform1ui(kHasPixelList, has_pixel_list ? 1U : 0U);
   glUniform1f(kStepMm, static_cast<GLfloat>(step_mm_));
   set_uniform(kMmFromVoxelAxes, Eigen::Matrix3d(voxel_from_patient_.linear().inverse()));
   set_uniform(kBoxLow, box_low_);
   set_uniform(kBoxHigh, box_high_);
   glUniform2f(kUnitPerMm, static_cast<GLfloat>(kv.unit_per_mm), static_cast<GLfloat>(mv.unit_per_mm));
-  const std::size_t groups = (pixels_per_pose + kGroupSize - 1) / kGroupSize;
-  const auto running = timer_.run();
-  glDispatchCompute(static_cast<GLuint>(std::min(groups, kMaxGroups)),
-                    static_cast<GLuint>(std::min(poses.size(), kMaxGroups)), 1);
+  const std::size_t rays_each = std::clamp<std::size_t>(pixels_per_pose, 1, rays_per_dispatch_);
+  const std::size_t poses_each = std::max<std::size_t>(1, rays_per_dispatch_ / rays_each);
+  for (std::size_t pose = 0; pose < poses.size(); pose += poses_each)
+    for (std::size_t ray = 0; ray < pixels_per_pose; ray += rays_each) {
+      const std::size_t poses_end = std::min(poses.size(), pose + poses_each),
+                        rays_end = std::min(pixels_per_pose, ray + rays_each);
+      glUniform2ui(kPoses, static_cast<GLuint>(pose), static_cast<GLuint>(poses_end));
+      glUniform2ui(kRays, static_cast<GLuint>(ray), static_cast<GLuint>(rays_end));
+      const std::size_t groups = (rays_end - ray + kGroupSize - 1) / kGroupSize;
+      const auto running = timer_.run();
+      glDispatchCompute(static_cast<GLuint>(std::min(groups, kMaxGroups)),
+                        static_cast<GLuint>(std::min(poses_end - pose, kMaxGroups)), 1);
+    }
   glMemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT | GL_SHADER_STORAGE_BARRIER_BIT);
 }
 

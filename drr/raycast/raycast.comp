@@ -22,21 +22,42 @@ layout(std430, binding = 1) readonly buffer Views { View views[]; };
 layout(std430, binding = 2) readonly buffer Pixels { uint pixels[]; };             // of one pose, where a list is given
 layout(std430, binding = 3) writeonly buffer Result { float line_integrals[]; };   // [pose][pixel]
 
-layout(location = 0) uniform uint pose_count;
+layout(location = 0) uniform uvec2 poses;  // of this dispatch: the first, and the end
 layout(location = 1) uniform uint view_count;
 layout(location = 2) uniform uint pixels_per_pose;
-layout(location = 3) uniform bool has_pixel_list;
+layout(location = 3) uniform uint has_pixel_list;
 layout(location = 4) uniform float step_mm;
 layout(location = 5) uniform mat3 mm_from_voxel_axes;
 layout(location = 6) uniform vec3 box_low;   // outside of this box, in voxel indices, every sample is 0
 layout(location = 7) uniform vec3 box_high;
 layout(location = 8) uniform vec2 unit_per_mm;  // attenuation of a texture value of 1: kV, MV
+layout(location = 9) uniform uvec2 rays;        // of this dispatch, among those of a pose: the first, and the end
 
 const int kBlockEdge = 8;
 
+#ifdef EIGHT_BIT_WEIGHTS
+// What the texture units of GPUs do: weights of 8 bits.
+float sampled(sampler3D volume, vec3 voxel) {
+  vec3 below = floor(voxel);
+  vec3 share = floor((voxel - below) * 256.0 + 0.5) / 256.0;
+  float value = 0.0;
+  for (int n = 0; n < 8; ++n) {
+    ivec3 offset = ivec3(n & 1, n >> 1 & 1, n >> 2);
+    ivec3 at = ivec3(below) + offset;
+    if (any(lessThan(at, ivec3(0))) || any(greaterThanEqual(at, textureSize(volume, 0)))) continue;
+    vec3 weights = mix(1.0 - share, share, equal(offset, ivec3(1)));
+    value += weights.x * weights.y * weights.z * texelFetch(volume, at, 0).r;
+  }
+  return value;
+}
+#else
+float sampled(sampler3D volume, vec3 voxel) {
+  return textureLod(volume, (voxel + 0.5) / vec3(textureSize(volume, 0)), 0.0).r;
+}
+#endif
+
 float attenuation(bool is_mv, vec3 voxel) {
-  if (is_mv) return textureLod(mv_attenuation, (voxel + 0.5) / vec3(textureSize(mv_attenuation, 0)), 0.0).r;
-  return textureLod(kv_attenuation, (voxel + 0.5) / vec3(textureSize(kv_attenuation, 0)), 0.0).r;
+  return is_mv ? sampled(mv_attenuation, voxel) : sampled(kv_attenuation, voxel);
 }
 
 float line_integral(vec3 source, vec3 way, bool is_mv) {
@@ -84,8 +105,8 @@ float line_integral(vec3 source, vec3 way, bool is_mv) {
 
 void main() {
   // Strides instead of one thread per ray: group counts have limits, poses and pixels have none.
-  for (uint pose = gl_WorkGroupID.y; pose < pose_count; pose += gl_NumWorkGroups.y) {
-    for (uint n = gl_GlobalInvocationID.x; n < pixels_per_pose; n += gl_NumWorkGroups.x * gl_WorkGroupSize.x) {
+  for (uint pose = poses.x + gl_WorkGroupID.y; pose < poses.y; pose += gl_NumWorkGroups.y) {
+    for (uint n = rays.x + gl_GlobalInvocationID.x; n < rays.y; n += gl_NumWorkGroups.x * gl_WorkGroupSize.x) {
       uint view = 0u;
       while (view + 1u < view_count && n >= views[view + 1u].first_pixel) ++view;
       uint place = n - views[view].first_pixel;
@@ -95,7 +116,7 @@ void main() {
         uint square = place / 64u, inside = place % 64u;
         place = (square / (columns / 8u) * 8u + inside / 8u) * columns + square % (columns / 8u) * 8u + inside % 8u;
       }
-      uint pixel = has_pixel_list ? pixels[n] : place;
+      uint pixel = has_pixel_list != 0u ? pixels[n] : place;
       vec3 position = vec3(float(pixel % columns), float(pixel / columns), 1.0);
       mat4 camera = voxel_from_pixel[pose * view_count + view];
       line_integrals[pose * pixels_per_pose + views[view].first_pixel + place] =

@@ -7,41 +7,44 @@
 
 #include "drr/gl/context.h"
 #include "drr/gl/objects.h"
+#include "drr/images_on_gpu.h"
 #include "drr/raycast/attenuation_texture.h"
 #include "drr/renderer.h"
 
 namespace isoshift {
 
-class RaycastGlRenderer final : public Renderer {
+// How voxels are interpolated: by the texture units, or by shader code that rounds weights to 8 bits as the texture
+// units of GPUs do, which llvmpipe does not. For tests.
+enum class Filtering { kTextureUnits, kEightBitWeights };
+
+class RaycastGlRenderer final : public Renderer, public ImagesOnGpu {
  public:
   // Throws Error where there is no OpenGL 4.5 of the kind asked for, or the volume exceeds its limits.
   RaycastGlRenderer(const Volume<float>& ct_hu, const AttenuationModel& model, std::span<const Beam> beams,
-                    const RendererOptions& options);
-  ~RaycastGlRenderer() override { context_.make_current(); }
+                    const RendererOptions& options, Filtering filtering = Filtering::kTextureUnits);
+  ~RaycastGlRenderer() override { context_.try_make_current(); }
 
   RenderResult render(std::span<const XrayView> views, std::span<const Eigen::Isometry3d> room_from_patient,
                       const PixelSet& pixels) override;
   RendererKind kind() const override { return RendererKind::kRaycast; }
   std::string device() const override { return context_.renderer(); }
   std::optional<double> gpu_seconds() const override { return seconds_of(timer_, context_); }
-  RaycastGlRenderer* on_gpu() override { return this; }
+  ImagesOnGpu* on_gpu() override { return this; }
 
-  // The same, left on the GPU: line integrals as floats, [pose][view][pixel]. The renderer keeps the buffer, until its
-  // next call or its end. Throws Error where the images exceed one storage buffer.
   const Buffer& render_on_gpu(std::span<const XrayView> views, std::span<const Eigen::Isometry3d> room_from_patient,
-                              const PixelSet& pixels);
-  // How many poses that is. Throws Error where not even one fits.
-  std::size_t poses_at_once(std::size_t pixels_per_pose) const;
-  // Where the line integrals are.
-  const GlContext& context() const { return context_; }
+                              const PixelSet& pixels) override;
+  std::size_t poses_at_once(std::size_t pixels_per_pose) const override;
+  GlContext& context() const override { return context_; }
+
+  void poison(std::size_t line_integrals) override;
 
  private:
   void upload_views(std::span<const XrayView> views, const std::vector<std::size_t>& begins, const PixelSet& pixels);
   void dispatch(std::span<const XrayView> views, std::span<const Eigen::Isometry3d> poses, std::size_t pixels_per_pose,
                 bool has_pixel_list);
 
-  GlContext context_;  // first: what follows lives in it
-  Program program_;
+  GlContext& context_;
+  const Program& program_;
   std::map<Beam, AttenuationTexture> attenuation_;
   std::optional<Texture3d> occupied_;
   Buffer cameras_, views_, pixels_, result_;
@@ -49,6 +52,7 @@ class RaycastGlRenderer final : public Renderer {
   Eigen::Affine3d voxel_from_patient_;
   double step_mm_;
   Eigen::Vector3d box_low_, box_high_;
+  std::size_t rays_per_dispatch_;
 };
 
 }  // namespace isoshift

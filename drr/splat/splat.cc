@@ -71,9 +71,9 @@ void SplatRenderer::Voxels::upload() {
 
 SplatRenderer::SplatRenderer(RendererKind kind, const Volume<float>& ct_hu, const AttenuationModel& model,
                              std::span<const Beam> beams, const RendererOptions& options)
-    : context_(options.gl),
+    : context_(gl_context(options.gl)),
       kind_(kind),
-      program_(vertex_shader(kind), {kSplatFrag, "drr/splat/splat.frag"}),
+      program_(context_.program(vertex_shader(kind), {kSplatFrag, "drr/splat/splat.frag"})),
       image_(RenderTarget::Pixel::kOneFloat, RenderTarget::Depth::kNone),
       options_(options.splat),
       patient_from_voxel_(ct_hu.patient_from_voxel),
@@ -157,9 +157,9 @@ void SplatRenderer::draw(const XrayView& view, const Eigen::Isometry3d& room_fro
   glUniform1f(kWeight, static_cast<GLfloat>(voxels.unit_per_mm * voxel_mm3 / receptor.pixel_area_mm2()));
   glUniform2f(kSigmaPx, static_cast<GLfloat>(sigma_mm / receptor.column_step_mm.norm()),
               static_cast<GLfloat>(sigma_mm / receptor.row_step_mm.norm()));
-  glUniform1i(kFocusWobbles, options_.wobble == SplatOptions::Wobble::kFocus ? 1 : 0);
+  glUniform1ui(kFocusWobbles, options_.wobble == SplatOptions::Wobble::kFocus ? 1U : 0U);
   const bool bilinear = options_.deposit == SplatOptions::Deposit::kBilinear;
-  glUniform1i(kBilinear, bilinear ? 1 : 0);
+  glUniform1ui(kBilinear, bilinear ? 1U : 0U);
   glUniform2f(kImageSize, static_cast<GLfloat>(view.columns), static_cast<GLfloat>(view.rows));
   if (kind_ != RendererKind::kSplatTexture) glUniform1ui(kSeed, options_.seed);
   glDisable(GL_DEPTH_TEST);

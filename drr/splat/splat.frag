@@ -1,6 +1,6 @@
 // splat.frag: what a voxel adds to its pixel; the blending adds up.
 
-flat in float deposit;
+layout(location = 0) flat in float deposit;
 layout(location = 0) out float line_integral;
 
 void main() { line_integral = deposit; }

@@ -19,7 +19,7 @@ class SplatRenderer final : public Renderer {
   // where there is no OpenGL 4.5 of the kind asked for, or the volume has 2^32 voxels or more.
   SplatRenderer(RendererKind kind, const Volume<float>& ct_hu, const AttenuationModel& model,
                 std::span<const Beam> beams, const RendererOptions& options);
-  ~SplatRenderer() override { context_.make_current(); }
+  ~SplatRenderer() override { context_.try_make_current(); }
 
   RenderResult render(std::span<const XrayView> views, std::span<const Eigen::Isometry3d> room_from_patient,
                       const PixelSet& pixels) override;
@@ -41,9 +41,9 @@ class SplatRenderer final : public Renderer {
 
   void draw(const XrayView& view, const Eigen::Isometry3d& room_from_patient);
 
-  GlContext context_;  // first: what follows lives in it
+  GlContext& context_;
   RendererKind kind_;
-  Program program_;
+  const Program& program_;
   std::map<Beam, Voxels> voxels_;
   std::optional<Texture3d> noise_;
   RenderTarget image_;

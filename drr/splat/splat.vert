@@ -14,8 +14,8 @@ layout(location = 6) uniform mat3 mm_from_voxel_axes;
 layout(location = 9) uniform float sid_mm;             // along the central axis
 layout(location = 10) uniform float weight;            // of a texture value of 1: unit_per_mm dV / A
 layout(location = 11) uniform vec2 sigma_px;           // on the receptor, of columns and rows
-layout(location = 12) uniform bool focus_wobbles;
-layout(location = 13) uniform bool bilinear;
+layout(location = 12) uniform uint focus_wobbles;
+layout(location = 13) uniform uint bilinear;
 layout(location = 14) uniform vec2 image_size;
 layout(location = 15) uniform uint seed;
 
@@ -41,7 +41,7 @@ vec2 gaussian_pair(uvec3 position) {
 }
 #endif
 
-flat out float deposit;
+layout(location = 0) flat out float deposit;
 
 void main() {
   uvec3 position = uvec3(voxel % size.x, voxel / size.x % size.y, voxel / (size.x * size.y));
@@ -53,12 +53,12 @@ void main() {
 
   // A focal spot that moves by d moves the shadow by -d (1 - w) / w; a voxel that moves by d moves it by d / w.
   vec2 wobble = sigma_px * gaussian_pair(position);
-  vec2 pixel = projected.xy / w + (focus_wobbles ? wobble * (w - 1.0) / w : wobble / w);
+  vec2 pixel = projected.xy / w + (focus_wobbles != 0u ? wobble * (w - 1.0) / w : wobble / w);
   float way_mm = length(mm_from_voxel_axes * (vec3(position) - source_voxel));
   float cos_theta = w * sid_mm / way_mm;
   deposit = attenuation * weight / (w * w * cos_theta);
   vec2 center = floor(pixel + 0.5);
-  if (bilinear) {
+  if (bilinear != 0u) {
     vec2 corner = vec2(gl_InstanceID & 1, gl_InstanceID >> 1);
     vec2 part = pixel - floor(pixel);
     vec2 share = mix(1.0 - part, part, corner);

@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
+
 #include "geometry/rotation.h"
 #include "io/report/canvas.h"
 #include "io/report/moved_bodies.h"
@@ -133,7 +135,10 @@ ReportPage::Section checks_section(const SetupResult& report) {
 ReportPage::Section provenance_section(const SetupResult& report) {
   ReportPage::Section section{.title = "Provenance"};
   std::string settings;
-  for (const auto& [name, value] : report.renderer_settings) settings += fmt::format(", {} {}", name, value);
+  for (auto [name, value] : report.renderer_settings) {
+    std::ranges::replace(name, '_', ' ');
+    settings += fmt::format(", {} {}", name, printable(value));
+  }
   section.rows = {
       {"Program", fmt::format("isoshift {} ({})", report.version, report.commit)},
       {"Renderer", fmt::format("{} on {}{}; attenuation {}, threshold {:.0f} HU", report.renderer,

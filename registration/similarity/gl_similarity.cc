@@ -79,12 +79,6 @@ void upload(std::vector<T> values, Buffer& to) {
   to.upload(std::as_bytes(std::span(values)));
 }
 
-// The program, made where it is to run.
-Program program_in(const GlContext& context, SimilarityKind kind) {
-  context.make_current();
-  return Program(shader(kind));
-}
-
 SimilarityKind common_kind(std::span<const Comparison> comparisons) {
   if (comparisons.empty()) throw std::invalid_argument("nothing to compare");
   for (const Comparison& comparison : comparisons)
@@ -94,8 +88,8 @@ SimilarityKind common_kind(std::span<const Comparison> comparisons) {
 
 }  // namespace
 
-GlSimilarity::GlSimilarity(const GlContext& context, std::span<const Comparison> comparisons)
-    : context_(context), program_(program_in(context, common_kind(comparisons))), view_count_(comparisons.size()) {
+GlSimilarity::GlSimilarity(GlContext& context, std::span<const Comparison> comparisons)
+    : context_(context), program_(context.program(shader(common_kind(comparisons)))), view_count_(comparisons.size()) {
   std::vector<GlView> views;
   XraySide xray;
   for (const Comparison& comparison : comparisons) {

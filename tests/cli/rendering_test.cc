@@ -11,7 +11,7 @@
 #include "tests/support/temporary_folder.h"
 #include "workflow/register/truth.h"
 
-namespace isoshift {
+namespace isoshift::rendering_test {
 namespace {
 
 using testing::HasSubstr;
@@ -28,6 +28,7 @@ TEST(RenderingFlags, WhatARendererDoesNotHaveIsRefused) {
       {{"--renderer", "siddon", "--precision", "u8"},
        "--precision below f32 works only with renderers other than references"},
       {{"--renderer", "cpu", "--gl", "software"}, "--gl works only with renderers on OpenGL"},
+      {{"--renderer", "cpu", "--device", "1"}, "--device works only with renderers on OpenGL"},
       {{"--window", "0,100"}, "--window works only with --attenuation windowed"},
       {{"--renderer", "splat", "--gl", "software", "--wobble-sigma", "-1"}, "--wobble-sigma -1: expected 0 mm or more"},
   };
@@ -38,6 +39,14 @@ TEST(RenderingFlags, WhatARendererDoesNotHaveIsRefused) {
     EXPECT_FALSE(std::filesystem::exists(study.output()));
   }
   EXPECT_EQ(register_study(study, {"--renderer", "raycast-cuberille", "--block-edge", "3"}).exit_status, 2);
+}
+
+TEST(RenderingFlags, WhyAutoIsTheCpuIsInTheResult) {
+  SmallStudy study;
+  const CommandOutcome outcome = register_study(study, {"--preset", "fast", "--json"});
+  const Json result = Json::parse(outcome.out);
+  if (result["renderer"] == "raycast") GTEST_SKIP() << "there is a GPU here";
+  EXPECT_THAT(result["renderer_settings"]["chosen_because"].get<std::string>(), HasSubstr("no hardware OpenGL: "));
 }
 
 class EveryRenderer : public testing::TestWithParam<std::vector<std::string>> {};
@@ -62,7 +71,14 @@ TEST_P(EveryRenderer, RegistersAndSaysWhatItUsed) {
     std::ranges::replace(name, '-', '_');
     EXPECT_EQ(result["renderer_settings"][name], flags[n + 1]);
   }
-  EXPECT_THAT(result["renderer_settings"], testing::Contains(flags[1] == "cpu" ? "u8" : "u16"));
+  const Json& settings = result["renderer_settings"];
+  EXPECT_THAT(settings, testing::Contains(flags[1] == "cpu" ? "u8" : "u16"));
+  EXPECT_FALSE(settings.contains("chosen_because"));
+  if (flags[1] != "raycast") return;
+  EXPECT_THAT(settings["driver"].get<std::string>(), HasSubstr("Mesa"));
+  EXPECT_THAT(settings["self_check"].get<std::string>(), testing::StartsWith("passed, line integrals within 0.0"));
+  EXPECT_THAT(settings["compared_with_cpu"].get<std::string>(),
+              testing::MatchesRegex("[45][0-9]+ rays within 0.*rms."));
 }
 
 INSTANTIATE_TEST_SUITE_P(
@@ -102,4 +118,4 @@ TEST(Bench, FiguresAreMade) {
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::rendering_test

@@ -13,9 +13,10 @@
 #include "geometry/rotation.h"
 #include "phantom/shapes.h"
 #include "tests/drr/test_views.h"
+#include "tests/support/gpu.h"
 #include "tests/support/pose_near.h"
 
-namespace isoshift {
+namespace isoshift::renderer_test {
 
 namespace {
 
@@ -58,8 +59,7 @@ std::vector<Tested> all_tested() {
 class RendererTest : public testing::TestWithParam<Tested> {
  protected:
   void SetUp() override {
-    if (uses_gl(GetParam().kind) && GetParam().gl == GlDevice::kHardware && !has_hardware_gl())
-      GTEST_SKIP() << "no GPU here";
+    if (uses_gl(GetParam().kind) && GetParam().gl == GlDevice::kHardware) ISOSHIFT_SKIP_WITHOUT_GPU();
   }
   std::unique_ptr<Renderer> make(const Volume<float>& ct, const AttenuationModel& model = {}) {
     return make_renderer(GetParam().kind, ct, model, kBothBeams, {.gl = GetParam().gl});
@@ -384,4 +384,4 @@ TEST(Oracles, DifferByLessThanWhatTheDocsSay) {
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::renderer_test

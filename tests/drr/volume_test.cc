@@ -15,7 +15,7 @@
 #include "drr/raycast/raycast.h"
 #include "tests/drr/test_views.h"
 
-namespace isoshift {
+namespace isoshift::volume_test {
 namespace {
 
 using Eigen::Vector3d;
@@ -168,6 +168,22 @@ TEST(RaycastGl, LeavesResultsOnTheGpu) {
   EXPECT_EQ(found, expected);
 }
 
+TEST(RaycastGl, SmallDispatchesRenderTheSame) {
+  const Volume<float> ct = textured_volume();
+  const std::vector<XrayView> views = {centered_view(0, 24, 6.0), centered_view(70, 33, 4.0)};  // 24: in squares
+  const std::vector<Eigen::Isometry3d> poses = random_poses(5);
+  const RenderResult expected = make_renderer(RendererKind::kRaycast, ct, {}, kBothBeams, {.gl = GlDevice::kSoftware})
+                                    ->render(views, poses, PixelSet::all());
+  for (const std::size_t rays : {1000UL, 4000UL}) {  // parts of a pose, and two poses of five
+    RaycastGlRenderer renderer(ct, {}, kBothBeams, {.gl = GlDevice::kSoftware, .rays_per_dispatch = rays});
+    renderer.poison(poses.size() * (24 * 24 + 33 * 33));
+    const RenderResult found = renderer.render(views, poses, PixelSet::all());
+    for (std::size_t p = 0; p < poses.size(); ++p)
+      for (std::size_t v = 0; v < views.size(); ++v)
+        EXPECT_THAT(found.line_integrals(p, v), testing::ElementsAreArray(expected.line_integrals(p, v))) << rays;
+  }
+}
+
 TEST(RaycastGl, TwoRenderersDoNotDisturbEachOther) {
   const Volume<float> ct = textured_volume();
   const XrayView view = centered_view(20, 40, 4.0);
@@ -212,4 +228,4 @@ TEST(PixelSet, RandomIsTheSameForTheSameSeed) {
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::volume_test

@@ -20,8 +20,9 @@
 #include "phantom/xray_simulation.h"
 #include "registration/objective.h"
 #include "tests/drr/test_views.h"
+#include "tests/support/gpu.h"
 
-namespace isoshift {
+namespace isoshift::gl_similarity_test {
 namespace {
 
 constexpr double kTolerance = 1e-4;
@@ -113,7 +114,7 @@ double largest_difference(const std::vector<std::vector<double>>& found,
 class GlSimilarityTest : public testing::TestWithParam<Tested> {
  protected:
   void SetUp() override {
-    if (GetParam().gl == GlDevice::kHardware && !has_hardware_gl()) GTEST_SKIP() << "no GPU here";
+    if (GetParam().gl == GlDevice::kHardware) ISOSHIFT_SKIP_WITHOUT_GPU();
   }
   RendererOptions device() const { return {.gl = GetParam().gl}; }
 
@@ -131,7 +132,8 @@ class GlSimilarityTest : public testing::TestWithParam<Tested> {
 
   // One view, one pose per DRR.
   void expect_as_on_cpu(const std::vector<float>& xray, const std::vector<std::vector<float>>& drrs, double tolerance) {
-    const GlContext context(GetParam().gl);
+    GlContext& context = gl_context(GetParam().gl);
+    context.make_current();
     const Range of_first = drrs.front().empty() ? Range() : range_of(drrs.front());  // others reach beyond it
     const std::vector<Comparison> comparisons = {comparison(xray, of_first)};
     GlSimilarity similarity(context, comparisons);
@@ -227,7 +229,8 @@ INSTANTIATE_TEST_SUITE_P(All, GlSimilarityTest, testing::ValuesIn(all_tested()),
                          [](const auto& param) { return name_of(param.param); });
 
 TEST(GlSimilarity, TakesMorePosesThanWorkGroups) {
-  const GlContext context(GlDevice::kSoftware);
+  GlContext& context = gl_context(GlDevice::kSoftware);
+  context.make_current();
   const std::vector<float> xray = {1, 2, 3, 4};
   const std::vector<Comparison> comparisons(1, Comparison(SimilarityKind::kNcc, xray));
   GlSimilarity similarity(context, comparisons);
@@ -283,4 +286,4 @@ TEST(GlSimilarity, SecondsOfTheObjectiveAddUp) {
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::gl_similarity_test

@@ -21,9 +21,10 @@ namespace {
 // A child that registers one case after the other.
 class Worker {
  public:
-  Worker()
+  explicit Worker(int number)
       : process_({"isoshift", "__child", "register"},
-                 {.program = this_program(), .errors = ProcessOptions::Errors::kInherited}) {}
+                 {.program = this_program(), .errors = ProcessOptions::Errors::kInherited}),
+        number_(number) {}
 
   int socket() { return process_.channel().socket(); }
   bool is_ready() const { return is_ready_; }
@@ -33,6 +34,7 @@ class Worker {
   void give(BatchJob job) {
     last_ct_ = job.ct_key;
     job_ = std::move(job);
+    job_->order.worker = number_;
     process_.allow(kLongestRegistration);
     process_.channel().send(to_line(job_->order), process_.deadline());  // one that died is found when it is read from
   }
@@ -90,6 +92,7 @@ class Worker {
   }
 
   Process process_;
+  int number_;
   bool is_ready_ = false, is_alive_ = true, is_from_outside_ = false;
   std::string damage_;  // what is wrong with its message; empty: nothing
   std::optional<BatchJob> job_;
@@ -117,10 +120,11 @@ void run_in_workers(
   std::list<BatchJob> jobs(std::make_move_iterator(all.begin()), std::make_move_iterator(all.end()));
   std::list<std::unique_ptr<Worker>> workers;
   std::set<std::string> tried_twice;
+  int begun = 0;
   for (;;) {
     auto idle = static_cast<std::size_t>(std::ranges::count_if(workers, [](const auto& w) { return !w->job(); }));
     for (; workers.size() < static_cast<std::size_t>(count) && idle < jobs.size(); ++idle)
-      workers.push_back(std::make_unique<Worker>());
+      workers.push_back(std::make_unique<Worker>(begun++));
     for (const auto& worker : workers) {
       if (worker->job() || jobs.empty()) continue;
       const auto next = next_for(*worker, jobs, workers);

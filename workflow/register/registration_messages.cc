@@ -75,7 +75,8 @@ std::string to_line(const RegistrationOrder& order) {
                     {"is_searched", order.is_searched},
                     {"output", raw(order.output)},
                     {"tells_progress", order.tells_progress},
-                    {"at_a_time", order.at_a_time}}}});
+                    {"at_a_time", order.at_a_time},
+                    {"worker", order.worker}}}});
 }
 
 std::string to_line(const RegistrationMessage& message) { return line_of(std::visit(ToJson(), message)); }
@@ -99,8 +100,10 @@ RegistrationOrder registration_order_from(const std::string& line, const std::st
                           .is_searched = section->required<bool>("is_searched", kYesOrNo),
                           .output = text_in(*section, "output"),
                           .tells_progress = section->required<bool>("tells_progress", kYesOrNo),
-                          .at_a_time = section->required<int>("at_a_time", "a number of registrations")};
+                          .at_a_time = section->required<int>("at_a_time", "a number of registrations"),
+                          .worker = section->required<int>("worker", "a number of a child")};
   if (order.at_a_time < 1) section->refuse("at_a_time", "at least 1");
+  if (order.worker < 0) section->refuse("worker", "at least 0");
   section->end();
   return order;
 }

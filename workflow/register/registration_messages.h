@@ -22,6 +22,7 @@ struct RegistrationOrder {
   std::filesystem::path output;
   bool tells_progress = false;
   int at_a_time = 1;  // orders that are worked on at the same time, by children that share the cores
+  int worker = 0;     // which of these children works on it: several GPUs are shared out by this number
 
   bool operator==(const RegistrationOrder&) const = default;
 };

@@ -23,10 +23,11 @@ std::shared_ptr<const RendererPyramid> RendererStore::get(const RenderingOptions
 
 RegistrationSetup::RegistrationSetup(const RegistrationRequest& request, const Study& study,
                                      const std::vector<Beam>& beams, RendererStore& store)
-    : options_(request.search.registration()) {
+    : ct_(study.ct), options_(request.search.registration()) {
   RegionOfStudy region = region_of(request.region, study, request.rendering.threshold_hu);
-  if (region.rendered_ct)
-    renderers_ = std::make_shared<const RendererPyramid>(request.rendering.kind(), *region.rendered_ct,
+  region_ct_ = std::move(region.rendered_ct);
+  if (region_ct_)
+    renderers_ = std::make_shared<const RendererPyramid>(request.rendering.kind(), *region_ct_,
                                                          request.rendering.model(), beams, request.rendering.options());
   else
     renderers_ = store.get(request.rendering, study.ct, beams);

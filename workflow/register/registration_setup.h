@@ -2,6 +2,7 @@
 // Turns a user's request and a study into the input of register_views(), for every command that registers.
 
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "drr/renderer_pyramid.h"
@@ -43,10 +44,13 @@ class RegistrationSetup {
   RegistrationSetup& operator=(const RegistrationSetup&) = delete;
 
   const RendererPyramid& renderers() const { return *renderers_; }
+  const Volume<float>& rendered_ct() const { return region_ct_ ? *region_ct_ : ct_->hu; }
   const RegistrationOptions& options() const { return options_; }
 
  private:
   ProjectedRegion region_;
+  std::shared_ptr<const CtSeries> ct_;
+  std::optional<Volume<float>> region_ct_;  // where a volume of interest is rendered and not the whole CT
   std::shared_ptr<const RendererPyramid> renderers_;
   RegistrationOptions options_;
 };

@@ -6,6 +6,7 @@
 
 #include "base/error.h"
 #include "drr/gl/context.h"
+#include "registration/gpu_check.h"
 
 namespace isoshift {
 namespace {
@@ -22,10 +23,23 @@ void RenderingOptions::default_to_paper() {
   if (!precision && !is_oracle(kind())) precision = "u8";
 }
 
+std::optional<std::string> RenderingOptions::failed_gpu() const {
+  const GlChoice choice = gl_choice_from(gl, gpu);
+  const bool has_gpu = renderer == "auto" && choice.kind == GlDevice::kHardware && !why_no_gpu(choice.gpu);
+  return has_gpu ? gpu_check(choice).failure : std::nullopt;
+}
+
 RendererKind RenderingOptions::kind() const {
-  if (renderer == "auto")
-    return gl_device_from(gl) == GlDevice::kHardware && has_hardware_gl() ? RendererKind::kRaycast : RendererKind::kCpu;
+  if (renderer == "auto") return why_cpu() ? RendererKind::kCpu : RendererKind::kRaycast;
   return renderer_kind_from(renderer).value();
+}
+
+std::optional<std::string> RenderingOptions::why_cpu() const {
+  if (renderer != "auto") return std::nullopt;
+  const GlChoice choice = gl_choice_from(gl, gpu);
+  if (choice.kind == GlDevice::kSoftware) return "--gl software asks for no GPU";
+  if (auto none = why_no_gpu(choice.gpu)) return none;
+  return failed_gpu();
 }
 
 AttenuationModel RenderingOptions::model() const {
@@ -46,6 +60,7 @@ RendererOptions RenderingOptions::options() const {
   const RendererKind chosen = kind();
   const bool splats = is_splatting(chosen);
   refuse(gl && !uses_gl(chosen), "--gl", "renderers on OpenGL", chosen);
+  refuse(gpu && !uses_gl(chosen), "--device", "renderers on OpenGL", chosen);
   refuse(precision.value_or("f32") != "f32" && is_oracle(chosen), "--precision below f32",
          "renderers other than references", chosen);
   refuse(block_edge && chosen != RendererKind::kRaycastCuberille, "--block-edge", "raycast-cuberille", chosen);
@@ -55,7 +70,11 @@ RendererOptions RenderingOptions::options() const {
   refuse(deposit && !splats, "--deposit", "splatting", chosen);
 
   RendererOptions result;
-  result.gl = gl_device_from(gl);
+  result.gl = gl_choice_from(gl, gpu);
+  if (chosen == RendererKind::kRaycast) {
+    require_gpu_check(result.gl);
+    result.rays_per_dispatch = rays_per_dispatch(gpu_check(result.gl).rendering.samples_per_second);
+  }
   if (precision) result.precision = volume_precision_from(*precision);
   if (block_edge) result.block_edge = *block_edge;
   if (wobble) result.splat.wobble = *wobble == "focus" ? SplatOptions::Wobble::kFocus : SplatOptions::Wobble::kVoxel;
@@ -65,6 +84,13 @@ RendererOptions RenderingOptions::options() const {
   result.splat.sigma_mm = wobble_sigma_mm;
   result.check(chosen);
   return result;
+}
+
+void RenderingOptions::take_gpu_of(int process) {
+  const int gpus = count_gpus();
+  if (gpu || gpus < 2 || gl_choice_from(gl, gpu).kind != GlDevice::kHardware || !uses_gl(kind())) return;
+  gpu = std::to_string(process % gpus);
+  if (why_cpu()) gpu.reset();
 }
 
 void RenderingOptions::check() const {
@@ -78,6 +104,12 @@ std::vector<std::pair<std::string, std::string>> RenderingOptions::settings() co
   std::vector<std::pair<std::string, std::string>> settings;
   const VolumePrecision kept = is_oracle(chosen) ? VolumePrecision::kF32 : used.precision.value_or(kDefaultPrecision);
   settings.emplace_back("precision", to_string(kept));
+  if (const auto why = why_cpu()) settings.emplace_back("chosen_because", *why);
+  if (chosen == RendererKind::kRaycast) {
+    const GpuCheck& checked = gpu_check(used.gl);
+    settings.emplace_back("driver", checked.driver);
+    settings.emplace_back("self_check", checked.words());
+  }
   if (chosen == RendererKind::kRaycastCuberille) settings.emplace_back("block_edge", fmt::to_string(used.block_edge));
   if (is_splatting(chosen)) {
     settings.emplace_back("wobble", used.splat.wobble == SplatOptions::Wobble::kFocus ? "focus" : "voxel");
@@ -89,8 +121,8 @@ std::vector<std::pair<std::string, std::string>> RenderingOptions::settings() co
   return settings;
 }
 
-GlDevice gl_device_from(const std::optional<std::string>& gl) {
-  return gl.value_or("hardware") == "hardware" ? GlDevice::kHardware : GlDevice::kSoftware;
+GlChoice gl_choice_from(const std::optional<std::string>& gl, const std::optional<std::string>& gpu) {
+  return {gl.value_or("hardware") == "hardware" ? GlDevice::kHardware : GlDevice::kSoftware, gpu.value_or("")};
 }
 
 }  // namespace isoshift

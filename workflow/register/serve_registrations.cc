@@ -46,6 +46,7 @@ RegistrationMessage answer_to(const std::string& line, const OptionsFrom& option
     options.start = order.start;
     options.registration.search.is_searched = order.is_searched;
     options.output = order.output;
+    options.registration.rendering.take_gpu_of(order.worker);
     if (!order.site.empty()) options.site = order.site;
     if (!order.anatomy.empty()) options.anatomy = order.anatomy;
     const unsigned cores = std::max(1U, std::thread::hardware_concurrency());

@@ -127,6 +127,8 @@ SetupResult setup_result_of(const Study& study, std::span<const FixedImage> imag
   result.threshold_hu = model.threshold_hu;
   if (model.kind == AttenuationModel::Kind::kWindowed) result.window_hu = {model.window_low_hu, model.window_high_hu};
   result.renderer_settings = request.rendering.settings();
+  if (!result.compared_with_cpu.empty())
+    result.renderer_settings.emplace_back("compared_with_cpu", result.compared_with_cpu);
   if (study.machine) result.machine = {study.machine->name, study.machine->sha256};
   result.ct_series_uid = study.ct->series_instance_uid;
   result.ct_sha256 = study.ct->sha256;

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include "base/error.h"
+#include "drr/spot_check.h"
 #include "registration/quality/judge.h"
 #include "setup/irradiated_field.h"
 
@@ -65,6 +66,14 @@ RegistrationResult TargetRegistration::from(const Eigen::Isometry3d& start_room_
   RegistrationResult found = register_views(setup_.renderers(), images, start_room_from_patient, options_,
                                             [&](double share) { observer.progress("Registering", share); });
   observer.progress("Registering", 1.0);
+  if (setup_.renderers().finest().kind() == RendererKind::kRaycast) {
+    std::vector<XrayView> views;
+    for (const FixedImage& image : images) views.push_back(image.view);
+    const SpotCheck spots = check_rays(setup_.renderers().finest(), setup_.rendered_ct(), request_.rendering.model(),
+                                       views, found.actual_room_from_patient);
+    found.compared_with_cpu = spots.words();
+    if (spots.failure) found.demote(Verdict::kReview, *spots.failure);
+  }
   if (may_have_bent(options_, images, found) || may_target_lie_elsewhere(setup_.renderers(), images, options_, found))
     register_bodies(bent_patient(), images, study_.planned_room_from_patient, options_, found,
                     [&](double share) { observer.progress("Registering the target", share); });

@@ -6,7 +6,7 @@
 #include "base/error.h"
 #include "tests/support/message_line.h"
 
-namespace isoshift {
+namespace isoshift::registration_messages_test {
 namespace {
 
 using testing::HasSubstr;
@@ -33,7 +33,8 @@ TEST(RegistrationMessages, OrdersComeBackAsTheyWere) {
                                .is_searched = false,
                                .output = "/out/a",
                                .tells_progress = true,
-                               .at_a_time = 4};
+                               .at_a_time = 4,
+                               .worker = 3};
   EXPECT_EQ(registration_order_from(line_without_end(to_line(full)), ""), full);
   EXPECT_EQ(registration_order_from(line_without_end(to_line(RegistrationOrder())), ""), RegistrationOrder());
 }
@@ -80,4 +81,4 @@ TEST(RegistrationMessages, DamagedOrdersAreErrors) {
 }
 
 }  // namespace
-}  // namespace isoshift
+}  // namespace isoshift::registration_messages_test

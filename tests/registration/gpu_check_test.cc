@@ -1,0 +1,151 @@
+// The self-check: what works passes, and devices that compute something else fail, each in a way that was seen
+// somewhere.
+
+#include "registration/gpu_check.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <limits>
+
+#include "drr/raycast/raycast.h"
+#include "tests/support/gpu.h"
+
+namespace isoshift::gpu_check_test {
+namespace {
+
+using Eigen::Vector3d;
+using testing::HasSubstr;
+
+std::unique_ptr<Renderer> on_llvmpipe(const Volume<float>& ct_hu, const AttenuationModel& model,
+                                      std::span<const Beam> beams, Filtering filtering) {
+  return std::make_unique<RaycastGlRenderer>(ct_hu, model, beams, RendererOptions{.gl = GlDevice::kSoftware},
+                                             filtering);
+}
+
+// A renderer that does not do what it should.
+class Spoiled : public Renderer {
+ public:
+  using Spoil = std::function<void(std::vector<float>& line_integrals, std::size_t poses)>;
+  Spoiled(std::unique_ptr<Renderer> renderer, Spoil spoil) : renderer_(std::move(renderer)), spoil_(std::move(spoil)) {}
+
+  RenderResult render(std::span<const XrayView> views, std::span<const Eigen::Isometry3d> room_from_patient,
+                      const PixelSet& pixels) override {
+    const RenderResult right = renderer_->render(views, room_from_patient, pixels);
+    std::vector<float> values;
+    std::vector<std::size_t> begins = {0};
+    for (std::size_t view = 0; view < views.size(); ++view) begins.push_back(begins.back() + pixels.count(views, view));
+    for (std::size_t pose = 0; pose < room_from_patient.size(); ++pose)
+      for (std::size_t view = 0; view < views.size(); ++view) {
+        const auto part = right.line_integrals(pose, view);
+        values.insert(values.end(), part.begin(), part.end());
+      }
+    spoil_(values, room_from_patient.size());
+    return {std::move(values), std::move(begins)};
+  }
+  RendererKind kind() const override { return RendererKind::kRaycast; }
+  std::string device() const override { return "a GPU that fails"; }
+
+ private:
+  std::unique_ptr<Renderer> renderer_;
+  Spoil spoil_;
+};
+
+// The check of a device that samples the volume elsewhere.
+RenderingCheck check_of_moved(const Eigen::Affine3d& moved_from_voxel) {
+  return check_rendering([&](const auto& ct_hu, const auto& model, auto beams) {
+    Volume<float> moved = ct_hu;
+    moved.patient_from_voxel = moved.patient_from_voxel * moved_from_voxel;
+    return make_renderer(RendererKind::kTrilinear, moved, model, beams);
+  });
+}
+
+RenderingCheck check_of_spoiled(const Spoiled::Spoil& spoil) {
+  return check_rendering([&](const auto& ct_hu, const auto& model, auto beams) {
+    return std::make_unique<Spoiled>(make_renderer(RendererKind::kTrilinear, ct_hu, model, beams), spoil);
+  });
+}
+
+TEST(GpuCheck, LlvmpipePassesAndSaysByHowMuch) {
+  const GpuCheck& check = gpu_check(GlDevice::kSoftware);
+  EXPECT_EQ(check.failure, std::nullopt);
+  EXPECT_EQ(&gpu_check(GlDevice::kSoftware), &check) << "once per process";
+  EXPECT_GT(check.rendering.largest, 0.0);
+  EXPECT_GT(check.rendering.samples_per_second, 0.0);
+  EXPECT_LT(check.similarity.largest, 1e-5);
+  EXPECT_THAT(check.words(), testing::StartsWith("passed, line integrals within 0.0"));
+}
+
+TEST(GpuCheck, TheGpuPasses_hardware) {
+  ISOSHIFT_SKIP_WITHOUT_GPU();
+  EXPECT_EQ(gpu_check(GlDevice::kHardware).failure, std::nullopt);
+}
+
+TEST(GpuCheck, WeightsOfEightBitsPass) {
+  for (const Filtering filtering : {Filtering::kTextureUnits, Filtering::kEightBitWeights}) {
+    const RenderingCheck check = check_rendering(
+        [&](const auto& ct_hu, const auto& model, auto beams) { return on_llvmpipe(ct_hu, model, beams, filtering); });
+    EXPECT_EQ(check.failure, std::nullopt);
+  }
+}
+
+TEST(GpuCheck, SamplesATenthOfAVoxelBesideFail) {
+  for (int axis = 0; axis < 3; ++axis) {
+    Vector3d moved = Vector3d::Zero();
+    moved[axis] = 0.1;
+    EXPECT_THAT(check_of_moved(Eigen::Affine3d(Eigen::Translation3d(moved))).failure.value_or("passed"),
+                HasSubstr("its line integrals differ from the reference by"));
+  }
+}
+
+TEST(GpuCheck, AxesThatAreSwappedFail) {
+  Eigen::Affine3d swapped = Eigen::Affine3d::Identity();
+  swapped.linear() << 0, 1, 0, 1, 0, 0, 0, 0, 1;
+  EXPECT_NE(check_of_moved(swapped).failure, std::nullopt);
+}
+
+TEST(GpuCheck, VoxelsWithoutInterpolationFail) {
+  EXPECT_NE(check_rendering([](const auto& ct_hu, const auto& model, auto beams) {
+              return make_renderer(RendererKind::kSiddon, ct_hu, model, beams);
+            }).failure,
+            std::nullopt);
+}
+
+TEST(GpuCheck, ABeamInsteadOfTheOtherFails) {
+  EXPECT_NE(check_rendering([](const auto& ct_hu, const auto& model, auto) {
+              const Volume<float> kv = attenuation_volume(ct_hu, model, Beam::kKilovoltage);
+              return make_renderer(RendererKind::kTrilinear,
+                                   AttenuationByBeam{{Beam::kKilovoltage, kv}, {Beam::kMegavoltage, kv}});
+            }).failure,
+            std::nullopt);
+}
+
+TEST(GpuCheck, APixelThatIsNotWrittenFails) {
+  EXPECT_THAT(check_of_spoiled([](auto& line_integrals, std::size_t) {
+                line_integrals.back() = std::numeric_limits<float>::quiet_NaN();
+              }).failure.value_or("passed"),
+              HasSubstr("not every pixel was rendered"));
+}
+
+TEST(GpuCheck, ABlackImageFails) {
+  EXPECT_NE(
+      check_of_spoiled([](auto& line_integrals, std::size_t) { std::ranges::fill(line_integrals, 0.0F); }).failure,
+      std::nullopt);
+}
+
+TEST(GpuCheck, AnImageThatDependsOnOthersFails) {
+  EXPECT_THAT(check_of_spoiled([](auto& line_integrals, std::size_t poses) {
+                if (poses > 1) line_integrals.back() *= 1.0001F;
+                line_integrals[line_integrals.size() / 2] *= poses > 1 ? 1.0001F : 1.0F;
+              }).failure.value_or("passed"),
+              HasSubstr("an image depends on what is rendered beside it"));
+}
+
+TEST(GpuCheck, DispatchesGrowWithTheSpeedOfADevice) {
+  EXPECT_EQ(rays_per_dispatch(1e7), std::size_t{1} << 16);
+  EXPECT_EQ(rays_per_dispatch(1e9), 250000U);
+  EXPECT_EQ(rays_per_dispatch(1e12), std::size_t{1} << 24);
+}
+
+}  // namespace
+}  // namespace isoshift::gpu_check_test
