@@ -3,13 +3,15 @@
 #include <benchmark/benchmark.h>
 
 #include "bench/scene.h"
+#include "drr/gl/context.h"
 #include "registration/presets.h"
 
 namespace isoshift {
 namespace {
 
-void register_two_views(benchmark::State& state, const char* name) {
-  const RendererPyramid renderers(RendererKind::kCpu, bench_ct(), {}, std::array{Beam::kKilovoltage});
+void register_two_views(benchmark::State& state, const char* name, RendererKind kind, GlDevice gl) {
+  if (uses_gl(kind) && gl == GlDevice::kHardware && !has_hardware_gl()) return state.SkipWithError("no GPU here");
+  const RendererPyramid renderers(kind, bench_ct(), {}, std::array{Beam::kKilovoltage}, {.gl = gl});
   Placement placement;
   placement.translation_mm = Eigen::Vector3d(6, -6, 5);
   placement.rotation_deg = Eigen::Vector3d(2, -1.5, 1.5);
@@ -36,9 +38,24 @@ void register_two_views(benchmark::State& state, const char* name) {
   state.counters["rendering_share"] = rendering / seconds;  // of the search; checks render, too
   state.counters["similarity_share"] = similarity / seconds;
 }
-BENCHMARK_CAPTURE(register_two_views, setup, "setup")->UseRealTime()->Unit(benchmark::kMillisecond)->Iterations(5);
-BENCHMARK_CAPTURE(register_two_views, fast, "fast")->UseRealTime()->Unit(benchmark::kMillisecond)->Iterations(5);
-BENCHMARK_CAPTURE(register_two_views, paper, "paper")->UseRealTime()->Unit(benchmark::kMillisecond)->Iterations(5);
+
+const bool kRegistered = [] {
+  struct On {
+    const char* suffix;
+    RendererKind kind;
+    GlDevice gl;
+  };
+  for (const char* name : {"setup", "fast", "paper"})
+    for (const On& on : {On{"", RendererKind::kCpu, GlDevice::kHardware},
+                         On{"/raycast_software", RendererKind::kRaycast, GlDevice::kSoftware},
+                         On{"/raycast_hardware", RendererKind::kRaycast, GlDevice::kHardware}})
+      benchmark::RegisterBenchmark((std::string("register_two_views/") + name + on.suffix).c_str(), register_two_views,
+                                   name, on.kind, on.gl)
+          ->UseRealTime()
+          ->Unit(benchmark::kMillisecond)
+          ->Iterations(5);
+  return true;
+}();
 
 }  // namespace
 }  // namespace isoshift
