@@ -5,7 +5,7 @@
 
 #include <algorithm>
 #include <array>
-#include <exception>
+#include <mutex>
 
 #include "base/error.h"
 #include "drr/gl/egl.h"
@@ -208,7 +208,9 @@ std::optional<double> seconds_of(const GlTimer& timer, const GlContext& context)
 int count_gpus() { return missing_gl_library() ? 0 : static_cast<int>(candidates(GlDevice::kHardware).size()); }
 
 std::optional<std::string> why_no_gpu(const std::string& gpu) {
+  static std::mutex asking;
   static std::map<std::string, std::optional<std::string>> known;
+  const std::lock_guard lock(asking);
   const auto [at, is_new] = known.try_emplace(gpu);
   if (is_new) try {
       gl_context({GlDevice::kHardware, gpu});

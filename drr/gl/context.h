@@ -62,7 +62,8 @@ class GlContext {
 };
 
 // The context of this process for that choice, which all renderers share: opened when first asked for and kept to the
-// end; opened anew where the last one was lost. Throws Error as GlContext does.
+// end; opened anew where the last one was lost. All that renders with it is of one thread. Throws Error as GlContext
+// does.
 GlContext& gl_context(const GlChoice& choice);
 
 // What a timer of this context has counted; nothing on llvmpipe, whose clock stands still for compute shaders and has
@@ -72,7 +73,7 @@ std::optional<double> seconds_of(const GlTimer& timer, const GlContext& context)
 // GPUs that EGL knows, whether they work or not.
 int count_gpus();
 
-// Why no hardware context can be had; nothing where one can. Tried once per process and choice.
+// Why no hardware context can be had; nothing where one can. Tried once per process and choice; from any thread.
 std::optional<std::string> why_no_gpu(const std::string& gpu = {});
 inline bool has_hardware_gl() { return !why_no_gpu(); }
 

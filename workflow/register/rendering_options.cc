@@ -102,9 +102,9 @@ std::vector<std::pair<std::string, std::string>> RenderingOptions::settings() co
   const RendererKind chosen = kind();
   const RendererOptions used = options();
   std::vector<std::pair<std::string, std::string>> settings;
+  if (const auto why = why_cpu()) settings.emplace_back("chosen_because", *why);
   const VolumePrecision kept = is_oracle(chosen) ? VolumePrecision::kF32 : used.precision.value_or(kDefaultPrecision);
   settings.emplace_back("precision", to_string(kept));
-  if (const auto why = why_cpu()) settings.emplace_back("chosen_because", *why);
   if (chosen == RendererKind::kRaycast) {
     const GpuCheck& checked = gpu_check(used.gl);
     settings.emplace_back("driver", checked.driver);
