@@ -55,6 +55,7 @@ SimilarityCheck check_similarities(GlContext& context) {
   SimilarityCheck result;
   for (const SimilarityKind kind : kSimilarityKinds) {
     std::vector<Comparison> comparisons;
+    comparisons.reserve(kTestViews);
     for (unsigned view = 0; view < kTestViews; ++view)
       comparisons.emplace_back(kind, made_up_image(view),
                                kind == SimilarityKind::kGradientCorrelation ? inner_pixels() : std::vector<Neighbors>(),

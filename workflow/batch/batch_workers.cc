@@ -111,6 +111,22 @@ std::list<BatchJob>::iterator next_for(const Worker& worker, std::list<BatchJob>
   return free != jobs.end() ? free : jobs.begin();
 }
 
+using Workers = std::list<std::unique_ptr<Worker>>;
+
+// Starts workers, up to that many in all, while there are more jobs than idle workers.
+void start_workers(std::size_t most, std::size_t jobs, Workers& workers, int& started) {
+  auto idle = static_cast<std::size_t>(std::ranges::count_if(workers, [](const auto& w) { return !w->job(); }));
+  for (; workers.size() < most && idle < jobs; ++idle) workers.push_back(std::make_unique<Worker>(started++));
+}
+
+// Until a worker has something to say, but not for long.
+void wait_for(const Workers& workers) {
+  constexpr int kPatienceMs = 200;
+  std::vector<pollfd> polled;
+  for (const auto& worker : workers) polled.push_back({.fd = worker->socket(), .events = POLLIN, .revents = 0});
+  ::poll(polled.data(), polled.size(), kPatienceMs);
+}
+
 }  // namespace
 
 void run_in_workers(
@@ -118,13 +134,11 @@ void run_in_workers(
     const std::function<void(const std::string& name, const std::optional<std::string>& failure)>& on_end,
     const std::function<bool()>& should_stop) {
   std::list<BatchJob> jobs(std::make_move_iterator(all.begin()), std::make_move_iterator(all.end()));
-  std::list<std::unique_ptr<Worker>> workers;
+  Workers workers;
   std::set<std::string> tried_twice;
-  int begun = 0;
+  int started = 0;
   for (;;) {
-    auto idle = static_cast<std::size_t>(std::ranges::count_if(workers, [](const auto& w) { return !w->job(); }));
-    for (; workers.size() < static_cast<std::size_t>(count) && idle < jobs.size(); ++idle)
-      workers.push_back(std::make_unique<Worker>(begun++));
+    start_workers(static_cast<std::size_t>(count), jobs.size(), workers, started);
     for (const auto& worker : workers) {
       if (worker->job() || jobs.empty()) continue;
       const auto next = next_for(*worker, jobs, workers);
@@ -133,10 +147,7 @@ void run_in_workers(
     }
     if (should_stop() || std::ranges::none_of(workers, [](const auto& worker) { return worker->job().has_value(); }))
       return;
-    std::vector<pollfd> polled;
-    for (const auto& worker : workers) polled.push_back({.fd = worker->socket(), .events = POLLIN, .revents = 0});
-    constexpr int kPatienceMs = 200;
-    ::poll(polled.data(), polled.size(), kPatienceMs);
+    wait_for(workers);
     for (auto worker = workers.begin(); worker != workers.end();) {
       const auto now = worker++;
       const std::optional<Worker::JobEnd> end = (*now)->hear();

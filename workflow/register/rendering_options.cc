@@ -89,8 +89,8 @@ RendererOptions RenderingOptions::options() const {
 void RenderingOptions::take_gpu_of(int process) {
   const int gpus = count_gpus();
   if (gpu || gpus < 2 || gl_choice_from(gl, gpu).kind != GlDevice::kHardware || !uses_gl(kind())) return;
-  gpu = std::to_string(process % gpus);
-  if (why_cpu()) gpu.reset();
+  const std::string own = std::to_string(process % gpus);
+  if (!why_no_gpu(own) && !gpu_check({GlDevice::kHardware, own}).failure) gpu = own;
 }
 
 void RenderingOptions::check() const {
