@@ -23,12 +23,12 @@ def output_of(command, **more):
     return subprocess.run(command, capture_output=True, text=True, timeout=LIMIT_S, check=True, **more).stdout
 
 
-def machine(isoshift):
+def machine(devices):
     """What this machine is, as far as it tells."""
     with open("/proc/cpuinfo", encoding="utf-8") as lines:
         models = [line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")]
     found = {"processor": models[0] if models else platform.machine(), "threads": os.cpu_count(),
-             "system": platform.platform(), "devices": output_of([isoshift, "inspect", "--devices"]).splitlines()}
+             "system": platform.platform(), "devices": devices}
     try:
         query = ["nvidia-smi", "--query-gpu=name,driver_version,memory.total", "--format=csv,noheader"]
         found["nvidia_smi"] = output_of(query).splitlines()
@@ -75,13 +75,13 @@ def main():
     options = parser.parse_args()
     kind = "software" if options.software else "hardware"
     isoshift = options.release / "cli" / "isoshift"
-    devices = output_of([isoshift, "inspect", "--devices"])
-    line = next(line for line in devices.splitlines() if line.startswith(f"OpenGL, {kind}: "))
+    devices = output_of([isoshift, "inspect", "--devices"]).splitlines()
+    line = next(line for line in devices if line.startswith(f"OpenGL, {kind}: "))
     if ": none; " in line:
         sys.exit(f"error: {line}\n       ./dev gpu OUTPUT.json --software measures Mesa on the CPU instead")
     result = {"is_gpu": not options.software, "device": line.split(": ", 1)[1],
               "program": output_of([isoshift, "--version"]).strip(),
-              "made": time.strftime("%Y-%m-%dT%H:%M:%S%z"), "machine": machine(isoshift), "seconds": {}}
+              "made": time.strftime("%Y-%m-%dT%H:%M:%S%z"), "machine": machine(devices), "seconds": {}}
     steps = {"tests": lambda: tests(options.unit_tests, kind), "table1": lambda: table1(isoshift, kind),
              "benchmarks": lambda: benchmarks(options.release / "bench" / "isoshift_bench", kind)}
     status = 0
@@ -90,7 +90,7 @@ def main():
         begin = time.monotonic()
         try:
             result[name] = step()
-        except subprocess.SubprocessError as error:
+        except (OSError, subprocess.SubprocessError) as error:
             result[name] = {"error": str(error)}
             status = 1
         result["seconds"][name] = round(time.monotonic() - begin, 1)

@@ -20,6 +20,9 @@ bool has_word(const char* list, const char* word) {
   return list != nullptr && (" " + std::string(list) + " ").find(" " + std::string(word) + " ") != std::string::npos;
 }
 
+// Whether EGL itself has an extension, before there is a display.
+bool has_client_extension(const char* name) { return has_word(eglQueryString(EGL_NO_DISPLAY, EGL_EXTENSIONS), name); }
+
 // The file by which the system knows a device, if EGL tells it.
 std::string node_of(EGLDeviceEXT device) {
   const char* extensions = eglQueryDeviceStringEXT(device, EGL_EXTENSIONS);
@@ -42,8 +45,6 @@ std::optional<std::string> missing_gl_library() {
   }();
   return missing;
 }
-
-bool has_client_extension(const char* name) { return has_word(eglQueryString(EGL_NO_DISPLAY, EGL_EXTENSIONS), name); }
 
 std::vector<EglDevice> egl_devices() {
   const bool can_enumerate =

@@ -12,9 +12,6 @@ namespace isoshift {
 // A library without which libepoxy ends the process, so that it must be looked for first: what to tell people.
 std::optional<std::string> missing_gl_library();
 
-// Whether EGL itself has an extension, before there is a display.
-bool has_client_extension(const char* name);
-
 struct EglDevice {
   EGLDeviceEXT handle = EGL_NO_DEVICE_EXT;
   bool is_software = false;  // Mesa's own on the CPU

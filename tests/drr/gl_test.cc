@@ -157,25 +157,23 @@ TEST_F(GlEnvironment, WithoutAnEglDriverTheReasonIsSaid) {
   EXPECT_THAT(outcome.out, HasSubstr("--renderer auto is cpu: no hardware OpenGL: there is no GPU that EGL knows"));
 }
 
-TEST_F(GlEnvironment, WithoutTheEglLibraryTheReasonIsSaid) {
-  const CommandOutcome outcome = run_shell(fmt::format(
-      "unshare -m sh -c 'mount --bind /dev/null \"$(readlink -f /usr/lib/*/libEGL.so.1)\" && {} inspect --devices'",
-      ISOSHIFT_PROGRAM));
-  if (outcome.out.find("unshare") != std::string::npos || outcome.out.find("mount") != std::string::npos)
-    GTEST_SKIP() << "no mount namespace can be made here; needs root";
-  EXPECT_EQ(outcome.exit_status, 0);
-  EXPECT_THAT(outcome.out, HasSubstr("the library libEGL.so.1 is missing (Debian package libegl1)"));
-}
-
-TEST_F(GlEnvironment, WithoutTheOpenGlLibrariesTheReasonIsSaid) {
-  const CommandOutcome outcome = run_shell(fmt::format(
-      "unshare -m sh -c 'for library in /usr/lib/*/libOpenGL.so.0 /usr/lib/*/libGL.so.1; do "
-      "[ ! -e $library ] || mount --bind /dev/null \"$(readlink -f $library)\"; done; {} inspect --devices'",
-      ISOSHIFT_PROGRAM));
-  if (outcome.out.find("unshare") != std::string::npos || outcome.out.find("mount") != std::string::npos)
-    GTEST_SKIP() << "no mount namespace can be made here; needs root";
-  EXPECT_EQ(outcome.exit_status, 0);
-  EXPECT_THAT(outcome.out, HasSubstr("the library libOpenGL.so.0 is missing (Debian package libopengl0)"));
+TEST_F(GlEnvironment, WithoutTheLibrariesTheReasonIsSaid) {
+  struct Missing {
+    const char *files, *message;
+  };
+  for (const auto& [files, message] :
+       {Missing{"/usr/lib/*/libEGL.so.1", "the library libEGL.so.1 is missing (Debian package libegl1)"},
+        Missing{"/usr/lib/*/libOpenGL.so.0 /usr/lib/*/libGL.so.1",
+                "the library libOpenGL.so.0 is missing (Debian package libopengl0)"}}) {
+    const CommandOutcome outcome = run_shell(fmt::format(
+        "unshare -m sh -c 'for library in {}; do "
+        "[ ! -e $library ] || mount --bind /dev/null \"$(readlink -f $library)\"; done; {} inspect --devices'",
+        files, ISOSHIFT_PROGRAM));
+    if (outcome.out.find("unshare") != std::string::npos || outcome.out.find("mount") != std::string::npos)
+      GTEST_SKIP() << "no mount namespace can be made here; needs root";
+    EXPECT_EQ(outcome.exit_status, 0);
+    EXPECT_THAT(outcome.out, HasSubstr(message));
+  }
 }
 
 TEST_F(GlEnvironment, DevicesAreListedWithLimitsAndSelfCheck) {
