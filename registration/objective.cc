@@ -48,22 +48,24 @@ std::vector<std::uint32_t> drawn_pixels(const std::vector<std::uint32_t>& pixels
 }
 
 // Gradients need their neighbors rendered, too: pixels are taken in square patches, which share them, and those with
-// the strongest gradients of the DRR first. Where it has none, there is only noise to compare.
-std::vector<std::uint32_t> strongest_pixels(const std::vector<std::uint32_t>& pixels, const Image<float>& drr,
-                                            const ObjectiveOptions& options) {
+// the strongest gradients of the DRR first. Where it has none, there is only noise to compare. A DRR with pixels
+// `coarser` times as large tells that as well.
+std::vector<std::uint32_t> strongest_pixels(const std::vector<std::uint32_t>& pixels, int columns,
+                                            const Image<float>& drr, int coarser, const ObjectiveOptions& options) {
   struct Patch {
     double strength = 0.0;
     std::vector<std::uint32_t> pixels;
   };
   constexpr std::size_t kPatchEdge = 8;
-  const std::size_t patches_per_row = static_cast<std::size_t>(drr.columns) / kPatchEdge + 1;
-  std::vector<Patch> patches(patches_per_row * (static_cast<std::size_t>(drr.rows) / kPatchEdge + 1));
+  const std::size_t patches_per_row = static_cast<std::size_t>(columns) / kPatchEdge + 1;
+  std::vector<Patch> patches(pixels.empty() ? 0 : patches_per_row * (pixels.back() / columns / kPatchEdge + 1));
   for (const std::uint32_t pixel : pixels) {
-    const int column = static_cast<int>(pixel) % drr.columns, row = static_cast<int>(pixel) / drr.columns;
+    const int column = static_cast<int>(pixel) % columns, row = static_cast<int>(pixel) / columns;
     Patch& patch = patches[static_cast<std::size_t>(row) / kPatchEdge * patches_per_row +
                            static_cast<std::size_t>(column) / kPatchEdge];
-    const float along_row = drr.at(column + 1, row) - drr.at(column - 1, row);
-    const float along_column = drr.at(column, row + 1) - drr.at(column, row - 1);
+    const int c = std::clamp(column / coarser, 1, drr.columns - 2), r = std::clamp(row / coarser, 1, drr.rows - 2);
+    const float along_row = drr.at(c + 1, r) - drr.at(c - 1, r);
+    const float along_column = drr.at(c, r + 1) - drr.at(c, r - 1);
     patch.strength += along_row * along_row + along_column * along_column;
     patch.pixels.push_back(pixel);
   }
@@ -76,6 +78,32 @@ std::vector<std::uint32_t> strongest_pixels(const std::vector<std::uint32_t>& pi
   }
   std::ranges::sort(strongest);
   return strongest;
+}
+
+// The pixels and those beside, above and below them, in rising order.
+std::vector<std::uint32_t> with_neighbors(const std::vector<std::uint32_t>& pixels, const Image<std::uint8_t>& field) {
+  std::vector<std::uint8_t> is_wanted(field.pixels.size());
+  const auto columns = static_cast<std::uint32_t>(field.columns);
+  for (const std::uint32_t pixel : pixels)
+    for (const std::uint32_t wanted : {pixel, pixel - 1, pixel + 1, pixel - columns, pixel + columns})
+      is_wanted[wanted] = 1;
+  std::vector<std::uint32_t> all;
+  for (std::size_t pixel = 0; pixel < is_wanted.size(); ++pixel)
+    if (is_wanted[pixel] != 0) all.push_back(static_cast<std::uint32_t>(pixel));
+  return all;
+}
+
+// Where the neighbors of the pixels compared stand among those rendered.
+std::vector<Neighbors> neighbors_among(const std::vector<std::uint32_t>& rendered,
+                                       const std::vector<std::uint32_t>& compared, const Image<std::uint8_t>& field) {
+  std::vector<std::uint32_t> place(field.pixels.size());
+  for (std::size_t n = 0; n < rendered.size(); ++n) place[rendered[n]] = static_cast<std::uint32_t>(n);
+  const auto columns = static_cast<std::uint32_t>(field.columns);
+  std::vector<Neighbors> neighbors;
+  neighbors.reserve(compared.size());
+  for (const std::uint32_t pixel : compared)
+    neighbors.push_back({place[pixel - 1], place[pixel + 1], place[pixel - columns], place[pixel + columns]});
+  return neighbors;
 }
 
 }  // namespace
@@ -95,8 +123,13 @@ Objective::Objective(Renderer& renderer, std::span<const FixedImage> images, con
       add_view(image, drawn_pixels(field, options, random), about);
       continue;
     }
-    const RenderResult drr = renderer.render(std::span(&image.view, 1), std::span(&about, 1), PixelSet::all());
-    add_view(image, strongest_pixels(field, image_of(image.view, drr.line_integrals(0, 0)), options), about);
+    constexpr int kFewest = 8;
+    const int coarser = std::min(image.view.columns, image.view.rows) < kFewest ? 1 : 2;
+    const XrayView coarse = image.view.downscaled(coarser);
+    const RenderResult drr = renderer.render(std::span(&coarse, 1), std::span(&about, 1), PixelSet::all());
+    add_view(image,
+             strongest_pixels(field, image.view.columns, image_of(coarse, drr.line_integrals(0, 0)), coarser, options),
+             about);
   }
   if (ImagesOnGpu* gl = renderer_.on_gpu(); gl != nullptr && !comparisons_.empty())
     gl_similarity_ = std::make_unique<GlSimilarity>(gl->context(), comparisons_);
@@ -105,19 +138,11 @@ Objective::Objective(Renderer& renderer, std::span<const FixedImage> images, con
 Objective::~Objective() = default;
 
 void Objective::add_view(const FixedImage& image, std::vector<std::uint32_t> compared, const Eigen::Isometry3d& about) {
-  const auto columns = static_cast<std::uint32_t>(image.field.columns);
   std::vector<std::uint32_t> rendered = compared;
   std::vector<Neighbors> neighbors;
   if (similarity_ == SimilarityKind::kGradientCorrelation) {
-    for (const std::uint32_t pixel : compared)
-      rendered.insert(rendered.end(), {pixel - 1, pixel + 1, pixel - columns, pixel + columns});
-    std::ranges::sort(rendered);
-    rendered.erase(std::unique(rendered.begin(), rendered.end()), rendered.end());
-    const auto place = [&](std::uint32_t pixel) {
-      return static_cast<std::uint32_t>(std::ranges::lower_bound(rendered, pixel) - rendered.begin());
-    };
-    for (const std::uint32_t pixel : compared)
-      neighbors.push_back({place(pixel - 1), place(pixel + 1), place(pixel - columns), place(pixel + columns)});
+    rendered = with_neighbors(compared, image.field);
+    neighbors = neighbors_among(rendered, compared, image.field);
   }
   std::vector<float> xray;
   xray.reserve(rendered.size());
@@ -172,16 +197,14 @@ std::vector<std::vector<double>> Objective::per_view_on_gpu(std::span<const Eige
 
 std::vector<QuadraticModel> Objective::models(std::span<const Eigen::Isometry3d> room_from_patient) {
   const auto begin = Clock::now();
-  const RenderResult drrs = renderer_.render_with_derivatives(views_, room_from_patient, pixels_);
+  const RenderResult drrs = render_with_derivatives(room_from_patient);
   const double rendering = seconds_since(begin);
   const std::size_t views = views_.size();
   std::vector<QuadraticModel> of_views(room_from_patient.size() * views);
   parallel_for(std::size_t{0}, of_views.size(), [&](std::size_t n) {
     const std::size_t pose = n / views, view = n % views;
-    const std::span<const MotionDerivatives> derivatives = drrs.derivatives(pose, view);
-    const Eigen::Map<const PixelJacobian> jacobian(derivatives.front().data(),
-                                                   static_cast<Eigen::Index>(derivatives.size()), 6);
-    of_views[n] = comparisons_[view].model(drrs.line_integrals(pose, view), jacobian);
+    of_views[n] =
+        comparisons_[view].model(drrs.line_integrals(pose, view), pixel_jacobian(drrs.derivatives(pose, view)));
   });
   std::vector<QuadraticModel> means;
   const double share = 1.0 / static_cast<double>(views);

@@ -22,6 +22,11 @@ struct ObjectiveOptions {
 
 class GlSimilarity;
 
+// The derivatives of a rendered list by the motion of the patient, as they stand.
+inline Eigen::Map<const PixelJacobian> pixel_jacobian(std::span<const MotionDerivatives> derivatives) {
+  return {derivatives.front().data(), static_cast<Eigen::Index>(derivatives.size()), 6};
+}
+
 class Objective {
  public:
   // Compares inside each image's field. Borrows the renderer. Throws Error for a field of fewer than 100 pixels.
@@ -42,6 +47,10 @@ class Objective {
   // What the similarities are computed from.
   RenderResult render(std::span<const Eigen::Isometry3d> room_from_patient) {
     return renderer_.render(views_, room_from_patient, pixels_);
+  }
+  bool has_derivatives() const { return renderer_.has_derivatives(); }
+  RenderResult render_with_derivatives(std::span<const Eigen::Isometry3d> room_from_patient) {
+    return renderer_.render_with_derivatives(views_, room_from_patient, pixels_);
   }
   std::span<const XrayView> views() const { return views_; }
   const Comparison& comparison(std::size_t view) const { return comparisons_[view]; }

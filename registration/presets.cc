@@ -13,6 +13,7 @@ namespace {
 std::vector<Stage> setup_stages() {
   return {{.name = "coarse",
            .similarity = SimilarityKind::kStochasticRankCorrelation,
+           .optimizer = OptimizerKind::kLevenbergMarquardt,
            .pixel_mm = 5.0,
            .voxel_mm = 4.0,
            .candidates = 60,
@@ -25,6 +26,7 @@ std::vector<Stage> setup_stages() {
            .relative_tolerance = 0.02},
           {.name = "medium",
            .similarity = SimilarityKind::kStochasticRankCorrelation,
+           .optimizer = OptimizerKind::kLevenbergMarquardt,
            .pixel_mm = 2.5,
            .voxel_mm = 2.0,
            .pixel_fraction = 0.25,

@@ -7,6 +7,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "base/error.h"
+#include "base/parallel.h"
 #include "registration/preprocess/irradiated_field.h"
 #include "registration/preprocess/mat.h"
 
@@ -125,7 +126,7 @@ FixedImage reduced(const FixedImage& image, int factor) {
                     .irradiated = image.irradiated,
                     .label = image.label,
                     .reduced_by = image.reduced_by * factor};
-  for (int row = 0; row < result.field.rows; ++row)
+  parallel_for(0, result.field.rows, [&](int row) {
     for (int column = 0; column < result.field.columns; ++column) {
       double sum = 0.0;
       bool inside = true;
@@ -137,6 +138,7 @@ FixedImage reduced(const FixedImage& image, int factor) {
       result.line_integral.at(column, row) = static_cast<float>(sum / (factor * factor));
       result.field.at(column, row) = inside;
     }
+  });
   return result;
 }
 

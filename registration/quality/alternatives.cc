@@ -17,6 +17,7 @@ namespace {
 std::vector<Stage> short_stages() {
   return {{.name = "coarse",
            .similarity = SimilarityKind::kStochasticRankCorrelation,
+           .optimizer = OptimizerKind::kLevenbergMarquardt,
            .pixel_mm = 5.0,
            .voxel_mm = 4.0,
            .pixel_fraction = 0.35,
@@ -26,6 +27,7 @@ std::vector<Stage> short_stages() {
            .max_evaluations = 80},
           {.name = "medium",
            .similarity = SimilarityKind::kGradientCorrelation,
+           .optimizer = OptimizerKind::kLevenbergMarquardt,
            .pixel_mm = 4.0,
            .voxel_mm = 3.0,
            .pixel_fraction = 0.4,

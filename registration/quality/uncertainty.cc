@@ -2,6 +2,7 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
+#include <algorithm>
 #include <cmath>
 #include <map>
 
@@ -11,7 +12,6 @@ namespace isoshift {
 namespace {
 
 constexpr double kCorrelationMm = 25.0;  // residuals are alike over about this distance, at the isocenter
-constexpr double kStepMm = 0.3;          // of the differences, also of rotations on the sphere of kLeverMm
 
 // What the sandwich leaves out: errors common to all tiles, such as those of the model of beam and scatter, and of
 // voxels of finite size. The factor and the floors bring the share of true errors within one and two sigma to about 68
@@ -22,78 +22,127 @@ constexpr double kFloorVoxels = 0.03, kFloorMm = 0.025;
 // `chest-breathing` lay at 2 to 3.4 sigma on four axes.
 constexpr double kOverlap = 2.0;
 
-// Centered, and of unit norm.
-Eigen::VectorXd normalized(const std::vector<float>& values) {
-  Eigen::VectorXd result =
-      Eigen::Map<const Eigen::VectorXf>(values.data(), static_cast<Eigen::Index>(values.size())).cast<double>();
-  result.array() -= result.mean();
-  const double norm = result.norm();
-  if (norm > 0.0) result /= norm;
+using Values = Eigen::Map<const Eigen::VectorXf>;
+Values values_of(std::span<const float> list) { return {list.data(), static_cast<Eigen::Index>(list.size())}; }
+
+// Line integrals of all views at a pose, and how they change with its parameters.
+class Linearized {
+ public:
+  Linearized(Objective& objective, const Eigen::Isometry3d& pose, int axes)
+      : drrs_(objective.has_derivatives() ? objective.render_with_derivatives(std::span(&pose, 1))
+                                          : objective.render(poses_around(pose, axes))),
+        has_derivatives_(objective.has_derivatives()),
+        axes_(axes) {}
+
+  std::span<const float> line_integrals(std::size_t view) const { return drrs_.line_integrals(0, view); }
+
+  PixelJacobian jacobian(std::size_t view) const {
+    if (has_derivatives_) {
+      const std::vector<double> at_the_pose(static_cast<std::size_t>(axes_), 0.0);
+      return pixel_jacobian(drrs_.derivatives(0, view)) * motions_per_parameter(at_the_pose).cast<float>();
+    }
+    PixelJacobian jacobian(static_cast<Eigen::Index>(line_integrals(view).size()), axes_);
+    for (int axis = 0; axis < axes_; ++axis) {
+      const std::size_t before = 2 * static_cast<std::size_t>(axis) + 1;
+      jacobian.col(axis) =
+          (values_of(drrs_.line_integrals(before + 1, view)) - values_of(drrs_.line_integrals(before, view))) /
+          static_cast<float>(2.0 * kStepMm);
+    }
+    return jacobian;
+  }
+
+ private:
+  static constexpr double kStepMm = 0.3;  // of central differences, also of rotations, on the sphere of kLeverMm
+
+  // The pose itself, and for each axis the poses a step before and after it.
+  static std::vector<Eigen::Isometry3d> poses_around(const Eigen::Isometry3d& pose, int axes) {
+    std::vector<Eigen::Isometry3d> poses = {pose};
+    for (int axis = 0; axis < axes; ++axis)
+      for (const double step : {-kStepMm, kStepMm}) {
+        std::vector<double> parameters(static_cast<std::size_t>(axes), 0.0);
+        parameters[static_cast<std::size_t>(axis)] = step;
+        poses.push_back(setup_error_from_parameters(parameters) * pose);
+      }
+    return poses;
+  }
+
+  RenderResult drrs_;
+  bool has_derivatives_;
+  int axes_;
+};
+
+Eigen::VectorXd centered(std::span<const float> list) {
+  Eigen::VectorXd values = values_of(list).cast<double>();
+  values.array() -= values.mean();
+  return values;
+}
+
+// A list, centered and of unit norm, and how that changes with the parameters; zeros where the list is constant.
+struct Normalized {
+  Eigen::VectorXd values;
+  Eigen::MatrixXd derivative;
+};
+Normalized normalized(std::span<const float> list, const PixelJacobian& jacobian) {
+  Normalized result{.values = centered(list), .derivative = jacobian.cast<double>()};
+  const double norm = result.values.norm();
+  if (!(norm > 0.0)) return {.values = result.values, .derivative = 0.0 * result.derivative};
+  result.values /= norm;
+  result.derivative.rowwise() -= result.derivative.colwise().mean().eval();
+  result.derivative /= norm;
+  result.derivative -= (result.values * (result.values.transpose() * result.derivative)).eval();
   return result;
 }
 
 // The curvature and the scatter, summed over views and directions.
 struct Sandwich {
   Eigen::MatrixXd curvature, scatter;
-  int tiles = 0;
+  Eigen::Index tiles = 0;
 };
 
-// Residuals and derivatives of one view along one direction, added to the scores of its tiles. What does not correlate
-// at all does not bend the similarity.
-void add(const Eigen::VectorXd& residual, const Eigen::MatrixXd& derivative, double correlation,
-         std::span<const int> tile_of, Eigen::MatrixXd& curvature, std::map<int, Eigen::VectorXd>& scores) {
-  curvature += correlation * derivative.transpose() * derivative;
-  for (Eigen::Index n = 0; n < residual.size(); ++n) {
-    auto [score, is_new] = scores.try_emplace(tile_of[static_cast<std::size_t>(n)]);
-    if (is_new) score->second = Eigen::VectorXd::Zero(derivative.cols());
-    score->second += residual[n] * derivative.row(n).transpose();
+// For each pixel compared, the number of its tile among those that have pixels.
+std::vector<Eigen::Index> tiles_of(std::span<const std::uint32_t> pixels, const XrayView& camera) {
+  const int tile_px = std::max(1, static_cast<int>(std::lround(kCorrelationMm * pixels_per_mm(camera))));
+  std::map<int, Eigen::Index> numbers;
+  std::vector<Eigen::Index> tiles;
+  tiles.reserve(pixels.size());
+  for (const std::uint32_t pixel : pixels) {
+    const int column = static_cast<int>(pixel) % camera.columns, row = static_cast<int>(pixel) / camera.columns;
+    const int place = row / tile_px * camera.columns + column / tile_px;
+    tiles.push_back(numbers.try_emplace(place, static_cast<Eigen::Index>(numbers.size())).first->second);
   }
+  return tiles;
 }
 
 Sandwich sandwich_at(Objective& objective, const Eigen::Isometry3d& pose, int axes) {
-  std::vector<Eigen::Isometry3d> poses = {pose};
-  for (int axis = 0; axis < axes; ++axis)
-    for (const double step : {-kStepMm, kStepMm}) {
-      std::vector<double> parameters(static_cast<std::size_t>(axes), 0.0);
-      parameters[static_cast<std::size_t>(axis)] = step;
-      poses.push_back(setup_error_from_parameters(parameters) * pose);
-    }
-  const RenderResult drrs = objective.render(poses);
-
+  const Linearized drrs(objective, pose, axes);
   Sandwich sandwich{.curvature = Eigen::MatrixXd::Zero(axes, axes), .scatter = Eigen::MatrixXd::Zero(axes, axes)};
   for (std::size_t view = 0; view < objective.views().size(); ++view) {
     const Comparison& comparison = objective.comparison(view);
-    const XrayView& camera = objective.views()[view];
-    const int tile_px = std::max(1, static_cast<int>(std::lround(kCorrelationMm * pixels_per_mm(camera))));
-    std::vector<int> tile_of;
-    for (const std::uint32_t pixel : objective.compared_pixels(view)) {
-      const int column = static_cast<int>(pixel) % camera.columns, row = static_cast<int>(pixel) / camera.columns;
-      tile_of.push_back(row / tile_px * camera.columns + column / tile_px);
-    }
-    std::vector<Gradients> of_pose;
-    of_pose.reserve(poses.size());
-    for (std::size_t p = 0; p < poses.size(); ++p)
-      of_pose.push_back(gradients(drrs.line_integrals(p, view), comparison.neighbors()));
-    std::map<int, Eigen::VectorXd> scores;
-    for (const auto direction : {&Gradients::along_row, &Gradients::along_column}) {
-      const Eigen::VectorXd xray = normalized(comparison.xray_gradients().*direction);
-      const Eigen::VectorXd drr = normalized(of_pose.front().*direction);
-      Eigen::MatrixXd derivative(drr.size(), axes);
-      for (int axis = 0; axis < axes; ++axis)
-        derivative.col(axis) =
-            (normalized(of_pose[2 * axis + 2].*direction) - normalized(of_pose[2 * axis + 1].*direction)) /
-            (2.0 * kStepMm);
-      add(xray - drr, derivative, xray.dot(drr), tile_of, sandwich.curvature, scores);
-    }
-    for (const auto& [tile, score] : scores) sandwich.scatter += score * score.transpose();
-    sandwich.tiles += static_cast<int>(scores.size());
+    const std::vector<Eigen::Index> tiles = tiles_of(objective.compared_pixels(view), objective.views()[view]);
+    const Eigen::Index count = tiles.empty() ? 0 : *std::ranges::max_element(tiles) + 1;
+    const Gradients drr = gradients(drrs.line_integrals(view), comparison.neighbors());
+    const GradientJacobians change = gradient_jacobians(drrs.jacobian(view), comparison.neighbors());
+    Eigen::MatrixXd scores = Eigen::MatrixXd::Zero(axes, count);
+    const auto add = [&](std::span<const float> of_xray, std::span<const float> of_drr, const PixelJacobian& jacobian) {
+      const Eigen::VectorXd x = centered(of_xray).normalized();
+      const Normalized d = normalized(of_drr, jacobian);
+      // What does not correlate at all does not bend the similarity.
+      sandwich.curvature += x.dot(d.values) * d.derivative.transpose() * d.derivative;
+      const Eigen::VectorXd residual = x - d.values;
+      for (Eigen::Index n = 0; n < residual.size(); ++n)
+        scores.col(tiles[static_cast<std::size_t>(n)]) += residual[n] * d.derivative.row(n).transpose();
+    };
+    add(comparison.xray_gradients().along_row, drr.along_row, change.along_row);
+    add(comparison.xray_gradients().along_column, drr.along_column, change.along_column);
+    sandwich.scatter += scores * scores.transpose();
+    sandwich.tiles += count;
   }
   return sandwich;
 }
 
 // Sandwiches of few tiles are too thin.
 double small_sample(const Sandwich& sandwich, int axes) {
-  return sandwich.tiles > axes ? static_cast<double>(sandwich.tiles) / (sandwich.tiles - axes) : 1e6;
+  return sandwich.tiles > axes ? static_cast<double>(sandwich.tiles) / static_cast<double>(sandwich.tiles - axes) : 1e6;
 }
 
 }  // namespace

@@ -80,6 +80,13 @@ double normalized_mutual_information(const JointHistogram& histogram);  // 1 whe
 // How the pixels of a DRR change with some parameters: a row per pixel, a column per parameter.
 using PixelJacobian = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
+// How gradients() of the pixels change, a row per pixel that has all neighbors.
+struct GradientJacobians {
+  PixelJacobian along_row, along_column;
+};
+GradientJacobians gradient_jacobians(const Eigen::Ref<const PixelJacobian>& jacobian,
+                                     std::span<const Neighbors> neighbors);
+
 // The X-ray's side of one view, prepared once.
 class Comparison {
  public:

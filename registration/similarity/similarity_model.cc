@@ -24,15 +24,6 @@ QuadraticModel correlation_of(std::span<const float> xray, std::span<const float
   return correlation_model(centered(xray), centered(drr), std::move(of_drr));
 }
 
-// The differences of the Jacobian's rows that gradients() takes of pixels.
-PixelJacobian differences(const JacobianRef& jacobian, std::span<const Neighbors> neighbors,
-                          std::uint32_t Neighbors::* from, std::uint32_t Neighbors::* to) {
-  PixelJacobian result(static_cast<Index>(neighbors.size()), jacobian.cols());
-  for (std::size_t n = 0; n < neighbors.size(); ++n)
-    result.row(static_cast<Index>(n)) = jacobian.row(neighbors[n].*to) - jacobian.row(neighbors[n].*from);
-  return result;
-}
-
 // How histogram_ranks() change. A pixel that moves among the bins changes its own rank, and takes others with it: by
 // moving a share from bin b to the next it lowers the ranks at the middles of both by half of that.
 PixelJacobian jacobian_of_ranks(const RankedPlaces& ranked, std::span<const float> drr, const Range& range,
@@ -103,17 +94,26 @@ QuadraticModel information_model(SimilarityKind kind, std::span<const std::uint3
 
 }  // namespace
 
+GradientJacobians gradient_jacobians(const JacobianRef& jacobian, std::span<const Neighbors> neighbors) {
+  const auto count = static_cast<Index>(neighbors.size());
+  GradientJacobians result{.along_row = PixelJacobian(count, jacobian.cols()),
+                           .along_column = PixelJacobian(count, jacobian.cols())};
+  for (Index n = 0; n < count; ++n) {
+    const Neighbors& around = neighbors[static_cast<std::size_t>(n)];
+    result.along_row.row(n) = jacobian.row(around.right) - jacobian.row(around.left);
+    result.along_column.row(n) = jacobian.row(around.below) - jacobian.row(around.above);
+  }
+  return result;
+}
+
 QuadraticModel Comparison::model(std::span<const float> drr, const Eigen::Ref<const PixelJacobian>& jacobian) const {
   switch (kind_) {
     case SimilarityKind::kNcc: return correlation_of(values_, drr, jacobian);
     case SimilarityKind::kGradientCorrelation: {
       const Gradients of_drr = gradients(drr, neighbors_);
-      return weighted_sum(0.5,
-                          correlation_of(gradients_.along_row, of_drr.along_row,
-                                         differences(jacobian, neighbors_, &Neighbors::left, &Neighbors::right)),
-                          0.5,
-                          correlation_of(gradients_.along_column, of_drr.along_column,
-                                         differences(jacobian, neighbors_, &Neighbors::above, &Neighbors::below)));
+      const GradientJacobians change = gradient_jacobians(jacobian, neighbors_);
+      return weighted_sum(0.5, correlation_of(gradients_.along_row, of_drr.along_row, change.along_row), 0.5,
+                          correlation_of(gradients_.along_column, of_drr.along_column, change.along_column));
     }
     case SimilarityKind::kStochasticRankCorrelation: {
       const RankedPlaces ranked = ranked_places(drr, drr_range_);

@@ -46,6 +46,36 @@ TEST(Uncertainty, MoreNoiseMakesEveryAxisLessCertain) {
   }
 }
 
+// A renderer that does not tell its derivatives.
+class WithoutDerivatives : public Renderer {
+ public:
+  explicit WithoutDerivatives(Renderer& renderer) : renderer_(renderer) {}
+  RenderResult render(std::span<const XrayView> views, std::span<const Eigen::Isometry3d> room_from_patient,
+                      const PixelSet& pixels) override {
+    return renderer_.render(views, room_from_patient, pixels);
+  }
+  RendererKind kind() const override { return renderer_.kind(); }
+  std::string device() const override { return renderer_.device(); }
+
+ private:
+  Renderer& renderer_;
+};
+
+TEST(Uncertainty, IsTheSameFromDerivativesAndFromDifferences) {
+  const RegistrationScene scene = make_scene(small_scene(1000.0));
+  WithoutDerivatives plain(scene.renderers->finest());
+  const auto sigmas_of = [&](Renderer& renderer) {
+    Objective objective(renderer, scene.images, scene.actual(), {.similarity = SimilarityKind::kGradientCorrelation});
+    const Uncertainty said = estimated_uncertainty(objective, scene.actual(), {}).value();
+    Eigen::Matrix<double, 6, 1> sigmas;
+    sigmas << said.sigma_translation_mm(), said.sigma_rotation_rad();
+    return sigmas;
+  };
+  const auto by_derivatives = sigmas_of(scene.renderers->finest()), by_differences = sigmas_of(plain);
+  for (int axis = 0; axis < 6; ++axis)
+    EXPECT_NEAR(by_derivatives[axis] / by_differences[axis], 1.0, 0.1) << "axis " << axis;
+}
+
 // The truth known, the pose found in many draws of the noise: how far it lies off, and what was said about that.
 TEST(Uncertainty, SaysHowFarOffNoisyRegistrationsEnd) {
   constexpr int kDraws = 24;
