@@ -4,12 +4,19 @@
 
 namespace isoshift {
 
-Eigen::Matrix4d Camera::matrix() const {
-  Eigen::Matrix4d voxel_from_pixel = Eigen::Matrix4d::Identity();
-  voxel_from_pixel.topLeftCorner<3, 3>() = way_voxel_from_pixel;
-  voxel_from_pixel.topRightCorner<3, 1>() = source_voxel;
-  return voxel_from_pixel;
+namespace {
+
+Eigen::Matrix4d matrix_of(const Eigen::Matrix3d& way_from_pixel, const Eigen::Vector3d& source) {
+  Eigen::Matrix4d matrix = Eigen::Matrix4d::Identity();
+  matrix.topLeftCorner<3, 3>() = way_from_pixel;
+  matrix.topRightCorner<3, 1>() = source;
+  return matrix;
 }
+
+}  // namespace
+
+Eigen::Matrix4d Camera::matrix() const { return matrix_of(way_voxel_from_pixel, source_voxel); }
+Eigen::Matrix4d Camera::room_matrix() const { return matrix_of(way_room_from_pixel, source_room_mm); }
 
 Camera make_camera(const XrayView& view, const Eigen::Isometry3d& room_from_patient,
                    const Eigen::Affine3d& voxel_from_patient) {

@@ -19,8 +19,9 @@ struct Camera {
   Eigen::Matrix3d way_room_from_pixel;
   Eigen::Matrix3d voxel_from_room_axes;
 
-  // As shaders take it: (column, row, 1, 0) to the way, (0, 0, 0, 1) to the source.
+  // As shaders take it: (column, row, 1, 0) to the way, (0, 0, 0, 1) to the source; in voxels, and in the room.
   Eigen::Matrix4d matrix() const;
+  Eigen::Matrix4d room_matrix() const;
 };
 
 Camera make_camera(const XrayView& view, const Eigen::Isometry3d& room_from_patient,

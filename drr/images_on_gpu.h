@@ -24,7 +24,8 @@ class ImagesOnGpu {
   // How many poses that is. Throws Error where not even one fits.
   virtual std::size_t poses_at_once(std::size_t pixels_per_pose) const = 0;
 
-  // Fills the buffer of so many line integrals with NaN: what the next images leave out then shows.
+  // Fills the buffers of so many line integrals and of their derivatives with NaN: what the next images leave out then
+  // shows.
   virtual void poison(std::size_t line_integrals) = 0;
 
   // Where the line integrals are.

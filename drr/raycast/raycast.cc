@@ -16,7 +16,7 @@ namespace {
 
 // Binding slots and uniform locations, as in raycast.comp.
 constexpr std::uint32_t kKvTexture = 0, kMvTexture = 1, kOccupiedTexture = 2;
-constexpr std::uint32_t kCameras = 0, kViews = 1, kPixels = 2, kResult = 3;
+constexpr std::uint32_t kCameras = 0, kViews = 1, kPixels = 2, kResult = 3, kRooms = 4, kDerivatives = 5;
 enum Uniform : int {
   kPoses = 0,
   kViewCount = 1,
@@ -38,9 +38,21 @@ struct GlView {
   std::uint32_t first_pixel, columns, is_mv, in_squares;
 };
 
-ShaderSource shader(Filtering filtering) {
-  const char* variant = filtering == Filtering::kEightBitWeights ? "#define EIGHT_BIT_WEIGHTS\n#line 1\n" : "";
-  return {variant + std::string(kRaycastComp), "drr/raycast/raycast.comp"};
+struct GlRoom {
+  glm::mat4 room_from_pixel, room_from_gradient;
+};
+
+ShaderSource shader(Filtering filtering, bool with_derivatives) {
+  std::string variant;
+  if (filtering == Filtering::kEightBitWeights) variant += "#define EIGHT_BIT_WEIGHTS\n";
+  if (with_derivatives) variant += "#define DERIVATIVES\n";
+  return {variant + "#line 1\n" + kRaycastComp, "drr/raycast/raycast.comp"};
+}
+
+GlRoom room_of(const Camera& camera) {
+  Eigen::Matrix4d room_from_gradient = Eigen::Matrix4d::Identity();
+  room_from_gradient.topLeftCorner<3, 3>() = camera.voxel_from_room_axes.transpose();
+  return {.room_from_pixel = to_glm(camera.room_matrix()), .room_from_gradient = to_glm(room_from_gradient)};
 }
 
 template <class T>
@@ -53,7 +65,8 @@ std::span<const std::byte> bytes_of(const std::vector<T>& values) {
 RaycastGlRenderer::RaycastGlRenderer(const Volume<float>& ct_hu, const AttenuationModel& model,
                                      std::span<const Beam> beams, const RendererOptions& options, Filtering filtering)
     : context_(gl_context(options.gl)),
-      program_(context_.program(shader(filtering))),
+      program_(context_.program(shader(filtering, false))),
+      filtering_(filtering),
       voxel_from_patient_(ct_hu.patient_from_voxel.inverse()),
       step_mm_(ct_hu.spacing_mm().minCoeff()),
       rays_per_dispatch_(std::max<std::size_t>(1, options.rays_per_dispatch)) {
@@ -78,21 +91,38 @@ RaycastGlRenderer::RaycastGlRenderer(const Volume<float>& ct_hu, const Attenuati
 
 RenderResult RaycastGlRenderer::render(std::span<const XrayView> views,
                                        std::span<const Eigen::Isometry3d> room_from_patient, const PixelSet& pixels) {
+  return render_all(views, room_from_patient, pixels, false);
+}
+
+RenderResult RaycastGlRenderer::render_with_derivatives(std::span<const XrayView> views,
+                                                        std::span<const Eigen::Isometry3d> room_from_patient,
+                                                        const PixelSet& pixels) {
+  return render_all(views, room_from_patient, pixels, true);
+}
+
+RenderResult RaycastGlRenderer::render_all(std::span<const XrayView> views,
+                                           std::span<const Eigen::Isometry3d> room_from_patient, const PixelSet& pixels,
+                                           bool with_derivatives) {
   context_.make_current();
   timer_.clear();
   std::vector<std::size_t> begins = checked_view_begins(views, room_from_patient, pixels);
   const std::size_t pixels_per_pose = begins.back();
   std::vector<float> line_integrals(pixels_per_pose * room_from_patient.size());
+  std::vector<MotionDerivatives> derivatives(with_derivatives ? line_integrals.size() : 0);
   upload_views(views, begins, pixels);
-  const std::size_t at_once = poses_at_once(pixels_per_pose);
+  const std::size_t at_once =
+      poses_at_once(pixels_per_pose, with_derivatives ? sizeof(MotionDerivatives) : sizeof(float));
   for (std::size_t first = 0; first < room_from_patient.size(); first += at_once) {
     const std::size_t count = std::min(at_once, room_from_patient.size() - first);
-    dispatch(views, room_from_patient.subspan(first, count), pixels_per_pose, !pixels.of_view.empty());
-    const auto part = std::span(line_integrals).subspan(first * pixels_per_pose, count * pixels_per_pose);
-    result_.download(std::as_writable_bytes(part));
+    dispatch(views, room_from_patient.subspan(first, count), pixels_per_pose, !pixels.of_view.empty(),
+             with_derivatives);
+    const std::size_t begin = first * pixels_per_pose, pixels_rendered = count * pixels_per_pose;
+    result_.download(std::as_writable_bytes(std::span(line_integrals).subspan(begin, pixels_rendered)));
+    if (with_derivatives)
+      derivatives_.download(std::as_writable_bytes(std::span(derivatives).subspan(begin, pixels_rendered)));
   }
   context_.check("rendering");
-  return RenderResult(std::move(line_integrals), std::move(begins));
+  return RenderResult(std::move(line_integrals), std::move(begins), std::move(derivatives));
 }
 
 const Buffer& RaycastGlRenderer::render_on_gpu(std::span<const XrayView> views,
@@ -104,14 +134,17 @@ const Buffer& RaycastGlRenderer::render_on_gpu(std::span<const XrayView> views,
   if (room_from_patient.size() > poses_at_once(begins.back()))
     throw Error("so many images exceed a storage buffer of this OpenGL");
   upload_views(views, begins, pixels);
-  dispatch(views, room_from_patient, begins.back(), !pixels.of_view.empty());
+  dispatch(views, room_from_patient, begins.back(), !pixels.of_view.empty(), false);
   context_.check("rendering");
   return result_;
 }
 
-// As many poses as one storage buffer can hold.
 std::size_t RaycastGlRenderer::poses_at_once(std::size_t pixels_per_pose) const {
-  const std::size_t pose_bytes = std::max<std::size_t>(1, pixels_per_pose * sizeof(float));
+  return poses_at_once(pixels_per_pose, sizeof(float));
+}
+
+std::size_t RaycastGlRenderer::poses_at_once(std::size_t pixels_per_pose, std::size_t pixel_bytes) const {
+  const std::size_t pose_bytes = std::max<std::size_t>(1, pixels_per_pose * pixel_bytes);
   const std::size_t count = static_cast<std::size_t>(context_.largest_buffer_bytes()) / pose_bytes;
   if (count == 0)
     throw Error("images of this size exceed the storage buffers of this OpenGL.\n       Use --renderer cpu");
@@ -122,6 +155,8 @@ void RaycastGlRenderer::poison(std::size_t line_integrals) {
   context_.make_current();
   result_.reserve(line_integrals * sizeof(float));
   result_.fill(std::numeric_limits<float>::quiet_NaN());
+  derivatives_.reserve(line_integrals * sizeof(MotionDerivatives));
+  derivatives_.fill(std::numeric_limits<float>::quiet_NaN());
 }
 
 void RaycastGlRenderer::upload_views(std::span<const XrayView> views, const std::vector<std::size_t>& begins,
@@ -141,18 +176,33 @@ void RaycastGlRenderer::upload_views(std::span<const XrayView> views, const std:
     list.clear();
     for (const auto& of_view : pixels.of_view) list.insert(list.end(), of_view.begin(), of_view.end());
   }
+  if (list == uploaded_pixels_) return;
   pixels_.upload(bytes_of(list));
+  uploaded_pixels_ = std::move(list);
 }
 
 void RaycastGlRenderer::dispatch(std::span<const XrayView> views, std::span<const Eigen::Isometry3d> poses,
-                                 std::size_t pixels_per_pose, bool has_pixel_list) {
+                                 std::size_t pixels_per_pose, bool has_pixel_list, bool with_derivatives) {
   std::vector<glm::mat4> cameras;
+  std::vector<GlRoom> rooms;
   for (const Eigen::Isometry3d& pose : poses)
-    for (const XrayView& view : views) cameras.push_back(to_glm(make_camera(view, pose, voxel_from_patient_).matrix()));
+    for (const XrayView& view : views) {
+      const Camera camera = make_camera(view, pose, voxel_from_patient_);
+      cameras.push_back(to_glm(camera.matrix()));
+      if (with_derivatives) rooms.push_back(room_of(camera));
+    }
   cameras_.upload(bytes_of(cameras));
   result_.reserve(poses.size() * pixels_per_pose * sizeof(float));
+  if (with_derivatives) {
+    rooms_.upload(bytes_of(rooms));
+    derivatives_.reserve(poses.size() * pixels_per_pose * sizeof(MotionDerivatives));
+    rooms_.bind(kRooms);
+    derivatives_.bind(kDerivatives);
+  }
 
-  program_.use();
+  if (with_derivatives && derivatives_program_ == nullptr)
+    derivatives_program_ = &context_.program(shader(filtering_, true));
+  (with_derivatives ? *derivatives_program_ : program_).use();
   const AttenuationTexture& kv = attenuation_.begin()->second;  // where a beam is absent, the other stands in unread
   const AttenuationTexture& mv = attenuation_.rbegin()->second;
   kv.texture.bind(kKvTexture);
@@ -170,8 +220,11 @@ void RaycastGlRenderer::dispatch(std::span<const XrayView> views, std::span<cons
   set_uniform(kBoxLow, box_low_);
   set_uniform(kBoxHigh, box_high_);
   glUniform2f(kUnitPerMm, static_cast<GLfloat>(kv.unit_per_mm), static_cast<GLfloat>(mv.unit_per_mm));
-  const std::size_t rays_each = std::clamp<std::size_t>(pixels_per_pose, 1, rays_per_dispatch_);
-  const std::size_t poses_each = std::max<std::size_t>(1, rays_per_dispatch_ / rays_each);
+  constexpr std::size_t kSamplesWithDerivatives = 7;
+  const std::size_t rays_at_once =
+      std::max<std::size_t>(1, rays_per_dispatch_ / (with_derivatives ? kSamplesWithDerivatives : 1));
+  const std::size_t rays_each = std::clamp<std::size_t>(pixels_per_pose, 1, rays_at_once);
+  const std::size_t poses_each = std::max<std::size_t>(1, rays_at_once / rays_each);
   for (std::size_t pose = 0; pose < poses.size(); pose += poses_each)
     for (std::size_t ray = 0; ray < pixels_per_pose; ray += rays_each) {
       const std::size_t poses_end = std::min(poses.size(), pose + poses_each),

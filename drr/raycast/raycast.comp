@@ -2,6 +2,7 @@
 // Positions are continuous voxel indices, lengths mm, attenuation 1/mm. The volume is sampled trilinearly at the middle
 // of equal steps of at most step_mm; outside of it the texture's border is 0. Blocks in which every sample would be 0 are
 // passed over by a walk from block to block (Amanatides and Woo, Eurographics 1987) (docs/renderers.md, "Ray casting").
+// With DERIVATIVES also how every line integral changes if the patient moves (docs/algorithms.md, "Derivatives").
 
 layout(local_size_x = 64) in;
 
@@ -21,6 +22,15 @@ layout(std430, binding = 0) readonly buffer Cameras { mat4 voxel_from_pixel[]; }
 layout(std430, binding = 1) readonly buffer Views { View views[]; };
 layout(std430, binding = 2) readonly buffer Pixels { uint pixels[]; };             // of one pose, where a list is given
 layout(std430, binding = 3) writeonly buffer Result { float line_integrals[]; };   // [pose][pixel]
+#ifdef DERIVATIVES
+// As the cameras, but of the room, mm; and how directions of voxels turn into those of the room for gradients.
+struct Room {
+  mat4 room_from_pixel;
+  mat4 room_from_gradient;
+};
+layout(std430, binding = 4) readonly buffer Rooms { Room rooms[]; };                // [pose][view]
+layout(std430, binding = 5) writeonly buffer Derivatives { float derivatives[]; };  // [pose][pixel][6]
+#endif
 
 layout(location = 0) uniform uvec2 poses;  // of this dispatch: the first, and the end
 layout(location = 1) uniform uint view_count;
@@ -60,7 +70,53 @@ float attenuation(bool is_mv, vec3 voxel) {
   return is_mv ? sampled(mv_attenuation, voxel) : sampled(kv_attenuation, voxel);
 }
 
-float line_integral(vec3 source, vec3 way, bool is_mv) {
+// What a ray adds up: attenuation, its gradient, and the gradient times t. Of the plain variant only the first.
+struct Sums {
+  float value;
+#ifdef DERIVATIVES
+  vec3 by_source, by_way;
+#endif
+};
+
+#ifdef DERIVATIVES
+// The gradient of the trilinear interpolation: along each axis the difference between the faces of the cell.
+vec3 gradient(bool is_mv, vec3 voxel) {
+  vec3 low = floor(voxel), high = low + 1.0;
+  return vec3(attenuation(is_mv, vec3(high.x, voxel.yz)) - attenuation(is_mv, vec3(low.x, voxel.yz)),
+              attenuation(is_mv, vec3(voxel.x, high.y, voxel.z)) - attenuation(is_mv, vec3(voxel.x, low.y, voxel.z)),
+              attenuation(is_mv, vec3(voxel.xy, high.z)) - attenuation(is_mv, vec3(voxel.xy, low.z)));
+}
+#endif
+
+Sums nothing() {
+  Sums sums;
+  sums.value = 0.0;
+#ifdef DERIVATIVES
+  sums.by_source = sums.by_way = vec3(0.0);
+#endif
+  return sums;
+}
+
+void add_sample(vec3 source, vec3 way, float t, bool is_mv, inout Sums sums) {
+  vec3 voxel = source + t * way;
+  sums.value += attenuation(is_mv, voxel);
+#ifdef DERIVATIVES
+  vec3 slope = gradient(is_mv, voxel);
+  sums.by_source += slope;
+  sums.by_way += t * slope;
+#endif
+}
+
+void scale(float factor, inout Sums sums) {
+  sums.value *= factor;
+#ifdef DERIVATIVES
+  sums.by_source *= factor;
+  sums.by_way *= factor;
+#endif
+}
+
+// The line integral, and its derivatives by the source and the way in voxels.
+Sums along(vec3 source, vec3 way, bool is_mv) {
   // The part of the ray inside the box. A component of 0 gives infinities, which min and max put in their place.
   vec3 at_low = (box_low - source) / way;
   vec3 at_high = (box_high - source) / way;
@@ -68,7 +124,7 @@ float line_integral(vec3 source, vec3 way, bool is_mv) {
   vec3 leaves = max(at_low, at_high);
   float begin = max(max(enters.x, enters.y), max(enters.z, 0.0));
   float end = min(min(leaves.x, leaves.y), min(leaves.z, 1.0));
-  if (!(begin < end)) return 0.0;
+  if (!(begin < end)) return nothing();
 
   float way_mm = length(mm_from_voxel_axes * way);
   int steps = max(1, int(ceil((end - begin) * way_mm / step_mm)));
@@ -84,7 +140,7 @@ float line_integral(vec3 source, vec3 way, bool is_mv) {
   vec3 next_t = mix(next_face, vec3(1e30), equal(way, vec3(0.0)));
 
   // Whole runs of occupied blocks are sampled in one loop: neighboring rays then stay together for most of their way.
-  float sum = 0.0;
+  Sums sums = nothing();
   int next = 0;  // the first sample behind the blocks walked through; the middle of step n lies at begin + (n + 1/2) step_t
   while (next < steps) {
     bool run = texelFetch(occupied, block, 0).r > 0.0;
@@ -98,10 +154,24 @@ float line_integral(vec3 source, vec3 way, bool is_mv) {
       if (any(lessThan(block, ivec3(0))) || any(greaterThan(block, last_block))) next = steps;
     } while (next < steps && (texelFetch(occupied, block, 0).r > 0.0) == run);
     if (!run) continue;
-    for (int n = first; n < next; ++n) sum += attenuation(is_mv, source + (begin + (float(n) + 0.5) * step_t) * way);
+    for (int n = first; n < next; ++n) add_sample(source, way, begin + (float(n) + 0.5) * step_t, is_mv, sums);
   }
-  return sum * step_t * way_mm * (is_mv ? unit_per_mm.y : unit_per_mm.x);
+  scale(step_t * way_mm * (is_mv ? unit_per_mm.y : unit_per_mm.x), sums);
+  return sums;
 }
+
+#ifdef DERIVATIVES
+// A point x of the room meets the voxel that was at x - translation - rotation x x before the patient moved.
+void put_derivatives(Sums sums, Room room, vec3 position, uint at) {
+  vec3 by_source = mat3(room.room_from_gradient) * sums.by_source;
+  vec3 by_way = mat3(room.room_from_gradient) * sums.by_way;
+  vec3 turned = cross(room.room_from_pixel[3].xyz, by_source) + cross(mat3(room.room_from_pixel) * position, by_way);
+  for (int axis = 0; axis < 3; ++axis) {
+    derivatives[6u * at + uint(axis)] = -by_source[axis];
+    derivatives[6u * at + 3u + uint(axis)] = -turned[axis];
+  }
+}
+#endif
 
 void main() {
   // Strides instead of one thread per ray: group counts have limits, poses and pixels have none.
@@ -119,8 +189,12 @@ void main() {
       uint pixel = has_pixel_list != 0u ? pixels[n] : place;
       vec3 position = vec3(float(pixel % columns), float(pixel / columns), 1.0);
       mat4 camera = voxel_from_pixel[pose * view_count + view];
-      line_integrals[pose * pixels_per_pose + views[view].first_pixel + place] =
-          line_integral(camera[3].xyz, mat3(camera) * position, views[view].is_mv != 0u);
+      Sums sums = along(camera[3].xyz, mat3(camera) * position, views[view].is_mv != 0u);
+      uint at = pose * pixels_per_pose + views[view].first_pixel + place;
+      line_integrals[at] = sums.value;
+#ifdef DERIVATIVES
+      put_derivatives(sums, rooms[pose * view_count + view], position, at);
+#endif
     }
   }
 }

@@ -26,6 +26,10 @@ class RaycastGlRenderer final : public Renderer, public ImagesOnGpu {
 
   RenderResult render(std::span<const XrayView> views, std::span<const Eigen::Isometry3d> room_from_patient,
                       const PixelSet& pixels) override;
+  RenderResult render_with_derivatives(std::span<const XrayView> views,
+                                       std::span<const Eigen::Isometry3d> room_from_patient,
+                                       const PixelSet& pixels) override;
+  bool has_derivatives() const override { return true; }
   RendererKind kind() const override { return RendererKind::kRaycast; }
   std::string device() const override { return context_.renderer(); }
   std::optional<double> gpu_seconds() const override { return seconds_of(timer_, context_); }
@@ -40,14 +44,21 @@ class RaycastGlRenderer final : public Renderer, public ImagesOnGpu {
 
  private:
   void upload_views(std::span<const XrayView> views, const std::vector<std::size_t>& begins, const PixelSet& pixels);
+  RenderResult render_all(std::span<const XrayView> views, std::span<const Eigen::Isometry3d> room_from_patient,
+                          const PixelSet& pixels, bool with_derivatives);
   void dispatch(std::span<const XrayView> views, std::span<const Eigen::Isometry3d> poses, std::size_t pixels_per_pose,
-                bool has_pixel_list);
+                bool has_pixel_list, bool with_derivatives);
+  // How many poses fit into a storage buffer of so many bytes per pixel. Throws Error where not even one does.
+  std::size_t poses_at_once(std::size_t pixels_per_pose, std::size_t pixel_bytes) const;
 
   GlContext& context_;
   const Program& program_;
+  const Program* derivatives_program_ = nullptr;  // compiled when it is needed first
+  Filtering filtering_;
   std::map<Beam, AttenuationTexture> attenuation_;
   std::optional<Texture3d> occupied_;
-  Buffer cameras_, views_, pixels_, result_;
+  Buffer cameras_, views_, pixels_, result_, rooms_, derivatives_;
+  std::vector<std::uint32_t> uploaded_pixels_;  // a search renders the same ones again and again
   GlTimer timer_;
   Eigen::Affine3d voxel_from_patient_;
   double step_mm_;

@@ -16,7 +16,7 @@ namespace {
 
 // Differences that correct devices stay below, and none that samples elsewhere, with other weights or another
 // attenuation does (docs/renderers.md, "Before a GPU is trusted"). Steps of a voxel miss a part of sharp edges.
-constexpr double kMostOfEdges = 0.02, kMostOfWaves = 0.002;
+constexpr double kMostOfEdges = 0.02, kMostOfWaves = 0.002, kMostOfSlopes = 0.15;
 
 // HU(i, j, k) in voxels of 3 x 2.5 x 3.5 mm, with oblique axes about the isocenter.
 template <class Hu>
@@ -98,6 +98,25 @@ class Check {
     }
   }
 
+  // The derivatives of single pixels, where the ray caster has them.
+  void run_derivatives(const MakeRayCaster& make, const char* what, const Volume<float>& ct,
+                       const AttenuationModel& model) {
+    const std::vector<XrayView> views = {view_from(35.0, kBeams[0]), view_from(100.0, kBeams[1])};
+    const std::vector<Eigen::Isometry3d> at = poses();
+    const std::unique_ptr<Renderer> tested = make(ct, model, kBeams);
+    if (!tested->has_derivatives()) return;
+    const auto oracle = make_renderer(RendererKind::kTrilinear, ct, model, kBeams);
+    const PixelSet some = PixelSet::random(views, 0.2, 2);
+    poison(*tested, views, at.size(), some);
+    const RenderResult found = tested->render_with_derivatives(views, at, some),
+                       known = oracle->render_with_derivatives(views, at, some);
+    for (std::size_t pose = 0; pose < at.size(); ++pose)
+      for (std::size_t view = 0; view < views.size(); ++view) {
+        compare(what, found.line_integrals(pose, view), known.line_integrals(pose, view), kMostOfWaves);
+        compare_derivatives(what, found.derivatives(pose, view), known.derivatives(pose, view));
+      }
+  }
+
   // Ever more rays through a volume in which no sample is passed over, until it takes a while.
   void time(const MakeRayCaster& make, const Volume<float>& ct) {
     constexpr std::chrono::milliseconds kAWhile(2);
@@ -142,6 +161,23 @@ class Check {
                              largest / scale, rms, most));
   }
 
+  void compare_derivatives(const char* what, std::span<const MotionDerivatives> found,
+                           std::span<const MotionDerivatives> known) {
+    for (int axis = 0; axis < 6; ++axis) {
+      double wrong = 0.0, all = 0.0;
+      for (std::size_t n = 0; n < found.size(); ++n) {
+        wrong += std::pow(static_cast<double>(found[n][axis]) - known[n][axis], 2);
+        all += std::pow(static_cast<double>(known[n][axis]), 2);
+      }
+      const double share = std::sqrt(wrong / all);
+      result_.slopes = std::max(result_.slopes, share);
+      if (!(share <= kMostOfSlopes))
+        fail(what, fmt::format("derivatives of its line integrals differ from the reference by {:.2g} (rms, relative), "
+                               "expected at most {}",
+                               share, kMostOfSlopes));
+    }
+  }
+
   void fail(const char* what, std::string_view why) {
     if (!result_.failure) result_.failure = fmt::format("{}: {}", what, why);
   }
@@ -156,6 +192,7 @@ RenderingCheck check_rendering(const MakeRayCaster& make) {
   const Volume<float> full = waves();
   check.run(make, "a cube of water", water_cube(), {}, kMostOfEdges);
   check.run(make, "a volume of waves", full, kAllAttenuates, kMostOfWaves);
+  check.run_derivatives(make, "a volume of waves", full, kAllAttenuates);
   if (!check.result().failure) check.time(make, full);
   return check.result();
 }

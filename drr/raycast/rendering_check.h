@@ -16,6 +16,7 @@ struct RenderingCheck {
   // Differences from `trilinear` as shares of the largest line integral of their image: root mean square, and the
   // largest; of the worst image.
   double rms = 0.0, largest = 0.0;
+  double slopes = 0.0;                 // the same, the largest, of derivatives
   double samples_per_second = 0.0;     // taken along rays of the densest image, with the way to the device and back
   std::optional<std::string> failure;  // what is wrong, for people
 };
@@ -25,7 +26,8 @@ using MakeRayCaster = std::function<std::unique_ptr<Renderer>(const Volume<float
                                                               std::span<const Beam> beams)>;
 
 // Renders a cube of water and a volume of waves at kV and MV, from oblique directions at several poses, whole images
-// and single pixels, in one call and in several, and compares with `trilinear`. Every pixel must have been written.
+// and single pixels, in one call and in several, and compares with `trilinear`; of the waves also the derivatives of
+// single pixels. Every pixel must have been written.
 RenderingCheck check_rendering(const MakeRayCaster& make);
 
 // How many rays a dispatch should have at most on such a device: a quarter of a second of long rays through a clinical

@@ -51,6 +51,48 @@ class Spoiled : public Renderer {
   Spoil spoil_;
 };
 
+// An oracle whose derivatives are not what they should be.
+class OtherDerivatives : public Renderer {
+ public:
+  using Spoil = std::function<void(MotionDerivatives& derivatives)>;
+  OtherDerivatives(std::unique_ptr<Renderer> renderer, Spoil spoil)
+      : renderer_(std::move(renderer)), spoil_(std::move(spoil)) {}
+
+  RenderResult render(std::span<const XrayView> views, std::span<const Eigen::Isometry3d> room_from_patient,
+                      const PixelSet& pixels) override {
+    return renderer_->render(views, room_from_patient, pixels);
+  }
+  RenderResult render_with_derivatives(std::span<const XrayView> views,
+                                       std::span<const Eigen::Isometry3d> room_from_patient,
+                                       const PixelSet& pixels) override {
+    const RenderResult right = renderer_->render_with_derivatives(views, room_from_patient, pixels);
+    std::vector<float> values;
+    std::vector<MotionDerivatives> derivatives;
+    std::vector<std::size_t> begins = {0};
+    for (std::size_t view = 0; view < views.size(); ++view) begins.push_back(begins.back() + pixels.count(views, view));
+    for (std::size_t pose = 0; pose < room_from_patient.size(); ++pose)
+      for (std::size_t view = 0; view < views.size(); ++view) {
+        std::ranges::copy(right.line_integrals(pose, view), std::back_inserter(values));
+        std::ranges::copy(right.derivatives(pose, view), std::back_inserter(derivatives));
+      }
+    std::ranges::for_each(derivatives, spoil_);
+    return {std::move(values), std::move(begins), std::move(derivatives)};
+  }
+  bool has_derivatives() const override { return true; }
+  RendererKind kind() const override { return RendererKind::kRaycast; }
+  std::string device() const override { return "a GPU that fails"; }
+
+ private:
+  std::unique_ptr<Renderer> renderer_;
+  Spoil spoil_;
+};
+
+RenderingCheck check_of_derivatives(const OtherDerivatives::Spoil& spoil) {
+  return check_rendering([&](const auto& ct_hu, const auto& model, auto beams) {
+    return std::make_unique<OtherDerivatives>(make_renderer(RendererKind::kTrilinear, ct_hu, model, beams), spoil);
+  });
+}
+
 // The check of a device that samples the volume elsewhere.
 RenderingCheck check_of_moved(const Eigen::Affine3d& moved_from_voxel) {
   return check_rendering([&](const auto& ct_hu, const auto& model, auto beams) {
@@ -71,6 +113,7 @@ TEST(GpuCheck, LlvmpipePassesAndSaysByHowMuch) {
   EXPECT_EQ(check.failure, std::nullopt);
   EXPECT_EQ(&gpu_check(GlDevice::kSoftware), &check) << "once per process";
   EXPECT_GT(check.rendering.largest, 0.0);
+  EXPECT_GT(check.rendering.slopes, 0.0);
   EXPECT_GT(check.rendering.samples_per_second, 0.0);
   EXPECT_LT(check.similarity.largest, 1e-5);
   EXPECT_THAT(check.words(), testing::StartsWith("passed, line integrals within 0.0"));
@@ -139,6 +182,16 @@ TEST(GpuCheck, AnImageThatDependsOnOthersFails) {
                 line_integrals[line_integrals.size() / 2] *= poses > 1 ? 1.0001F : 1.0F;
               }).failure.value_or("passed"),
               HasSubstr("an image depends on what is rendered beside it"));
+}
+
+TEST(GpuCheck, WrongDerivativesFail) {
+  EXPECT_EQ(check_of_derivatives([](MotionDerivatives&) {}).failure, std::nullopt);
+  for (int axis = 0; axis < 6; ++axis)
+    for (const float factor : {0.8F, -1.0F, std::numeric_limits<float>::quiet_NaN()})
+      EXPECT_THAT(check_of_derivatives([&](MotionDerivatives& derivatives) {
+                    derivatives[axis] *= factor;
+                  }).failure.value_or("passed"),
+                  HasSubstr("derivatives of its line integrals differ"));
 }
 
 TEST(GpuCheck, DispatchesGrowWithTheSpeedOfADevice) {
