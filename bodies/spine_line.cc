@@ -57,7 +57,9 @@ class SliceMeans {
   double sum(int i, int j, double aside_mm, double front_mm, double back_mm, double* area) const {
     const double left = i - aside_mm / cell_mm_, right = i + aside_mm / cell_mm_ + 1;
     const double front = j + front_mm / cell_mm_, back = j + back_mm / cell_mm_ + 1;
-    const auto clamped = [](double at, int most) { return std::clamp(static_cast<int>(std::lround(at)), 0, most); };
+    const auto clamped = [](double at, int most) {  // rounded; std::lround() took half of the time
+      return static_cast<int>(std::clamp(at + 0.5, 0.0, static_cast<double>(most)));
+    };
     const int a = clamped(left, columns_), b = clamped(right, columns_);
     const int c = clamped(front, rows_), d = clamped(back, rows_);
     *area = (right - left) * (back - front);

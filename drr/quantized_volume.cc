@@ -5,24 +5,37 @@
 #include <limits>
 #include <type_traits>
 
+#include "base/large_vector.h"
 #include "base/parallel.h"
+#include "drr/attenuation_curve.h"
 
 namespace isoshift {
 namespace {
 
 QuantizedVolume::Voxels storage(VolumePrecision precision, std::size_t count) {
   switch (precision) {
-    case VolumePrecision::kU8: return std::vector<std::uint8_t>(count);
-    case VolumePrecision::kU16: return std::vector<std::uint16_t>(count);
+    case VolumePrecision::kU8: return large_vector<std::uint8_t>(count);
+    case VolumePrecision::kU16: return large_vector<std::uint16_t>(count);
     case VolumePrecision::kF32: break;
   }
-  return std::vector<float>(count);
+  return large_vector<float>(count);
+}
+
+// Of a volume that is not empty.
+float highest_in(const Volume<float>& volume) {
+  const auto of_slice = static_cast<std::ptrdiff_t>(volume.size.x()) * volume.size.y();
+  std::vector<float> highest(static_cast<std::size_t>(volume.size.z()));
+  parallel_for(0, volume.size.z(), [&](int k) {
+    const auto slice = volume.voxels.begin() + k * of_slice;
+    highest[static_cast<std::size_t>(k)] = *std::max_element(slice, slice + of_slice);
+  });
+  return *std::ranges::max_element(highest);
 }
 
 // What the largest integer stands for.
 double largest_attenuation_per_mm(const Volume<float>& ct_hu, const AttenuationModel& model, Beam beam) {
   if (model.kind == AttenuationModel::Kind::kWindowed || ct_hu.voxels.empty()) return 1.0;
-  const float highest = model.attenuation_per_mm(*std::ranges::max_element(ct_hu.voxels), beam);
+  const float highest = model.attenuation_per_mm(highest_in(ct_hu), beam);
   return highest > 0.0F ? highest : 1.0;
 }
 
@@ -76,11 +89,11 @@ double QuantizedVolume::full_scale_per_mm() const {
 QuantizedVolume quantized_attenuation(const Volume<float>& ct_hu, const AttenuationModel& model, Beam beam,
                                       VolumePrecision precision) {
   return quantized_values(ct_hu, precision, largest_attenuation_per_mm(ct_hu, model, beam),
-                          [&](float hu) { return model.attenuation_per_mm(hu, beam); });
+                          AttenuationCurve(model, beam));
 }
 
 QuantizedVolume quantized(const Volume<float>& attenuation_per_mm, VolumePrecision precision) {
-  const float largest = attenuation_per_mm.voxels.empty() ? 0.0F : *std::ranges::max_element(attenuation_per_mm.voxels);
+  const float largest = attenuation_per_mm.voxels.empty() ? 0.0F : highest_in(attenuation_per_mm);
   return quantized_values(attenuation_per_mm, precision, largest > 0.0F ? largest : 1.0,
                           [](float value) { return value; });
 }

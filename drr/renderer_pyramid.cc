@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 
 #include "base/parallel.h"
 #include "geometry/voxel_box.h"
@@ -21,18 +22,20 @@ CoarserCt coarser_ct(const Volume<float>& ct_hu, const AttenuationModel& model, 
   CoarserCt coarser{.hu = Volume<float>(size, ct_hu.patient_from_voxel * voxel_from_block(block)), .model = model};
   coarser.model.threshold_hu = nothing_hu;
   parallel_for(0, size.z(), [&](int k) {
-    for (int j = 0; j < size.y(); ++j)
-      for (int i = 0; i < size.x(); ++i) {
-        float sum = 0.0F;
-        for (int z = 0; z < block.z(); ++z)
-          for (int y = 0; y < block.y(); ++y)
-            for (int x = 0; x < block.x(); ++x) {
-              const Eigen::Vector3i at(i * block.x() + x, j * block.y() + y, k * block.z() + z);
-              const bool inside = (at.array() < ct_hu.size.array()).all();
-              sum += inside ? attenuating_hu(ct_hu.at(at.x(), at.y(), at.z())) : nothing_hu;
-            }
-        coarser.hu.at(i, j, k) = sum / static_cast<float>(block.prod());
-      }
+    std::vector<float> row(static_cast<std::size_t>(size.x()) * block.x(), nothing_hu);
+    for (int j = 0; j < size.y(); ++j) {
+      float* sums = &coarser.hu.at(0, j, k);
+      for (int z = k * block.z(); z < (k + 1) * block.z(); ++z)
+        for (int y = j * block.y(); y < (j + 1) * block.y(); ++y) {
+          if (z < ct_hu.size.z() && y < ct_hu.size.y())
+            std::transform(&ct_hu.at(0, y, z), &ct_hu.at(0, y, z) + ct_hu.size.x(), row.begin(), attenuating_hu);
+          else
+            std::ranges::fill(row, nothing_hu);
+          for (int i = 0; i < size.x(); ++i)
+            for (int x = 0; x < block.x(); ++x) sums[i] += row[static_cast<std::size_t>(i * block.x() + x)];
+        }
+      for (int i = 0; i < size.x(); ++i) sums[i] /= static_cast<float>(block.prod());
+    }
   });
   return coarser;
 }
@@ -43,13 +46,19 @@ RendererPyramid::RendererPyramid(RendererKind kind, const Volume<float>& ct_hu, 
   levels_.push_back(
       {.edge_mm = ct_hu.spacing_mm().maxCoeff(), .renderer = make_renderer(kind, ct_hu, model, beams, options)});
   Eigen::Vector3i last = Eigen::Vector3i::Ones();
+  std::optional<CoarserCt> coarser;
   for (const double edge_mm : {1.0, 2.0, 4.0}) {
     const Eigen::Vector3i block = block_of(ct_hu.spacing_mm(), ct_hu.size, edge_mm);
     if (block == last) continue;
+    // Blocks of whole blocks have the mean of their means.
+    const Eigen::Vector3i of_last = block.cwiseQuotient(last);
+    if (coarser && of_last.cwiseProduct(last) == block)
+      coarser = coarser_ct(coarser->hu, coarser->model, of_last);
+    else
+      coarser = coarser_ct(ct_hu, model, block);
     last = block;
-    const CoarserCt coarser = coarser_ct(ct_hu, model, block);
-    levels_.push_back({.edge_mm = coarser.hu.spacing_mm().maxCoeff(),
-                       .renderer = make_renderer(kind, coarser.hu, coarser.model, beams, options)});
+    levels_.push_back({.edge_mm = coarser->hu.spacing_mm().maxCoeff(),
+                       .renderer = make_renderer(kind, coarser->hu, coarser->model, beams, options)});
   }
 }
 

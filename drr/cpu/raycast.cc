@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "base/error.h"
+#include "base/large_vector.h"
 #include "base/parallel.h"
 #include "drr/cpu/march.h"
 
@@ -28,7 +29,7 @@ constexpr int kReadBeyond = 4;  // a pair is loaded as 32 bits
 template <class T>
 std::vector<T> cropped(const std::vector<T>& voxels, const Vector3i& size, const VoxelBox& box) {
   const Vector3i padded = box.size().array() + 3;
-  std::vector<T> result(padded.cast<std::size_t>().prod() + kReadBeyond);
+  std::vector<T> result = large_vector<T>(padded.cast<std::size_t>().prod() + kReadBeyond);
   const std::size_t slice = static_cast<std::size_t>(padded.x()) * padded.y();
   parallel_for(box.first.z(), box.last.z() + 1, [&](int k) {
     T* out = result.data() + static_cast<std::size_t>(k - box.first.z() + 1) * slice;
@@ -43,7 +44,7 @@ std::vector<T> cropped(const std::vector<T>& voxels, const Vector3i& size, const
 // The same voxels, y fastest instead of x.
 template <class T>
 std::vector<T> with_y_fastest(const std::vector<T>& voxels, const Vector3i& size) {
-  std::vector<T> result(voxels.size());
+  std::vector<T> result = large_vector<T>(voxels.size());
   const std::size_t slice = static_cast<std::size_t>(size.x()) * size.y();
   parallel_for(0, size.z(), [&](int k) {
     const T* in = voxels.data() + k * slice;

@@ -10,6 +10,7 @@
 #include <set>
 
 #include "base/error.h"
+#include "base/large_vector.h"
 #include "base/parallel.h"
 #include "base/sha256.h"
 #include "io/dicom/decode.h"
@@ -277,16 +278,19 @@ std::vector<Finding> spacing_findings(const std::vector<double>& positions_mm, d
 Volume<float> resampled(const std::vector<Slice>& slices, const std::vector<double>& positions_mm,
                         const Eigen::Affine3d& patient_from_voxel, int count, double spacing_mm) {
   const PixelFormat& format = slices.front().format;
-  Volume<float> volume({format.columns, format.rows, count}, patient_from_voxel);
-  std::size_t below = 0;
-  for (int k = 0; k < count; ++k) {
+  Volume<float> volume;
+  volume.size = {format.columns, format.rows, count};
+  volume.patient_from_voxel = patient_from_voxel;
+  volume.voxels = large_vector<float>(volume.size.cast<std::size_t>().prod());
+  parallel_for(0, count, [&](int k) {
     const double position_mm = positions_mm.front() + k * spacing_mm;
-    while (below + 2 < positions_mm.size() && positions_mm[below + 1] <= position_mm) ++below;
+    const auto above = std::ranges::upper_bound(positions_mm, position_mm) - positions_mm.begin();
+    const auto below = static_cast<std::size_t>(std::clamp<std::ptrdiff_t>(above - 1, 0, std::ssize(positions_mm) - 2));
     const double gap_mm = positions_mm[below + 1] - positions_mm[below];
     const auto fraction = static_cast<float>(std::clamp((position_mm - positions_mm[below]) / gap_mm, 0.0, 1.0));
     std::ranges::transform(slices[below].hu, slices[below + 1].hu, volume.voxels.begin() + volume.index(0, 0, k),
                            [fraction](float a, float b) { return a + fraction * (b - a); });
-  }
+  });
   return volume;
 }
 
