@@ -13,7 +13,6 @@
 #include <cstring>
 #include <fstream>
 #include <random>
-#include <sstream>
 #include <utility>
 
 #include "base/error.h"
@@ -235,12 +234,14 @@ void DicomItem::erase(const DcmTagKey& tag) {
 namespace {
 
 std::string bytes_of(const std::filesystem::path& path) {
-  std::ifstream stream(path, std::ios::binary);
-  std::ostringstream bytes;
-  bytes << stream.rdbuf();
-  if (!stream || !bytes)
-    throw Error(fmt::format("{}: cannot be read as a DICOM file: {}", path.string(), std::strerror(errno)));
-  return std::move(bytes).str();
+  std::error_code failed;
+  const std::uintmax_t size = std::filesystem::file_size(path, failed);
+  std::string bytes(failed ? 0 : size, '\0');
+  if (std::ifstream stream(path, std::ios::binary);
+      !failed && !stream.read(bytes.data(), static_cast<std::streamsize>(bytes.size())))
+    failed = {errno, std::generic_category()};
+  if (failed) throw Error(fmt::format("{}: cannot be read as a DICOM file: {}", path.string(), failed.message()));
+  return bytes;
 }
 
 }  // namespace

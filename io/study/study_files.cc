@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "base/error.h"
+#include "base/parallel.h"
 #include "io/dicom/dicom_dataset.h"
 #include "io/dicom/rt_image.h"
 
@@ -385,14 +386,17 @@ void merge(StudyFiles from, StudyFiles& files) {
 }
 
 StudyFiles scan_study(const std::vector<fs::path>& paths) {
-  StudyFiles files;
-  for (const fs::path& path : files_below(paths)) {
+  const std::vector<fs::path> below = files_below(paths);
+  std::vector<StudyFiles> scanned(below.size());
+  parallel_for(std::size_t{0}, below.size(), [&](std::size_t n) {
     try {
-      merge(scan_file(path), files);
+      scanned[n] = scan_file(below[n]);
     } catch (const Error& error) {
-      files.unreadable.emplace_back(error.what());
+      scanned[n].unreadable.emplace_back(error.what());
     }
-  }
+  });
+  StudyFiles files;
+  for (StudyFiles& of_file : scanned) merge(std::move(of_file), files);
   return files;
 }
 
