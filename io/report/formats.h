@@ -1,6 +1,7 @@
 #pragma once
 // The formats of a result. All but JSON are made from a ReportPage, so that they show the same texts and numbers.
 
+#include <span>
 #include <string>
 
 #include "io/report/report_page.h"
@@ -23,7 +24,12 @@ std::string csv_report(const SetupResult& report);
 // report.pdf: one sheet of A4 to sign, then the details.
 std::string pdf_report(const SetupResult& report, const ReportPage& page);
 
-// report.html: one page that needs no other file and no network.
-std::string html_report(const SetupResult& report, const ReportPage& page);
+// The pictures of a view as PNG files.
+struct ViewPngs {
+  std::string xray, drr_planned, drr_found;
+};
+
+// report.html: one page that needs no other file and no network, with the pictures of every view.
+std::string html_report(const SetupResult& report, const ReportPage& page, std::span<const ViewPngs> pictures);
 
 }  // namespace isoshift

@@ -80,21 +80,20 @@ std::string svg_image(double width, double height, std::string_view description,
                      1.4 * height, data_uri("image/svg+xml", canvas.finish()));
 }
 
-std::string png_image(const Image<std::uint8_t>& gray, std::string_view name, std::string_view description) {
-  return fmt::format("<img class=\"{}\" alt=\"{}\" src=\"{}\">", name, description,
-                     data_uri("image/png", png_of(gray)));
+std::string png_image(const std::string& png, std::string_view name, std::string_view description) {
+  return fmt::format("<img class=\"{}\" alt=\"{}\" src=\"{}\">", name, description, data_uri("image/png", png));
 }
 
-std::string view_figure(const SetupResult::View& view, std::size_t number) {
+std::string view_figure(const SetupResult::View& view, const ViewPngs& pictures, std::size_t number) {
   const auto radio = [&](const char* group, const char* value, const char* words, bool checked) {
     return fmt::format("<label><input type=\"radio\" name=\"{}{}\" value=\"{}\"{}> {}</label>", group, number, value,
                        checked ? " checked" : "", words);
   };
   return fmt::format("<figure id=\"view{}\"><figcaption>{}</figcaption><div class=\"stills\">", number,
                      html_escaped(printable(view.label))) +
-         png_image(view.picture.xray, "xray", "X-ray") +
-         png_image(view.picture.drr_planned, "planned", "DRR, patient as planned") +
-         png_image(view.picture.drr_found, "found", "DRR, patient as found") +
+         png_image(pictures.xray, "xray", "X-ray") +
+         png_image(pictures.drr_planned, "planned", "DRR, patient as planned") +
+         png_image(pictures.drr_found, "found", "DRR, patient as found") +
          "</div><div class=\"controls\" hidden>"
          "<label>Wipe<input type=\"range\" min=\"0\" max=\"100\" value=\"50\">"
          "<span class=\"ends\"><span>DRR</span><span>X-ray</span></span></label>"
@@ -152,11 +151,11 @@ std::string details(const SetupResult& report, const ReportPage& page) {
 
 }  // namespace
 
-std::string html_report(const SetupResult& report, const ReportPage& page) {
+std::string html_report(const SetupResult& report, const ReportPage& page, std::span<const ViewPngs> pictures) {
   std::string views, notes, conventions;
   Json data = Json::array();
   for (std::size_t n = 0; n < report.views.size(); ++n) {
-    views += view_figure(report.views[n], n + 1);
+    views += view_figure(report.views[n], pictures[n], n + 1);
     data.push_back(view_data(report.views[n], n + 1));
   }
   if (!page.warnings.empty()) notes += "<h2>Warnings</h2>" + list(page.warnings);

@@ -5,11 +5,12 @@
 
 #include <array>
 #include <fstream>
+#include <functional>
 #include <iterator>
-#include <utility>
 
 #include "base/error.h"
 #include "base/output_folder.h"
+#include "base/parallel.h"
 #include "io/objects/encapsulated_pdf.h"
 #include "io/report/drawings.h"
 #include "io/report/formats.h"
@@ -17,9 +18,14 @@
 namespace isoshift {
 namespace {
 
-using Picture = Image<std::uint8_t> ViewPicture::*;
-constexpr std::array<std::pair<const char*, Picture>, 3> kPictures = {
-    {{"xray", &ViewPicture::xray}, {"planned", &ViewPicture::drr_planned}, {"found", &ViewPicture::drr_found}}};
+struct NamedPicture {
+  const char* name;
+  Image<std::uint8_t> ViewPicture::* picture;
+  std::string ViewPngs::* png;
+};
+constexpr std::array<NamedPicture, 3> kPictures = {{{"xray", &ViewPicture::xray, &ViewPngs::xray},
+                                                    {"planned", &ViewPicture::drr_planned, &ViewPngs::drr_planned},
+                                                    {"found", &ViewPicture::drr_found, &ViewPngs::drr_found}}};
 
 std::filesystem::path picture_path(const std::filesystem::path& folder, std::size_t view, const char* name) {
   return folder / fmt::format("view{}_{}.png", view + 1, name);
@@ -50,17 +56,27 @@ EncapsulatedPdf document_of(const SetupResult& report, const ReportPage& page) {
 
 void write_result(const SetupResult& report, const std::filesystem::path& folder) {
   const ReportPage page = report_page(report);
-  const std::string pdf = pdf_report(report, page);
+  const std::size_t views = report.views.size();
+  std::string pdf;
+  std::vector<ViewPngs> pictures(views);
+  std::vector<std::string> comparisons(views);
+  // To compress them takes longer than all else: each is made once, and all at the same time.
+  std::vector<std::function<void()>> drawings = {[&] { pdf = pdf_report(report, page); }};
+  for (std::size_t n = 0; n < views; ++n) {
+    drawings.emplace_back([&, n] { comparisons[n] = comparison_png(report.views[n]); });
+    for (const NamedPicture& named : kPictures)
+      drawings.emplace_back([&, n] { pictures[n].*named.png = png_of(report.views[n].picture.*named.picture); });
+  }
+  parallel_for(std::size_t{0}, drawings.size(), [&](std::size_t n) { drawings[n](); });
   write_text(folder / kResultFile, json_report(report));
   write_text(folder / "report.txt", text_report(page));
   write_text(folder / "report.csv", csv_report(report));
   write_text(folder / "report.pdf", pdf);
-  write_text(folder / "report.html", html_report(report, page));
+  write_text(folder / "report.html", html_report(report, page, pictures));
   write_encapsulated_pdf(document_of(report, page), pdf, folder / "report.dcm");
-  for (std::size_t n = 0; n < report.views.size(); ++n) {
-    for (const auto& [name, picture] : kPictures)
-      write_text(picture_path(folder, n, name), png_of(report.views[n].picture.*picture));
-    write_text(folder / fmt::format("view{}.png", n + 1), comparison_png(report.views[n]));
+  for (std::size_t n = 0; n < views; ++n) {
+    for (const NamedPicture& named : kPictures) write_text(picture_path(folder, n, named.name), pictures[n].*named.png);
+    write_text(folder / fmt::format("view{}.png", n + 1), comparisons[n]);
   }
 }
 
@@ -76,8 +92,8 @@ SetupResult read_result(const std::filesystem::path& folder) {
   SetupResult report = read_report(folder);
   for (std::size_t n = 0; n < report.views.size(); ++n) {
     ViewPicture& picture = report.views[n].picture;
-    for (const auto& [name, member] : kPictures) picture.*member = read_gray_png(picture_path(folder, n, name));
-    for (const auto& [name, member] : kPictures)
+    for (const auto& [name, member, png] : kPictures) picture.*member = read_gray_png(picture_path(folder, n, name));
+    for (const auto& [name, member, png] : kPictures)
       if ((picture.*member).columns != picture.xray.columns || (picture.*member).rows != picture.xray.rows)
         throw Error(
             fmt::format("{}: is not of the size of the X-ray's picture", picture_path(folder, n, name).string()));

@@ -115,7 +115,8 @@ TEST(MovedBodies, EveryFormatTellsItDirectlyBehindTheTarget) {
   const ReportPage page = report_page(report);
   EXPECT_EQ(page.who[1].name, "Target");
   EXPECT_EQ(page.who[2].name, kBent);
-  for (const std::string& shown : {text_report(page), html_report(report, page)}) {
+  for (const std::string& shown :
+       {text_report(page), html_report(report, page, std::vector<ViewPngs>(report.views.size()))}) {
     EXPECT_THAT(shown, HasSubstr("vertebra 3 toward the feet lies 9.2 mm off"));
     EXPECT_THAT(shown, HasSubstr("carries the target 62 %"));
     EXPECT_THAT(shown, HasSubstr("its surface lies at most 0.4 mm from where a rigid motion puts it"));

@@ -28,7 +28,9 @@ using testing::HasSubstr;
 using testing::Not;
 
 std::string text_of(const SetupResult& report) { return text_report(report_page(report)); }
-std::string html_of(const SetupResult& report) { return html_report(report, report_page(report)); }
+std::string html_of(const SetupResult& report) {
+  return html_report(report, report_page(report), std::vector<ViewPngs>(report.views.size()));
+}
 
 // The text of a PDF, in the order it is read.
 std::string text_of_pdf(const SetupResult& report, int last_page = 99) {
