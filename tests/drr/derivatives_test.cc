@@ -98,12 +98,15 @@ TEST_P(DerivativesTest, OfAListOfPixelsAreThoseOfTheWholeImage) {
 }
 
 TEST_P(DerivativesTest, LineIntegralsAreThoseWithoutDerivatives) {
+  // Two variants of a shader may round differently: a ray that grazes a face can miss it in one of them (2e-5, on
+  // zink).
+  const float rounding = uses_gl(GetParam()) ? 1e-4F : 0.0F;
   const RenderResult with = renderer_->render_with_derivatives(three_views(), poses_, PixelSet::all());
   const RenderResult without = renderer_->render(three_views(), poses_, PixelSet::all());
   for (std::size_t p = 0; p < poses_.size(); ++p)
     for (std::size_t v = 0; v < three_views().size(); ++v)
       for (std::size_t n = 0; n < with.line_integrals(p, v).size(); ++n)
-        ASSERT_EQ(with.line_integrals(p, v)[n], without.line_integrals(p, v)[n]);
+        ASSERT_NEAR(with.line_integrals(p, v)[n], without.line_integrals(p, v)[n], rounding);
 }
 
 TEST_P(DerivativesTest, AreZeroWhereARayMissesTheVolume) {
