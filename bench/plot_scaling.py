@@ -20,7 +20,7 @@ GROWTH = [
     ("views_in_a_call", "views", lambda value: value),
     ("bodies_of_a_patient", "bodies, with derivatives", lambda value: value),
     ("voxels_along_an_edge", "voxels along an edge of a cube of 192 mm", lambda value: value),
-    ("threads", "threads (2 views, 16 poses)", lambda value: value),
+    ("threads", "1 / threads (2 views, 16 poses)", lambda value: 1 / value),
 ]
 PER_ROW = 4
 WIDTH, HEIGHT, LEFT, TOP, GAP = 260, 200, 60, 30, 80
@@ -58,9 +58,9 @@ def panel(left, top, data, label):
     svg = [f'<rect x="{left}" y="{top}" width="{WIDTH}" height="{HEIGHT}" fill="none" stroke="#888"/>']
     for n in range(5):
         x, y = place(top_x * n / 4, top_y * n / 4)
-        svg.append(f'<text x="{x:.0f}" y="{top + HEIGHT + 16}" text-anchor="middle">{top_x * n / 4:.0f}</text>')
+        svg.append(f'<text x="{x:.0f}" y="{top + HEIGHT + 16}" text-anchor="middle">{top_x * n / 4:.4g}</text>')
         svg.append(f'<text x="{left - 6}" y="{y + 4:.0f}" text-anchor="end">{top_y * n / 4:.1f}</text>')
-    (x0, y0), (x1, y1) = place(0, max(0, offset)), place(top_x, offset + slope * top_x)
+    (x0, y0), (x1, y1) = place(max(0, -offset / slope), max(0, offset)), place(top_x, offset + slope * top_x)
     svg.append(f'<line x1="{x0:.1f}" y1="{y0:.1f}" x2="{x1:.1f}" y2="{max(y1, top):.1f}" stroke="#c60" stroke-dasharray="4 3"/>')
     for x, y in data:
         px, py = place(x, y)
