@@ -62,10 +62,12 @@ std::vector<ViewConsistency> regional_consistency(const RendererPyramid& rendere
                                                   const Eigen::Isometry3d& room_from_patient) {
   const std::vector<FixedImage> levels = fixed.reduced_to(kComparedPixelMm, room_from_patient, 0.0);
   std::vector<XrayView> views;
+  views.reserve(levels.size());
   for (const FixedImage& level : levels) views.push_back(level.view);
   const RenderResult drrs =
       renderers.with_voxels_up_to(kComparedPixelMm).render(views, std::span(&room_from_patient, 1), PixelSet::all());
   std::vector<ViewConsistency> consistency;
+  consistency.reserve(levels.size());
   for (std::size_t view = 0; view < levels.size(); ++view)
     consistency.push_back(consistency_of(levels[view], drrs.line_integrals(0, view)));
   return consistency;
