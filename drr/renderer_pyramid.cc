@@ -32,7 +32,7 @@ CoarserCt coarser_ct(const Volume<float>& ct_hu, const AttenuationModel& model, 
           else
             std::ranges::fill(row, nothing_hu);
           for (int i = 0; i < size.x(); ++i)
-            for (int x = 0; x < block.x(); ++x) sums[i] += row[static_cast<std::size_t>(i * block.x() + x)];
+            for (int x = 0; x < block.x(); ++x) sums[i] += row[static_cast<std::size_t>(i) * block.x() + x];
         }
       for (int i = 0; i < size.x(); ++i) sums[i] /= static_cast<float>(block.prod());
     }
