@@ -236,11 +236,13 @@ namespace {
 std::string bytes_of(const std::filesystem::path& path) {
   std::error_code failed;
   const std::uintmax_t size = std::filesystem::file_size(path, failed);
+  std::ifstream stream(path, std::ios::binary);
+  if (!failed && !stream) failed = {errno, std::generic_category()};
   std::string bytes(failed ? 0 : size, '\0');
-  if (std::ifstream stream(path, std::ios::binary);
-      !failed && !stream.read(bytes.data(), static_cast<std::streamsize>(bytes.size())))
-    failed = {errno, std::generic_category()};
+  stream.read(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+  if (stream.bad()) failed = std::make_error_code(std::errc::io_error);
   if (failed) throw Error(fmt::format("{}: cannot be read as a DICOM file: {}", path.string(), failed.message()));
+  bytes.resize(static_cast<std::size_t>(stream.gcount()));  // fewer where the file is being cut off
   return bytes;
 }
 
