@@ -7,6 +7,7 @@
 #include "drr/attenuation_curve.h"
 
 namespace isoshift {
+
 void AttenuationModel::check() const {
   if (!std::isfinite(threshold_hu)) throw UsageError("--threshold-hu must be a finite number");
   if (!(std::isfinite(window_low_hu) && std::isfinite(window_high_hu) && window_low_hu < window_high_hu))

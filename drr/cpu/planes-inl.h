@@ -115,6 +115,32 @@ class GatherPlane {
   const T* base_;
 };
 
+// A window of a plane's voxels around a packet, inside of the lattice.
+template <int kColumns, int kRows>
+struct Window {
+  int first_column, first_row;
+
+  template <class T>
+  HWY_INLINE Window(const PlaneLattice<T>& lattice, const Footprint& footprint)
+      : first_column(std::clamp(static_cast<int>(footprint.column_low), 0, lattice.columns - kColumns)),
+        first_row(std::clamp(static_cast<int>(footprint.row_low), 0, lattice.rows - kRows)) {}
+
+  template <class T>
+  HWY_INLINE const T* voxels(const PlaneLattice<T>& lattice, int plane) const {
+    return lattice.voxels + plane * lattice.plane_stride + first_row * lattice.row_stride + first_column;
+  }
+
+  // Whether it holds all that a packet meets from one footprint to another. The right neighbor belongs to it, and a
+  // part of a voxel is left to rounding.
+  template <class T>
+  static bool fits(const Footprint& a, const Footprint& b, const PlaneLattice<T>& lattice, float rounding) {
+    const float most_width = kColumns - 2.0F - rounding, most_height = kRows - 2.0F - rounding;
+    return std::max(a.column_high - a.column_low, b.column_high - b.column_low) <= most_width &&
+           std::max(a.row_high - a.row_low, b.row_high - b.row_low) <= most_height && lattice.columns >= kColumns &&
+           lattice.rows >= kRows;
+  }
+};
+
 #if HWY_TARGET <= HWY_AVX3
 // The same from a window of voxels that is loaded whole and looked up in registers: on AVX-512 several times as fast as
 // gathering, where neighboring rays are at most a few voxels apart.
@@ -127,23 +153,18 @@ class WindowPlane {
   static constexpr int kRows = 8;
 
   static bool fits(const Footprint& a, const Footprint& b, const PlaneLattice<T>& lattice) {
-    // The right neighbor belongs to the window; half a voxel is left to rounding.
-    constexpr float kMaxWidth = kColumns - 2.5F, kMaxHeight = kRows - 2.5F;
-    return std::max(a.column_high - a.column_low, b.column_high - b.column_low) <= kMaxWidth &&
-           std::max(a.row_high - a.row_low, b.row_high - b.row_low) <= kMaxHeight && lattice.columns >= kColumns &&
-           lattice.rows >= kRows;
+    return Window<kColumns, kRows>::fits(a, b, lattice, 0.5F);
   }
 
   HWY_INLINE WindowPlane(const PlaneLattice<T>& lattice, int plane, const Footprint& footprint)
-      : column_origin_(std::clamp(static_cast<int>(footprint.column_low), 0, lattice.columns - kColumns)),
-        row_origin_(std::clamp(static_cast<int>(footprint.row_low), 0, lattice.rows - kRows)) {
-    const T* base = lattice.voxels + plane * lattice.plane_stride + row_origin_ * lattice.row_stride + column_origin_;
+      : window_(lattice, footprint) {
+    const T* base = window_.voxels(lattice, plane);
     for (int n = 0; n < kTables; ++n) tables_[n] = load(base, lattice.row_stride, n);
   }
 
   HWY_INLINE Sample operator()(FloatVec column, FloatVec row) const {
-    column = hn::Sub(column, hn::Set(Floats(), static_cast<float>(column_origin_)));
-    row = hn::Sub(row, hn::Set(Floats(), static_cast<float>(row_origin_)));
+    column = hn::Sub(column, hn::Set(Floats(), static_cast<float>(window_.first_column)));
+    row = hn::Sub(row, hn::Set(Floats(), static_cast<float>(window_.first_row)));
     const IntVec whole_column = hn::ConvertTo(Ints(), column);
     const IntVec whole_row = hn::ConvertTo(Ints(), row);
     const IntVec index = hn::Add(whole_column, hn::Mul(whole_row, hn::Set(Ints(), kColumns)));
@@ -192,7 +213,7 @@ class WindowPlane {
     }
   }
 
-  int column_origin_, row_origin_;
+  Window<kColumns, kRows> window_;
   __m512i tables_[kTables];
 };
 
@@ -206,35 +227,28 @@ using LargeWindow = WindowPlane<16, T>;
 template <int kRows, class T>
 class WindowPlane {
  public:
+  static constexpr int kColumns = 16 / sizeof(T);
+
   static constexpr int kPrefetch = 8;
   static HWY_INLINE void prefetch(const PlaneLattice<T>& lattice, int plane, const Footprint& footprint) {
-    const T* base = lattice.voxels + plane * lattice.plane_stride +
-                    std::clamp(static_cast<int>(footprint.row_low), 0, lattice.rows - kRows) * lattice.row_stride +
-                    std::clamp(static_cast<int>(footprint.column_low), 0, lattice.columns - kColumns);
+    const T* base = Window<kColumns, kRows>(lattice, footprint).voxels(lattice, plane);
     for (int n = 0; n < kRows; ++n) __builtin_prefetch(base + n * lattice.row_stride);
   }
 
-  static constexpr int kColumns = 16 / sizeof(T);
-
   static bool fits(const Footprint& a, const Footprint& b, const PlaneLattice<T>& lattice) {
-    // The right neighbor belongs to the window; a tenth of a voxel is left to rounding.
-    constexpr float kMaxWidth = kColumns - 2.1F, kMaxHeight = kRows - 2.1F;
-    return std::max(a.column_high - a.column_low, b.column_high - b.column_low) <= kMaxWidth &&
-           std::max(a.row_high - a.row_low, b.row_high - b.row_low) <= kMaxHeight && lattice.columns >= kColumns &&
-           lattice.rows >= kRows;
+    return Window<kColumns, kRows>::fits(a, b, lattice, 0.1F);
   }
 
   HWY_INLINE WindowPlane(const PlaneLattice<T>& lattice, int plane, const Footprint& footprint)
-      : column_origin_(std::clamp(static_cast<int>(footprint.column_low), 0, lattice.columns - kColumns)),
-        row_origin_(std::clamp(static_cast<int>(footprint.row_low), 0, lattice.rows - kRows)) {
-    const T* base = lattice.voxels + plane * lattice.plane_stride + row_origin_ * lattice.row_stride + column_origin_;
+      : window_(lattice, footprint) {
+    const T* base = window_.voxels(lattice, plane);
     for (int n = 0; n < kRows; ++n)
       rows_[n] = hn::LoadDup128(Bytes(), reinterpret_cast<const std::uint8_t*>(base + n * lattice.row_stride));
   }
 
   HWY_INLINE Sample operator()(FloatVec column, FloatVec row) const {
-    column = hn::Sub(column, hn::Set(Floats(), static_cast<float>(column_origin_)));
-    row = hn::Sub(row, hn::Set(Floats(), static_cast<float>(row_origin_)));
+    column = hn::Sub(column, hn::Set(Floats(), static_cast<float>(window_.first_column)));
+    row = hn::Sub(row, hn::Set(Floats(), static_cast<float>(window_.first_row)));
     const IntVec whole_column = hn::ConvertTo(Ints(), column);
     const auto places = places_of(whole_column);
     WordVec near = look_up(0, places), far = look_up(1, places);
@@ -267,7 +281,7 @@ class WindowPlane {
     return hn::BitCast(Words(), hn::TableLookupBytesOr0(rows_[row], places));
   }
 
-  int column_origin_, row_origin_;
+  Window<kColumns, kRows> window_;
   ByteVec rows_[kRows];
 };
 
