@@ -21,6 +21,7 @@
 #include "registration/objective.h"
 #include "tests/drr/test_views.h"
 #include "tests/support/gpu.h"
+#include "tests/support/plain_renderer.h"
 
 namespace isoshift::gl_similarity_test {
 namespace {
@@ -46,21 +47,6 @@ std::vector<Tested> all_tested() {
     for (const GlDevice gl : {GlDevice::kSoftware, GlDevice::kHardware}) all.push_back({kind, gl});
   return all;
 }
-
-// The same line integrals, but brought back from the GPU: similarities are then those of the CPU.
-class BroughtBack final : public Renderer {
- public:
-  explicit BroughtBack(Renderer& renderer) : renderer_(renderer) {}
-  RenderResult render(std::span<const XrayView> views, std::span<const Eigen::Isometry3d> room_from_patient,
-                      const PixelSet& pixels) override {
-    return renderer_.render(views, room_from_patient, pixels);
-  }
-  RendererKind kind() const override { return renderer_.kind(); }
-  std::string device() const override { return renderer_.device(); }
-
- private:
-  Renderer& renderer_;
-};
 
 // X-rays of a head by ray-shape intersections, and its CT.
 struct Scene {
@@ -158,7 +144,7 @@ std::vector<float> random_pixels(std::size_t count, std::uint64_t seed) {
 
 TEST_P(GlSimilarityTest, IsThatOfTheCpuOnDrrsAndXrays) {
   RaycastGlRenderer renderer(scene().ct, {}, kBothBeams, device());
-  BroughtBack on_cpu(renderer);
+  PlainRenderer on_cpu(renderer);
   double largest = 0.0;
   for (const double fraction : {1.0, 0.1}) {
     const ObjectiveOptions options{.similarity = GetParam().kind, .pixel_fraction = fraction, .min_pixels = 100};

@@ -23,6 +23,24 @@ std::unique_ptr<Renderer> on_llvmpipe(const Volume<float>& ct_hu, const Attenuat
                                              filtering);
 }
 
+// What a result is made of.
+struct Parts {
+  std::vector<float> line_integrals;
+  std::vector<MotionDerivatives> derivatives;
+  std::vector<std::size_t> begins = {0};
+
+  Parts(const RenderResult& result, std::span<const XrayView> views, std::size_t poses, const PixelSet& pixels,
+        bool with_derivatives) {
+    for (std::size_t view = 0; view < views.size(); ++view) begins.push_back(begins.back() + pixels.count(views, view));
+    for (std::size_t pose = 0; pose < poses; ++pose)
+      for (std::size_t view = 0; view < views.size(); ++view) {
+        std::ranges::copy(result.line_integrals(pose, view), std::back_inserter(line_integrals));
+        if (with_derivatives) std::ranges::copy(result.derivatives(pose, view), std::back_inserter(derivatives));
+      }
+  }
+  RenderResult result() && { return {std::move(line_integrals), std::move(begins), std::move(derivatives)}; }
+};
+
 // A renderer that does not do what it should.
 class Spoiled : public Renderer {
  public:
@@ -31,17 +49,9 @@ class Spoiled : public Renderer {
 
   RenderResult render(std::span<const XrayView> views, std::span<const Eigen::Isometry3d> room_from_patient,
                       const PixelSet& pixels) override {
-    const RenderResult right = renderer_->render(views, room_from_patient, pixels);
-    std::vector<float> values;
-    std::vector<std::size_t> begins = {0};
-    for (std::size_t view = 0; view < views.size(); ++view) begins.push_back(begins.back() + pixels.count(views, view));
-    for (std::size_t pose = 0; pose < room_from_patient.size(); ++pose)
-      for (std::size_t view = 0; view < views.size(); ++view) {
-        const auto part = right.line_integrals(pose, view);
-        values.insert(values.end(), part.begin(), part.end());
-      }
-    spoil_(values, room_from_patient.size());
-    return {std::move(values), std::move(begins)};
+    Parts parts(renderer_->render(views, room_from_patient, pixels), views, room_from_patient.size(), pixels, false);
+    spoil_(parts.line_integrals, room_from_patient.size());
+    return std::move(parts).result();
   }
   RendererKind kind() const override { return RendererKind::kRaycast; }
   std::string device() const override { return "a GPU that fails"; }
@@ -65,18 +75,10 @@ class OtherDerivatives : public Renderer {
   RenderResult render_with_derivatives(std::span<const XrayView> views,
                                        std::span<const Eigen::Isometry3d> room_from_patient,
                                        const PixelSet& pixels) override {
-    const RenderResult right = renderer_->render_with_derivatives(views, room_from_patient, pixels);
-    std::vector<float> values;
-    std::vector<MotionDerivatives> derivatives;
-    std::vector<std::size_t> begins = {0};
-    for (std::size_t view = 0; view < views.size(); ++view) begins.push_back(begins.back() + pixels.count(views, view));
-    for (std::size_t pose = 0; pose < room_from_patient.size(); ++pose)
-      for (std::size_t view = 0; view < views.size(); ++view) {
-        std::ranges::copy(right.line_integrals(pose, view), std::back_inserter(values));
-        std::ranges::copy(right.derivatives(pose, view), std::back_inserter(derivatives));
-      }
-    std::ranges::for_each(derivatives, spoil_);
-    return {std::move(values), std::move(begins), std::move(derivatives)};
+    Parts parts(renderer_->render_with_derivatives(views, room_from_patient, pixels), views, room_from_patient.size(),
+                pixels, true);
+    std::ranges::for_each(parts.derivatives, spoil_);
+    return std::move(parts).result();
   }
   bool has_derivatives() const override { return true; }
   RendererKind kind() const override { return RendererKind::kRaycast; }

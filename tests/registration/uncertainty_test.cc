@@ -9,6 +9,7 @@
 #include "registration/presets.h"
 #include "registration/register_views.h"
 #include "tests/drr/test_views.h"
+#include "tests/support/plain_renderer.h"
 #include "tests/support/registration_scene.h"
 
 namespace isoshift::uncertainty_test {
@@ -46,24 +47,9 @@ TEST(Uncertainty, MoreNoiseMakesEveryAxisLessCertain) {
   }
 }
 
-// A renderer that does not tell its derivatives.
-class WithoutDerivatives : public Renderer {
- public:
-  explicit WithoutDerivatives(Renderer& renderer) : renderer_(renderer) {}
-  RenderResult render(std::span<const XrayView> views, std::span<const Eigen::Isometry3d> room_from_patient,
-                      const PixelSet& pixels) override {
-    return renderer_.render(views, room_from_patient, pixels);
-  }
-  RendererKind kind() const override { return renderer_.kind(); }
-  std::string device() const override { return renderer_.device(); }
-
- private:
-  Renderer& renderer_;
-};
-
 TEST(Uncertainty, IsTheSameFromDerivativesAndFromDifferences) {
   const RegistrationScene scene = make_scene(small_scene(1000.0));
-  WithoutDerivatives plain(scene.renderers->finest());
+  PlainRenderer plain(scene.renderers->finest());
   const auto sigmas_of = [&](Renderer& renderer) {
     Objective objective(renderer, scene.images, scene.actual(), {.similarity = SimilarityKind::kGradientCorrelation});
     const Uncertainty said = estimated_uncertainty(objective, scene.actual(), {}).value();
