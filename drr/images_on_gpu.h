@@ -18,11 +18,19 @@ class ImagesOnGpu {
 
   // Line integrals as floats, [pose][view][pixel]. The renderer keeps the buffer, until its next call or its end.
   // Throws Error where the images exceed one storage buffer.
-  virtual const Buffer& render_on_gpu(std::span<const XrayView> views,
-                                      std::span<const Eigen::Isometry3d> room_from_patient, const PixelSet& pixels) = 0;
+  virtual Buffer& render_on_gpu(std::span<const XrayView> views, std::span<const Eigen::Isometry3d> room_from_patient,
+                                const PixelSet& pixels) = 0;
+
+  // The same, and the derivatives of every line integral, MotionDerivatives in the same order.
+  struct WithDerivatives {
+    Buffer &line_integrals, &derivatives;
+  };
+  virtual WithDerivatives render_with_derivatives_on_gpu(std::span<const XrayView> views,
+                                                         std::span<const Eigen::Isometry3d> room_from_patient,
+                                                         const PixelSet& pixels) = 0;
 
   // How many poses that is. Throws Error where not even one fits.
-  virtual std::size_t poses_at_once(std::size_t pixels_per_pose) const = 0;
+  virtual std::size_t poses_at_once(std::size_t pixels_per_pose, bool with_derivatives) const = 0;
 
   // Fills the buffers of so many line integrals and of their derivatives with NaN: what the next images leave out then
   // shows.

@@ -159,8 +159,37 @@ void Objective::add_view(const FixedImage& image, std::vector<std::uint32_t> com
   comparisons_.emplace_back(similarity_, std::move(xray), std::move(neighbors), drr_range);
 }
 
+template <class Render, class Compare>
+auto Objective::on_gpu(std::span<const Eigen::Isometry3d> room_from_patient, bool with_derivatives, Render render,
+                       Compare compare) {
+  ImagesOnGpu& gl = *renderer_.on_gpu();
+  std::size_t pixels_per_pose = 0;
+  for (const auto& of_view : pixels_.of_view) pixels_per_pose += of_view.size();
+  constexpr std::size_t kMostPoses = 1024;  // what is made of the images needs memory, too
+  const std::size_t at_once = std::min(kMostPoses, gl.poses_at_once(pixels_per_pose, with_derivatives));
+  decltype(compare(render(gl, room_from_patient), std::size_t{0})) all;
+  for (std::size_t first = 0; first < room_from_patient.size(); first += at_once) {
+    const auto poses = room_from_patient.subspan(first, std::min(at_once, room_from_patient.size() - first));
+    const auto begin = Clock::now();
+    const auto& drrs = render(gl, poses);
+    double rendering = seconds_since(begin);  // on llvmpipe all of it, on a GPU until it is under way
+    const auto part = compare(drrs, poses.size());
+    all.insert(all.end(), part.begin(), part.end());
+    // By now its clock can be read without waiting; glFinish() in between would keep the GPU idle.
+    const double both = seconds_since(begin);
+    rendering = std::min(both, rendering + renderer_.gpu_seconds().value_or(0.0));
+    seconds_.rendering += rendering;
+    seconds_.similarity += both - rendering;
+  }
+  return all;
+}
+
 std::vector<std::vector<double>> Objective::per_view(std::span<const Eigen::Isometry3d> room_from_patient) {
-  if (gl_similarity_) return per_view_on_gpu(room_from_patient);
+  if (gl_similarity_)
+    return on_gpu(
+        room_from_patient, false,
+        [&](ImagesOnGpu& gl, auto poses) -> const Buffer& { return gl.render_on_gpu(views_, poses, pixels_); },
+        [&](const Buffer& line_integrals, std::size_t poses) { return gl_similarity_->of(line_integrals, poses); });
   const auto begin = Clock::now();
   const RenderResult drrs = render(room_from_patient);
   const double rendering = seconds_since(begin);
@@ -173,48 +202,38 @@ std::vector<std::vector<double>> Objective::per_view(std::span<const Eigen::Isom
   return similarity;
 }
 
-std::vector<std::vector<double>> Objective::per_view_on_gpu(std::span<const Eigen::Isometry3d> room_from_patient) {
-  ImagesOnGpu& gl = *renderer_.on_gpu();
-  std::size_t pixels_per_pose = 0;
-  for (const auto& of_view : pixels_.of_view) pixels_per_pose += of_view.size();
-  const std::size_t at_once = gl.poses_at_once(pixels_per_pose);
-  std::vector<std::vector<double>> similarity;
-  for (std::size_t first = 0; first < room_from_patient.size(); first += at_once) {
-    const auto poses = room_from_patient.subspan(first, std::min(at_once, room_from_patient.size() - first));
-    const auto begin = Clock::now();
-    const Buffer& line_integrals = gl.render_on_gpu(views_, poses, pixels_);
-    double rendering = seconds_since(begin);  // on llvmpipe all of it, on a GPU until it is under way
-    const auto part = gl_similarity_->of(line_integrals, poses.size());
-    similarity.insert(similarity.end(), part.begin(), part.end());
-    // By now its clock can be read without waiting; glFinish() in between would keep the GPU idle.
-    const double all = seconds_since(begin);
-    rendering = std::min(all, rendering + renderer_.gpu_seconds().value_or(0.0));
-    seconds_.rendering += rendering;
-    seconds_.similarity += all - rendering;
-  }
-  return similarity;
-}
-
-std::vector<QuadraticModel> Objective::models(std::span<const Eigen::Isometry3d> room_from_patient) {
+std::vector<QuadraticModel> Objective::models_of_views(std::span<const Eigen::Isometry3d> room_from_patient) {
+  if (gl_similarity_ && has_curvature(similarity_))
+    return on_gpu(
+        room_from_patient, true,
+        [&](ImagesOnGpu& gl, auto poses) { return gl.render_with_derivatives_on_gpu(views_, poses, pixels_); },
+        [&](const ImagesOnGpu::WithDerivatives& drrs, std::size_t poses) {
+          return gl_similarity_->models(drrs.line_integrals, drrs.derivatives, poses);
+        });
   const auto begin = Clock::now();
   const RenderResult drrs = render_with_derivatives(room_from_patient);
   const double rendering = seconds_since(begin);
   const std::size_t views = views_.size();
-  std::vector<QuadraticModel> of_views(room_from_patient.size() * views);
-  parallel_for(std::size_t{0}, of_views.size(), [&](std::size_t n) {
+  std::vector<QuadraticModel> models(room_from_patient.size() * views);
+  parallel_for(std::size_t{0}, models.size(), [&](std::size_t n) {
     const std::size_t pose = n / views, view = n % views;
-    of_views[n] =
-        comparisons_[view].model(drrs.line_integrals(pose, view), pixel_jacobian(drrs.derivatives(pose, view)));
+    models[n] = comparisons_[view].model(drrs.line_integrals(pose, view), pixel_jacobian(drrs.derivatives(pose, view)));
   });
+  seconds_.rendering += rendering;
+  seconds_.similarity += seconds_since(begin) - rendering;
+  return models;
+}
+
+std::vector<QuadraticModel> Objective::models(std::span<const Eigen::Isometry3d> room_from_patient) {
+  const std::vector<QuadraticModel> of_views = models_of_views(room_from_patient);
   std::vector<QuadraticModel> means;
+  const std::size_t views = views_.size();
   const double share = 1.0 / static_cast<double>(views);
   for (std::size_t first = 0; first < of_views.size(); first += views) {
     means.push_back(weighted_sum(share, of_views[first], 0.0, of_views[first]));
     for (std::size_t view = 1; view < views; ++view)
       means.back() = weighted_sum(1.0, means.back(), share, of_views[first + view]);
   }
-  seconds_.rendering += rendering;
-  seconds_.similarity += seconds_since(begin) - rendering;
   return means;
 }
 

@@ -70,7 +70,12 @@ class Objective {
 
  private:
   void add_view(const FixedImage& image, std::vector<std::uint32_t> compared, const Eigen::Isometry3d& about);
-  std::vector<std::vector<double>> per_view_on_gpu(std::span<const Eigen::Isometry3d> room_from_patient);
+  // The models of the views, [pose][view] one after the other.
+  std::vector<QuadraticModel> models_of_views(std::span<const Eigen::Isometry3d> room_from_patient);
+  // What `compare` makes of the images that `render` leaves on the GPU, of as many poses at a time as fit.
+  template <class Render, class Compare>
+  auto on_gpu(std::span<const Eigen::Isometry3d> room_from_patient, bool with_derivatives, Render render,
+              Compare compare);
 
   Renderer& renderer_;
   SimilarityKind similarity_;

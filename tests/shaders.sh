@@ -11,7 +11,9 @@ while read -r shader; do
   variants=$(grep -oE '(defined\(|#ifdef )[A-Z_]+' "$shader" | grep -oE '[A-Z_]+$' | sort -u || true)
   for variant in "" $variants; do
     source=$scratch/shader.${shader##*.}
-    { echo "#version 450 core"; [ -z "$variant" ] || echo "#define $variant"; echo "#line 1"; cat "$shader"; } >"$source"
+    # What comes before all shaders of a folder.
+    common=$(find "$(dirname "$shader")" -maxdepth 1 -name '*.glsl')
+    { echo "#version 450 core"; for name in $variant; do echo "#define $name"; done; cat $common <(echo "#line 1") "$shader"; } >"$source"
     if ! { glslangValidator -G100 --target-env opengl -o "$scratch/shader.spv" "$source" &&
            spirv-val --target-env opengl4.5 "$scratch/shader.spv"; } >"$scratch/log" 2>&1; then
       echo "$shader${variant:+ with $variant} is not valid:" >&2

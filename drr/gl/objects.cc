@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <array>
+#include <memory>
 
 #include "base/error.h"
 
@@ -73,6 +74,27 @@ GlName::~GlName() {
   if (name_ != 0 && eglGetCurrentContext() != EGL_NO_CONTEXT) remove_(name_);
 }
 
+std::span<const std::byte> MappedCopy::of(std::uint32_t buffer, std::size_t bytes) {
+  if (bytes > capacity_) {
+    constexpr GLbitfield kMapped = GL_MAP_READ_BIT | GL_MAP_PERSISTENT_BIT | GL_MAP_COHERENT_BIT;
+    const auto size = static_cast<GLsizeiptr>(bytes);
+    name_.emplace(new_buffer());
+    glNamedBufferStorage(name_->get(), size, nullptr, kMapped | GL_CLIENT_STORAGE_BIT);
+    mapped_ = static_cast<const std::byte*>(glMapNamedBufferRange(name_->get(), 0, size, kMapped));
+    capacity_ = mapped_ == nullptr ? 0 : bytes;
+    if (mapped_ == nullptr) throw Error(fmt::format("this OpenGL gives no memory to read {} bytes back", bytes));
+  }
+  if (bytes == 0) return {};
+  glMemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT);
+  glCopyNamedBufferSubData(buffer, name_->get(), 0, 0, static_cast<GLsizeiptr>(bytes));
+  const std::unique_ptr<__GLsync, void (*)(GLsync)> copied(glFenceSync(GL_SYNC_GPU_COMMANDS_COMPLETE, 0),
+                                                           [](GLsync sync) { glDeleteSync(sync); });
+  // A GPU that was reset signals its fences, too: GlContext::check() then says so.
+  constexpr GLuint64 kOneSecond = 1'000'000'000;
+  while (glClientWaitSync(copied.get(), GL_SYNC_FLUSH_COMMANDS_BIT, kOneSecond) == GL_TIMEOUT_EXPIRED) continue;
+  return {mapped_, bytes};
+}
+
 Buffer::Buffer() : name_(new_buffer()) {}
 
 void Buffer::reserve(std::size_t bytes) {
@@ -88,10 +110,6 @@ void Buffer::upload(std::span<const std::byte> bytes) {
 
 void Buffer::fill(float value) {
   if (capacity_ > 0) glClearNamedBufferData(name_.get(), GL_R32F, GL_RED, GL_FLOAT, &value);
-}
-
-void Buffer::download(std::span<std::byte> bytes) const {
-  glGetNamedBufferSubData(name_.get(), 0, static_cast<GLsizeiptr>(bytes.size()), bytes.data());
 }
 
 void Buffer::bind(std::uint32_t slot) const { glBindBufferBase(GL_SHADER_STORAGE_BUFFER, slot, name_.get()); }

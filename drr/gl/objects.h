@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <glm/mat4x4.hpp>
+#include <optional>
 #include <span>
 #include <string>
 #include <utility>
@@ -32,6 +33,19 @@ class GlName {
   Delete remove_;
 };
 
+// Memory of the host into which the GPU copies, mapped once for as long as it exists: a driver that is asked for the
+// bytes of a buffer instead may bring all of that buffer, however few are wanted.
+class MappedCopy {
+ public:
+  // The first bytes of a buffer, valid until the next call. Waits until they are there.
+  std::span<const std::byte> of(std::uint32_t buffer, std::size_t bytes);
+
+ private:
+  std::optional<GlName> name_;
+  const std::byte* mapped_ = nullptr;
+  std::size_t capacity_ = 0;
+};
+
 // A buffer that grows as needed: storage for shaders, or attributes of vertices.
 class Buffer {
  public:
@@ -39,13 +53,18 @@ class Buffer {
   void upload(std::span<const std::byte> bytes);
   void reserve(std::size_t bytes);  // what it held is lost
   void fill(float value);           // all of it
-  void download(std::span<std::byte> bytes) const;
+  // The first `count` values, which shaders wrote. Waits until they are there; valid until the next call.
+  template <class T>
+  std::span<const T> read(std::size_t count) {
+    return {reinterpret_cast<const T*>(copy_.of(name_.get(), count * sizeof(T)).data()), count};
+  }
   void bind(std::uint32_t slot) const;  // as shader storage
   std::uint32_t get() const { return name_.get(); }
 
  private:
   GlName name_;
   std::size_t capacity_ = 0;
+  MappedCopy copy_;
 };
 
 // A 3D texture of one value per voxel, linearly interpolated, 0 outside: voxel i lies at texture coordinate

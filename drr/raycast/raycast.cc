@@ -107,44 +107,52 @@ RenderResult RaycastGlRenderer::render_all(std::span<const XrayView> views,
   timer_.clear();
   std::vector<std::size_t> begins = checked_view_begins(views, room_from_patient, pixels);
   const std::size_t pixels_per_pose = begins.back();
-  std::vector<float> line_integrals(pixels_per_pose * room_from_patient.size());
-  std::vector<MotionDerivatives> derivatives(with_derivatives ? line_integrals.size() : 0);
+  std::vector<float> line_integrals;
+  std::vector<MotionDerivatives> derivatives;
+  line_integrals.reserve(pixels_per_pose * room_from_patient.size());
+  derivatives.reserve(with_derivatives ? line_integrals.capacity() : 0);
   upload_views(views, begins, pixels);
-  const std::size_t at_once =
-      poses_at_once(pixels_per_pose, with_derivatives ? sizeof(MotionDerivatives) : sizeof(float));
+  const std::size_t at_once = poses_at_once(pixels_per_pose, with_derivatives);
   for (std::size_t first = 0; first < room_from_patient.size(); first += at_once) {
     const std::size_t count = std::min(at_once, room_from_patient.size() - first);
     dispatch(views, room_from_patient.subspan(first, count), pixels_per_pose, !pixels.of_view.empty(),
              with_derivatives);
-    const std::size_t begin = first * pixels_per_pose, pixels_rendered = count * pixels_per_pose;
-    result_.download(std::as_writable_bytes(std::span(line_integrals).subspan(begin, pixels_rendered)));
-    if (with_derivatives)
-      derivatives_.download(std::as_writable_bytes(std::span(derivatives).subspan(begin, pixels_rendered)));
+    const auto append = [](const auto& part, auto& all) { all.insert(all.end(), part.begin(), part.end()); };
+    append(result_.read<float>(count * pixels_per_pose), line_integrals);
+    if (with_derivatives) append(derivatives_.read<MotionDerivatives>(count * pixels_per_pose), derivatives);
   }
   context_.check("rendering");
   return RenderResult(std::move(line_integrals), std::move(begins), std::move(derivatives));
 }
 
-const Buffer& RaycastGlRenderer::render_on_gpu(std::span<const XrayView> views,
-                                               std::span<const Eigen::Isometry3d> room_from_patient,
-                                               const PixelSet& pixels) {
-  context_.make_current();
-  timer_.clear();
-  const std::vector<std::size_t> begins = checked_view_begins(views, room_from_patient, pixels);
-  if (room_from_patient.size() > poses_at_once(begins.back()))
-    throw Error("so many images exceed a storage buffer of this OpenGL");
-  upload_views(views, begins, pixels);
-  dispatch(views, room_from_patient, begins.back(), !pixels.of_view.empty(), false);
-  context_.check("rendering");
+Buffer& RaycastGlRenderer::render_on_gpu(std::span<const XrayView> views,
+                                         std::span<const Eigen::Isometry3d> room_from_patient, const PixelSet& pixels) {
+  render_all_on_gpu(views, room_from_patient, pixels, false);
   return result_;
 }
 
-std::size_t RaycastGlRenderer::poses_at_once(std::size_t pixels_per_pose) const {
-  return poses_at_once(pixels_per_pose, sizeof(float));
+ImagesOnGpu::WithDerivatives RaycastGlRenderer::render_with_derivatives_on_gpu(
+    std::span<const XrayView> views, std::span<const Eigen::Isometry3d> room_from_patient, const PixelSet& pixels) {
+  render_all_on_gpu(views, room_from_patient, pixels, true);
+  return {.line_integrals = result_, .derivatives = derivatives_};
 }
 
-std::size_t RaycastGlRenderer::poses_at_once(std::size_t pixels_per_pose, std::size_t pixel_bytes) const {
-  const std::size_t pose_bytes = std::max<std::size_t>(1, pixels_per_pose * pixel_bytes);
+void RaycastGlRenderer::render_all_on_gpu(std::span<const XrayView> views,
+                                          std::span<const Eigen::Isometry3d> room_from_patient, const PixelSet& pixels,
+                                          bool with_derivatives) {
+  context_.make_current();
+  timer_.clear();
+  const std::vector<std::size_t> begins = checked_view_begins(views, room_from_patient, pixels);
+  if (room_from_patient.size() > poses_at_once(begins.back(), with_derivatives))
+    throw Error("so many images exceed a storage buffer of this OpenGL");
+  upload_views(views, begins, pixels);
+  dispatch(views, room_from_patient, begins.back(), !pixels.of_view.empty(), with_derivatives);
+  context_.check("rendering");
+}
+
+std::size_t RaycastGlRenderer::poses_at_once(std::size_t pixels_per_pose, bool with_derivatives) const {
+  const std::size_t pose_bytes =
+      std::max<std::size_t>(1, pixels_per_pose * (with_derivatives ? sizeof(MotionDerivatives) : sizeof(float)));
   const std::size_t count = static_cast<std::size_t>(context_.largest_buffer_bytes()) / pose_bytes;
   if (count == 0)
     throw Error("images of this size exceed the storage buffers of this OpenGL.\n       Use --renderer cpu");
@@ -236,7 +244,7 @@ void RaycastGlRenderer::dispatch(std::span<const XrayView> views, std::span<cons
       glDispatchCompute(static_cast<GLuint>(std::min(groups, kMaxGroups)),
                         static_cast<GLuint>(std::min(poses_end - pose, kMaxGroups)), 1);
     }
-  glMemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT | GL_SHADER_STORAGE_BARRIER_BIT);
+  glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);
 }
 
 }  // namespace isoshift

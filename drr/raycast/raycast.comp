@@ -40,10 +40,11 @@ layout(location = 4) uniform float step_mm;
 layout(location = 5) uniform mat3 mm_from_voxel_axes;
 layout(location = 6) uniform vec3 box_low;   // outside of this box, in voxel indices, every sample is 0
 layout(location = 7) uniform vec3 box_high;
-layout(location = 8) uniform vec2 unit_per_mm;  // attenuation of a texture value of 1: kV, MV
+layout(location = 8) uniform vec2 units_per_mm;  // attenuation of a texture value of 1: kV, MV
 layout(location = 9) uniform uvec2 rays;        // of this dispatch, among those of a pose: the first, and the end
 
 const int kBlockEdge = 8;
+const int kAtOnce = 4;
 
 #ifdef EIGHT_BIT_WEIGHTS
 // What the texture units of GPUs do: weights of 8 bits.
@@ -66,10 +67,6 @@ float sampled(sampler3D volume, vec3 voxel) {
 }
 #endif
 
-float attenuation(bool is_mv, vec3 voxel) {
-  return is_mv ? sampled(mv_attenuation, voxel) : sampled(kv_attenuation, voxel);
-}
-
 // What a ray adds up: attenuation, its gradient, and the gradient times t. Of the plain variant only the first.
 struct Sums {
   float value;
@@ -80,11 +77,11 @@ struct Sums {
 
 #ifdef DERIVATIVES
 // The gradient of the trilinear interpolation: along each axis the difference between the faces of the cell.
-vec3 gradient(bool is_mv, vec3 voxel) {
+vec3 gradient(sampler3D volume, vec3 voxel) {
   vec3 low = floor(voxel), high = low + 1.0;
-  return vec3(attenuation(is_mv, vec3(high.x, voxel.yz)) - attenuation(is_mv, vec3(low.x, voxel.yz)),
-              attenuation(is_mv, vec3(voxel.x, high.y, voxel.z)) - attenuation(is_mv, vec3(voxel.x, low.y, voxel.z)),
-              attenuation(is_mv, vec3(voxel.xy, high.z)) - attenuation(is_mv, vec3(voxel.xy, low.z)));
+  return vec3(sampled(volume, vec3(high.x, voxel.yz)) - sampled(volume, vec3(low.x, voxel.yz)),
+              sampled(volume, vec3(voxel.x, high.y, voxel.z)) - sampled(volume, vec3(voxel.x, low.y, voxel.z)),
+              sampled(volume, vec3(voxel.xy, high.z)) - sampled(volume, vec3(voxel.xy, low.z)));
 }
 #endif
 
@@ -97,11 +94,11 @@ Sums nothing() {
   return sums;
 }
 
-void add_sample(vec3 source, vec3 way, float t, bool is_mv, inout Sums sums) {
+void add_sample(vec3 source, vec3 way, float t, sampler3D volume, inout Sums sums) {
   vec3 voxel = source + t * way;
-  sums.value += attenuation(is_mv, voxel);
+  sums.value += sampled(volume, voxel);
 #ifdef DERIVATIVES
-  vec3 slope = gradient(is_mv, voxel);
+  vec3 slope = gradient(volume, voxel);
   sums.by_source += slope;
   sums.by_way += t * slope;
 #endif
@@ -116,7 +113,7 @@ void scale(float factor, inout Sums sums) {
 }
 
 // The line integral, and its derivatives by the source and the way in voxels.
-Sums along(vec3 source, vec3 way, bool is_mv) {
+Sums along(vec3 source, vec3 way, sampler3D volume, float unit_per_mm) {
   // The part of the ray inside the box. A component of 0 gives infinities, which min and max put in their place.
   vec3 at_low = (box_low - source) / way;
   vec3 at_high = (box_high - source) / way;
@@ -154,9 +151,13 @@ Sums along(vec3 source, vec3 way, bool is_mv) {
       if (any(lessThan(block, ivec3(0))) || any(greaterThan(block, last_block))) next = steps;
     } while (next < steps && (texelFetch(occupied, block, 0).r > 0.0) == run);
     if (!run) continue;
-    for (int n = first; n < next; ++n) add_sample(source, way, begin + (float(n) + 0.5) * step_t, is_mv, sums);
+    // The texture units fetch several samples at once where a loop's end is known when it is compiled.
+    for (; first + kAtOnce <= next; first += kAtOnce)
+      for (int n = 0; n < kAtOnce; ++n)
+        add_sample(source, way, begin + (float(first + n) + 0.5) * step_t, volume, sums);
+    for (; first < next; ++first) add_sample(source, way, begin + (float(first) + 0.5) * step_t, volume, sums);
   }
-  scale(step_t * way_mm * (is_mv ? unit_per_mm.y : unit_per_mm.x), sums);
+  scale(step_t * way_mm * unit_per_mm, sums);
   return sums;
 }
 
@@ -189,7 +190,12 @@ void main() {
       uint pixel = has_pixel_list != 0u ? pixels[n] : place;
       vec3 position = vec3(float(pixel % columns), float(pixel / columns), 1.0);
       mat4 camera = voxel_from_pixel[pose * view_count + view];
-      Sums sums = along(camera[3].xyz, mat3(camera) * position, views[view].is_mv != 0u);
+      vec3 source = camera[3].xyz, way = mat3(camera) * position;
+      Sums sums;
+      if (views[view].is_mv != 0u)
+        sums = along(source, way, mv_attenuation, units_per_mm.y);
+      else
+        sums = along(source, way, kv_attenuation, units_per_mm.x);
       uint at = pose * pixels_per_pose + views[view].first_pixel + place;
       line_integrals[at] = sums.value;
 #ifdef DERIVATIVES

@@ -35,9 +35,12 @@ class RaycastGlRenderer final : public Renderer, public ImagesOnGpu {
   std::optional<double> gpu_seconds() const override { return seconds_of(timer_, context_); }
   ImagesOnGpu* on_gpu() override { return this; }
 
-  const Buffer& render_on_gpu(std::span<const XrayView> views, std::span<const Eigen::Isometry3d> room_from_patient,
-                              const PixelSet& pixels) override;
-  std::size_t poses_at_once(std::size_t pixels_per_pose) const override;
+  Buffer& render_on_gpu(std::span<const XrayView> views, std::span<const Eigen::Isometry3d> room_from_patient,
+                        const PixelSet& pixels) override;
+  WithDerivatives render_with_derivatives_on_gpu(std::span<const XrayView> views,
+                                                 std::span<const Eigen::Isometry3d> room_from_patient,
+                                                 const PixelSet& pixels) override;
+  std::size_t poses_at_once(std::size_t pixels_per_pose, bool with_derivatives) const override;
   GlContext& context() const override { return context_; }
 
   void poison(std::size_t line_integrals) override;
@@ -48,8 +51,8 @@ class RaycastGlRenderer final : public Renderer, public ImagesOnGpu {
                           const PixelSet& pixels, bool with_derivatives);
   void dispatch(std::span<const XrayView> views, std::span<const Eigen::Isometry3d> poses, std::size_t pixels_per_pose,
                 bool has_pixel_list, bool with_derivatives);
-  // How many poses fit into a storage buffer of so many bytes per pixel. Throws Error where not even one does.
-  std::size_t poses_at_once(std::size_t pixels_per_pose, std::size_t pixel_bytes) const;
+  void render_all_on_gpu(std::span<const XrayView> views, std::span<const Eigen::Isometry3d> room_from_patient,
+                         const PixelSet& pixels, bool with_derivatives);
 
   GlContext& context_;
   const Program& program_;

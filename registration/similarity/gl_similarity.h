@@ -1,6 +1,6 @@
 #pragma once
-// Similarities on the GPU (similarity.comp), as Comparison::of() defines them: line integrals stay there, one number
-// per pose and view comes back.
+// Similarities and their models on the GPU (similarity.comp, correlation_sums.comp), as Comparison::of() and model()
+// define them: line integrals stay there, a few numbers per pose and view come back.
 
 #include <cstddef>
 #include <span>
@@ -24,10 +24,26 @@ class GlSimilarity {
   // of the X-rays'. Waits until they are there. Result [pose][view].
   std::vector<std::vector<double>> of(const Buffer& line_integrals, std::size_t poses);
 
+  // The same as models of the patient's motions, from the line integrals' derivatives by them. Of kinds with
+  // has_curvature(); of another to ask is a logic error. Result [pose][view], one after the other.
+  std::vector<QuadraticModel> models(const Buffer& line_integrals, const Buffer& derivatives, std::size_t poses);
+
  private:
-  const GlContext& context_;
+  // Pixels compared that one work group adds up.
+  struct Tile {
+    std::uint32_t view, list, first, end;
+  };
+
+  void bind_views(const Buffer& line_integrals) const;
+  // A work group for each of `per_pose` at every pose.
+  void dispatch(std::size_t poses, std::size_t per_pose) const;
+
+  GlContext& context_;
+  SimilarityKind kind_;
   const Program& program_;
   Buffer views_, xray_, pairs_, result_;
+  std::vector<Tile> tiles_;  // of one pose, by view and list
+  Buffer tile_buffer_, middles_, sums_;
   std::size_t view_count_, pixels_per_pose_ = 0;
 };
 

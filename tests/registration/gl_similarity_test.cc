@@ -161,6 +161,31 @@ TEST_P(GlSimilarityTest, IsThatOfTheCpuOnDrrsAndXrays) {
   RecordProperty("largest_difference", fmt::format("{:.1e}", largest));
 }
 
+TEST_P(GlSimilarityTest, ModelsAreThoseOfTheCpu) {
+  if (!has_curvature(GetParam().kind)) GTEST_SKIP() << "its models are not made on the GPU";
+  RaycastGlRenderer renderer(scene().ct, {}, kBothBeams, device());
+  for (const double fraction : {1.0, 0.1}) {
+    const ObjectiveOptions options{.similarity = GetParam().kind, .pixel_fraction = fraction, .min_pixels = 100};
+    Objective gpu(renderer, scene().images, scene().planned, options);
+    const auto poses = poses_about_plan(9);
+    const auto found = gpu.models(poses);
+    const RenderResult drrs = gpu.render_with_derivatives(poses);
+    ASSERT_EQ(found.size(), poses.size());
+    for (std::size_t pose = 0; pose + 1 < poses.size(); ++pose) {
+      const auto of_view = [&](std::size_t view) {
+        return gpu.comparison(view).model(drrs.line_integrals(pose, view), pixel_jacobian(drrs.derivatives(pose, view)));
+      };
+      const QuadraticModel expected = weighted_sum(0.5, of_view(0), 0.5, of_view(1));
+      EXPECT_NEAR(found[pose].value, expected.value, kTolerance);
+      EXPECT_TRUE(found[pose].gradient.isApprox(expected.gradient, 1e-4)) << pose;
+      EXPECT_TRUE(found[pose].curvature.isApprox(expected.curvature, 1e-4)) << pose;
+      EXPECT_EQ(gpu.models(std::span(poses).subspan(pose, 1))[0].gradient, found[pose].gradient) << "alone";
+    }
+    EXPECT_EQ(found.back().value, 0.0) << "outside of the view";
+    EXPECT_TRUE(found.back().gradient.isZero() && found.back().curvature.isZero());
+  }
+}
+
 TEST_P(GlSimilarityTest, IsThatOfTheCpuWhereThereIsNothingToCompare) {
   const std::vector<float> xray = random_pixels(kColumns * 17, 1);
   std::vector<float> one_bin = random_pixels(xray.size(), 2), half = random_pixels(xray.size(), 3);
@@ -240,7 +265,7 @@ TEST(GlSimilarity, TakesMorePosesThanOneBufferHolds) {
       .view = view, .line_integral = Image<float>(kPixels, kPixels), .field = Image<std::uint8_t>(kPixels, kPixels, 1)};
   for (int column = kPixels / 2; column < kPixels / 2 + 10; ++column)
     image.line_integral.at(column, kPixels / 2) = 1.0F;
-  const std::size_t at_once = renderer.poses_at_once(image.field.pixels.size());
+  const std::size_t at_once = renderer.poses_at_once(image.field.pixels.size(), false);
   if (at_once > 100) GTEST_SKIP() << "storage buffers hold " << at_once << " poses: too slow";
   const auto poses = random_poses(static_cast<int>(at_once) + 1);
   Objective objective(renderer, std::span(&image, 1), poses.front(), {});
