@@ -7,13 +7,14 @@
 #include <random>
 #include <vector>
 
+#include "registration/objective.h"
 #include "registration/similarity/gl_similarity.h"
 
 namespace isoshift {
 namespace {
 
 // Sums of floats in another order than on the CPU leave less than a tenth of it.
-constexpr double kMostSimilarityDifference = 1e-4;
+constexpr double kMostSimilarityDifference = 1e-4, kMostModelDifference = 1e-3;
 
 constexpr int kTestColumns = 24, kTestRows = 20;
 constexpr std::size_t kTestViews = 2, kTestPoses = 2;
@@ -40,19 +41,43 @@ std::vector<Neighbors> inner_pixels() {
   return neighbors;
 }
 
+// How the pixels of an image change with six motions: six other images, about 0.
+std::vector<MotionDerivatives> made_up_derivatives(unsigned seed) {
+  std::vector<MotionDerivatives> derivatives(static_cast<std::size_t>(kTestColumns) * kTestRows);
+  for (int motion = 0; motion < 6; ++motion) {
+    const std::vector<float> image = made_up_image(100 + 7 * seed + static_cast<unsigned>(motion));
+    for (std::size_t n = 0; n < image.size(); ++n) derivatives[n][motion] = image[n] - 3.0F;
+  }
+  return derivatives;
+}
+
+double relative_difference(const Eigen::MatrixXd& found, const Eigen::MatrixXd& expected) {
+  return (found - expected).norm() / expected.norm();
+}
+
 }  // namespace
 
 SimilarityCheck check_similarities(GlContext& context) {
   context.make_current();
   std::vector<std::vector<float>> drrs;  // [pose][view]
+  std::vector<std::vector<MotionDerivatives>> slopes;
   std::vector<float> all;
+  std::vector<MotionDerivatives> all_slopes;
   for (unsigned n = 0; n < kTestPoses * kTestViews; ++n) {
     drrs.push_back(made_up_image(10 + n));
     all.insert(all.end(), drrs.back().begin(), drrs.back().end());
+    slopes.push_back(made_up_derivatives(n));
+    all_slopes.insert(all_slopes.end(), slopes.back().begin(), slopes.back().end());
   }
-  Buffer line_integrals;
+  Buffer line_integrals, derivatives;
   line_integrals.upload(std::as_bytes(std::span(all)));
+  derivatives.upload(std::as_bytes(std::span(all_slopes)));
   SimilarityCheck result;
+  const auto require = [&](double difference, double most, const char* what, SimilarityKind kind) {
+    if (!(difference <= most) && !result.failure)
+      result.failure = fmt::format("{} {} differs from that of the CPU by {:.2g}, expected at most {}", what,
+                                   to_string(kind), difference, most);
+  };
   for (const SimilarityKind kind : kSimilarityKinds) {
     std::vector<Comparison> comparisons;
     comparisons.reserve(kTestViews);
@@ -60,14 +85,23 @@ SimilarityCheck check_similarities(GlContext& context) {
       comparisons.emplace_back(kind, made_up_image(view),
                                kind == SimilarityKind::kGradientCorrelation ? inner_pixels() : std::vector<Neighbors>(),
                                wide_range_of(drrs[view]));
-    const auto on_gpu = GlSimilarity(context, comparisons).of(line_integrals, kTestPoses);
+    GlSimilarity on_gpu(context, comparisons);
+    const auto found = on_gpu.of(line_integrals, kTestPoses);
+    const auto models =
+        has_curvature(kind) ? on_gpu.models(line_integrals, derivatives, kTestPoses) : std::vector<QuadraticModel>();
     for (std::size_t pose = 0; pose < kTestPoses; ++pose)
       for (std::size_t view = 0; view < kTestViews; ++view) {
-        const double difference = std::abs(on_gpu[pose][view] - comparisons[view].of(drrs[pose * kTestViews + view]));
-        if (!(difference <= kMostSimilarityDifference) && !result.failure)
-          result.failure = fmt::format("the similarity {} differs from that of the CPU by {:.2g}, expected at most {}",
-                                       to_string(kind), difference, kMostSimilarityDifference);
+        const std::size_t n = pose * kTestViews + view;
+        const double difference = std::abs(found[pose][view] - comparisons[view].of(drrs[n]));
+        require(difference, kMostSimilarityDifference, "the similarity", kind);
         if (!(difference <= result.largest)) result.largest = difference;
+        if (models.empty()) continue;
+        const QuadraticModel expected = comparisons[view].model(drrs[n], pixel_jacobian(slopes[n]));
+        const double of_model = std::max({std::abs(models[n].value - expected.value),
+                                          relative_difference(models[n].gradient, expected.gradient),
+                                          relative_difference(models[n].curvature, expected.curvature)});
+        require(of_model, kMostModelDifference, "the model of", kind);
+        if (!(of_model <= result.models)) result.models = of_model;
       }
   }
   return result;

@@ -118,6 +118,8 @@ TEST(GpuCheck, LlvmpipePassesAndSaysByHowMuch) {
   EXPECT_GT(check.rendering.slopes, 0.0);
   EXPECT_GT(check.rendering.samples_per_second, 0.0);
   EXPECT_LT(check.similarity.largest, 1e-5);
+  EXPECT_GT(check.similarity.models, 0.0);
+  EXPECT_LT(check.similarity.models, 1e-4);
   EXPECT_THAT(check.words(), testing::StartsWith("passed, line integrals within 0.0"));
 }
 
