@@ -25,6 +25,7 @@ void register_two_views(benchmark::State& state, const char* name, RendererKind 
   }
   Eigen::Isometry3d planned = Eigen::Isometry3d::Identity();  // HFS: (x, y, z) of the room is (x, z, -y) of the patient
   planned.linear() << 1, 0, 0, 0, 0, 1, 0, -1, 0;
+  register_views(renderers, prepared(xrays), planned, preset(name));  // compiles shaders
   double evaluations = 0.0, rendering = 0.0, similarity = 0.0, seconds = 0.0;
   for (auto _ : state) {
     RegistrationResult result = register_views(renderers, prepared(xrays), planned, preset(name));

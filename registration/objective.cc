@@ -6,6 +6,7 @@
 #include <chrono>
 #include <functional>
 #include <numeric>
+#include <optional>
 #include <random>
 
 #include "base/error.h"
@@ -106,58 +107,83 @@ std::vector<Neighbors> neighbors_among(const std::vector<std::uint32_t>& rendere
   return neighbors;
 }
 
+// DRRs with pixels twice as large as the images', where these have enough.
+class CoarseDrrs {
+ public:
+  CoarseDrrs(Renderer& renderer, std::span<const FixedImage> images, const Eigen::Isometry3d& room_from_patient) {
+    constexpr int kFewest = 8;
+    for (const FixedImage& image : images) {
+      coarser_.push_back(std::min(image.view.columns, image.view.rows) < kFewest ? 1 : 2);
+      views_.push_back(image.view.downscaled(coarser_.back()));
+    }
+    drrs_ = renderer.render(views_, std::span(&room_from_patient, 1), PixelSet::all());
+  }
+  int coarser(std::size_t view) const { return coarser_[view]; }
+  Image<float> image(std::size_t view) const { return image_of(views_[view], drrs_.line_integrals(0, view)); }
+
+ private:
+  std::vector<int> coarser_;
+  std::vector<XrayView> views_;
+  RenderResult drrs_{{}, {}};
+};
+
+void for_each_view(std::span<const FixedImage> images, const auto& work) {
+  parallel_for(std::size_t{0}, images.size(), work);
+}
+
 }  // namespace
 
 Objective::Objective(Renderer& renderer, std::span<const FixedImage> images, const Eigen::Isometry3d& about,
                      const ObjectiveOptions& options)
     : renderer_(renderer), similarity_(options.similarity) {
-  std::mt19937_64 random(options.seed);
-  for (const FixedImage& image : images) {
-    const std::vector<std::uint32_t> field = comparable_pixels(image.field, similarity_);
-    if (field.size() < kMinPixels)
+  const bool of_gradients = similarity_ == SimilarityKind::kGradientCorrelation;
+  compared_.resize(images.size());
+  for_each_view(images,
+                [&](std::size_t view) { compared_[view] = comparable_pixels(images[view].field, similarity_); });
+  for (std::size_t view = 0; view < images.size(); ++view)
+    if (compared_[view].size() < kMinPixels)
       throw Error(fmt::format(
           "{}: only {} of {} pixels lie in the irradiated field and are neither saturated nor excluded, too "
           "few to compare",
-          name_of_view(image.label, views_.size()), field.size(), image.field.pixels.size()));
-    if (similarity_ != SimilarityKind::kGradientCorrelation) {
-      add_view(image, drawn_pixels(field, options, random), about);
-      continue;
-    }
-    constexpr int kFewest = 8;
-    const int coarser = std::min(image.view.columns, image.view.rows) < kFewest ? 1 : 2;
-    const XrayView coarse = image.view.downscaled(coarser);
-    const RenderResult drr = renderer.render(std::span(&coarse, 1), std::span(&about, 1), PixelSet::all());
-    add_view(image,
-             strongest_pixels(field, image.view.columns, image_of(coarse, drr.line_integrals(0, 0)), coarser, options),
-             about);
+          name_of_view(images[view].label, view), compared_[view].size(), images[view].field.pixels.size()));
+  if (of_gradients) {
+    const CoarseDrrs drrs(renderer, images, about);
+    for_each_view(images, [&](std::size_t view) {
+      compared_[view] =
+          strongest_pixels(compared_[view], images[view].view.columns, drrs.image(view), drrs.coarser(view), options);
+    });
+  } else {
+    std::mt19937_64 random(options.seed);
+    for (std::vector<std::uint32_t>& of_view : compared_) of_view = drawn_pixels(of_view, options, random);
   }
+
+  pixels_.of_view.resize(images.size());
+  for (const FixedImage& image : images) views_.push_back(image.view);
+  for_each_view(images, [&](std::size_t view) {
+    pixels_.of_view[view] = of_gradients ? with_neighbors(compared_[view], images[view].field) : compared_[view];
+  });
+  std::vector<Range> drr_ranges(images.size());
+  if (has_histogram(similarity_)) {
+    const RenderResult drrs = render(std::span(&about, 1));
+    for (std::size_t view = 0; view < images.size(); ++view)
+      drr_ranges[view] = wide_range_of(drrs.line_integrals(0, view));
+  }
+  std::vector<std::optional<Comparison>> comparisons(images.size());
+  for_each_view(images, [&](std::size_t view) {
+    const FixedImage& image = images[view];
+    std::vector<Neighbors> neighbors;
+    if (of_gradients) neighbors = neighbors_among(pixels_.of_view[view], compared_[view], image.field);
+    std::vector<float> xray;
+    xray.reserve(pixels_.of_view[view].size());
+    for (const std::uint32_t pixel : pixels_.of_view[view]) xray.push_back(image.line_integral.pixels[pixel]);
+    comparisons[view].emplace(similarity_, std::move(xray), std::move(neighbors), drr_ranges[view]);
+  });
+  for (std::optional<Comparison>& comparison : comparisons) comparisons_.push_back(*std::move(comparison));
   if (ImagesOnGpu* gl = renderer_.on_gpu(); gl != nullptr && !comparisons_.empty())
     gl_similarity_ = std::make_unique<GlSimilarity>(gl->context(), comparisons_);
 }
 
 Objective::~Objective() = default;
-
-void Objective::add_view(const FixedImage& image, std::vector<std::uint32_t> compared, const Eigen::Isometry3d& about) {
-  std::vector<std::uint32_t> rendered = compared;
-  std::vector<Neighbors> neighbors;
-  if (similarity_ == SimilarityKind::kGradientCorrelation) {
-    rendered = with_neighbors(compared, image.field);
-    neighbors = neighbors_among(rendered, compared, image.field);
-  }
-  std::vector<float> xray;
-  xray.reserve(rendered.size());
-  for (const std::uint32_t pixel : rendered) xray.push_back(image.line_integral.pixels[pixel]);
-  Range drr_range;
-  if (has_histogram(similarity_)) {
-    const PixelSet pixels{.of_view = {rendered}};
-    const RenderResult drr = renderer_.render(std::span(&image.view, 1), std::span(&about, 1), pixels);
-    drr_range = wide_range_of(drr.line_integrals(0, 0));
-  }
-  views_.push_back(image.view);
-  pixels_.of_view.push_back(std::move(rendered));
-  compared_.push_back(std::move(compared));
-  comparisons_.emplace_back(similarity_, std::move(xray), std::move(neighbors), drr_range);
-}
 
 template <class Render, class Compare>
 auto Objective::on_gpu(std::span<const Eigen::Isometry3d> room_from_patient, bool with_derivatives, Render render,

@@ -69,7 +69,6 @@ class Objective {
   std::vector<double> values(std::span<const Eigen::Isometry3d> room_from_patient);
 
  private:
-  void add_view(const FixedImage& image, std::vector<std::uint32_t> compared, const Eigen::Isometry3d& about);
   // The models of the views, [pose][view] one after the other.
   std::vector<QuadraticModel> models_of_views(std::span<const Eigen::Isometry3d> room_from_patient);
   // What `compare` makes of the images that `render` leaves on the GPU, of as many poses at a time as fit.

@@ -8,6 +8,7 @@
 #include <random>
 
 #include "base/error.h"
+#include "base/parallel.h"
 #include "registration/objective.h"
 #include "registration/pose_objective.h"
 #include "registration/pose_parameters.h"
@@ -159,10 +160,10 @@ void report_spread(const std::vector<OptimizerResult>& found, StageReport& repor
 
 std::vector<FixedImage> FixedViews::reduced_to(double pixel_mm, const Eigen::Isometry3d& room_from_patient,
                                                double slack_mm) const {
-  std::vector<FixedImage> level;
-  level.reserve(images.size());
-  for (const FixedImage& image : images)
-    level.push_back(compared_part(image, region, pixel_mm, room_from_patient, slack_mm));
+  std::vector<FixedImage> level(images.size());
+  parallel_for(std::size_t{0}, images.size(), [&](std::size_t view) {
+    level[view] = compared_part(images[view], region, pixel_mm, room_from_patient, slack_mm);
+  });
   return level;
 }
 

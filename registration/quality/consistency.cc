@@ -66,10 +66,10 @@ std::vector<ViewConsistency> regional_consistency(const RendererPyramid& rendere
   for (const FixedImage& level : levels) views.push_back(level.view);
   const RenderResult drrs =
       renderers.with_voxels_up_to(kComparedPixelMm).render(views, std::span(&room_from_patient, 1), PixelSet::all());
-  std::vector<ViewConsistency> consistency;
-  consistency.reserve(levels.size());
-  for (std::size_t view = 0; view < levels.size(); ++view)
-    consistency.push_back(consistency_of(levels[view], drrs.line_integrals(0, view)));
+  std::vector<ViewConsistency> consistency(levels.size());
+  parallel_for(std::size_t{0}, levels.size(), [&](std::size_t view) {
+    consistency[view] = consistency_of(levels[view], drrs.line_integrals(0, view));
+  });
   return consistency;
 }
 

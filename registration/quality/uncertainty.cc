@@ -6,6 +6,7 @@
 #include <cmath>
 #include <map>
 
+#include "base/parallel.h"
 #include "registration/pose_parameters.h"
 
 namespace isoshift {
@@ -113,31 +114,42 @@ std::vector<Eigen::Index> tiles_of(std::span<const std::uint32_t> pixels, const 
   return tiles;
 }
 
+// What one view adds.
+Sandwich sandwich_of(const Objective& objective, std::size_t view, const Linearized& drrs, int axes) {
+  Sandwich sandwich{.curvature = Eigen::MatrixXd::Zero(axes, axes), .scatter = Eigen::MatrixXd::Zero(axes, axes)};
+  const Comparison& comparison = objective.comparison(view);
+  const std::vector<Eigen::Index> tiles = tiles_of(objective.compared_pixels(view), objective.views()[view]);
+  sandwich.tiles = tiles.empty() ? 0 : *std::ranges::max_element(tiles) + 1;
+  const Gradients drr = gradients(drrs.line_integrals(view), comparison.neighbors());
+  const GradientJacobians change = gradient_jacobians(drrs.jacobian(view), comparison.neighbors());
+  Eigen::MatrixXd scores = Eigen::MatrixXd::Zero(axes, sandwich.tiles);
+  const auto add = [&](std::span<const float> of_xray, std::span<const float> of_drr, const PixelJacobian& jacobian) {
+    const Eigen::VectorXd x = centered(of_xray).normalized();
+    const Normalized d = normalized(of_drr, jacobian);
+    // What does not correlate at all does not bend the similarity.
+    sandwich.curvature += x.dot(d.values) * d.derivative.transpose() * d.derivative;
+    const Eigen::VectorXd residual = x - d.values;
+    for (Eigen::Index n = 0; n < residual.size(); ++n)
+      scores.col(tiles[static_cast<std::size_t>(n)]) += residual[n] * d.derivative.row(n).transpose();
+  };
+  add(comparison.xray_gradients().along_row, drr.along_row, change.along_row);
+  add(comparison.xray_gradients().along_column, drr.along_column, change.along_column);
+  sandwich.scatter = scores * scores.transpose();
+  return sandwich;
+}
+
 Sandwich sandwich_at(Objective& objective, const Eigen::Isometry3d& pose, int axes) {
   const Linearized drrs(objective, pose, axes);
-  Sandwich sandwich{.curvature = Eigen::MatrixXd::Zero(axes, axes), .scatter = Eigen::MatrixXd::Zero(axes, axes)};
-  for (std::size_t view = 0; view < objective.views().size(); ++view) {
-    const Comparison& comparison = objective.comparison(view);
-    const std::vector<Eigen::Index> tiles = tiles_of(objective.compared_pixels(view), objective.views()[view]);
-    const Eigen::Index count = tiles.empty() ? 0 : *std::ranges::max_element(tiles) + 1;
-    const Gradients drr = gradients(drrs.line_integrals(view), comparison.neighbors());
-    const GradientJacobians change = gradient_jacobians(drrs.jacobian(view), comparison.neighbors());
-    Eigen::MatrixXd scores = Eigen::MatrixXd::Zero(axes, count);
-    const auto add = [&](std::span<const float> of_xray, std::span<const float> of_drr, const PixelJacobian& jacobian) {
-      const Eigen::VectorXd x = centered(of_xray).normalized();
-      const Normalized d = normalized(of_drr, jacobian);
-      // What does not correlate at all does not bend the similarity.
-      sandwich.curvature += x.dot(d.values) * d.derivative.transpose() * d.derivative;
-      const Eigen::VectorXd residual = x - d.values;
-      for (Eigen::Index n = 0; n < residual.size(); ++n)
-        scores.col(tiles[static_cast<std::size_t>(n)]) += residual[n] * d.derivative.row(n).transpose();
-    };
-    add(comparison.xray_gradients().along_row, drr.along_row, change.along_row);
-    add(comparison.xray_gradients().along_column, drr.along_column, change.along_column);
-    sandwich.scatter += scores * scores.transpose();
-    sandwich.tiles += count;
+  std::vector<Sandwich> of_views(objective.views().size());
+  parallel_for(std::size_t{0}, of_views.size(),
+               [&](std::size_t view) { of_views[view] = sandwich_of(objective, view, drrs, axes); });
+  Sandwich sum{.curvature = Eigen::MatrixXd::Zero(axes, axes), .scatter = Eigen::MatrixXd::Zero(axes, axes)};
+  for (const Sandwich& of_view : of_views) {
+    sum.curvature += of_view.curvature;
+    sum.scatter += of_view.scatter;
+    sum.tiles += of_view.tiles;
   }
-  return sandwich;
+  return sum;
 }
 
 // Sandwiches of few tiles are too thin.
