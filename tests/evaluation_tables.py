@@ -44,7 +44,7 @@ def row_of_sigmas(words, key, summaries):
 
 def main():
     results = json.loads((documented_rows.ROOT / "bench/results/evaluation.json").read_text())
-    rows = [row(case, summary) for part in ("baseline", "setup") for case, summary in results[part].items()]
+    rows = [row(case, summary) for part in ("baseline", "setup", "gpu") for case, summary in results[part].items()]
     rows += [row_of_target(case, summary) for case, summary in results["targets"].items()]
     rows += [row_of_sigmas(f"within {number} sigma", f"share_within_{number}_sigma", results["setup"].values())
              for number in ("one", "two")]
