@@ -74,7 +74,7 @@ GlName::~GlName() {
   if (name_ != 0 && eglGetCurrentContext() != EGL_NO_CONTEXT) remove_(name_);
 }
 
-std::span<const std::byte> MappedCopy::of(std::uint32_t buffer, std::size_t bytes) {
+std::span<const std::byte> MappedCopy::of(std::uint32_t buffer, std::size_t first, std::size_t bytes) {
   if (bytes > capacity_) {
     constexpr GLbitfield kMapped = GL_MAP_READ_BIT | GL_MAP_PERSISTENT_BIT | GL_MAP_COHERENT_BIT;
     const auto size = static_cast<GLsizeiptr>(bytes);
@@ -84,9 +84,8 @@ std::span<const std::byte> MappedCopy::of(std::uint32_t buffer, std::size_t byte
     capacity_ = mapped_ == nullptr ? 0 : bytes;
     if (mapped_ == nullptr) throw Error(fmt::format("this OpenGL gives no memory to read {} bytes back", bytes));
   }
-  if (bytes == 0) return {};
   glMemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT);
-  glCopyNamedBufferSubData(buffer, name_->get(), 0, 0, static_cast<GLsizeiptr>(bytes));
+  glCopyNamedBufferSubData(buffer, name_->get(), static_cast<GLintptr>(first), 0, static_cast<GLsizeiptr>(bytes));
   const std::unique_ptr<__GLsync, void (*)(GLsync)> copied(glFenceSync(GL_SYNC_GPU_COMMANDS_COMPLETE, 0),
                                                            [](GLsync sync) { glDeleteSync(sync); });
   // A GPU that was reset signals its fences, too: GlContext::check() then says so.

@@ -3,6 +3,7 @@
 // that end without one are left to the end of their context.
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <glm/mat4x4.hpp>
@@ -33,12 +34,14 @@ class GlName {
   Delete remove_;
 };
 
-// Memory of the host into which the GPU copies, mapped once for as long as it exists: a driver that is asked for the
-// bytes of a buffer instead may bring all of that buffer, however few are wanted.
+// Memory of the host into which the GPU copies, mapped once for as long as it exists. To ask the driver for the bytes
+// of a buffer instead took ten times as long on an NVIDIA H100 where the buffer was much larger than what was wanted.
 class MappedCopy {
  public:
-  // The first bytes of a buffer, valid until the next call. Waits until they are there.
-  std::span<const std::byte> of(std::uint32_t buffer, std::size_t bytes);
+  static constexpr std::size_t kMostBytes = std::size_t{16} << 20;
+
+  // So many bytes of a buffer, at most kMostBytes, valid until the next call. Waits until they are there.
+  std::span<const std::byte> of(std::uint32_t buffer, std::size_t first, std::size_t bytes);
 
  private:
   std::optional<GlName> name_;
@@ -53,10 +56,15 @@ class Buffer {
   void upload(std::span<const std::byte> bytes);
   void reserve(std::size_t bytes);  // what it held is lost
   void fill(float value);           // all of it
-  // The first `count` values, which shaders wrote. Waits until they are there; valid until the next call.
+  // Appends the first `count` values, which shaders wrote, to others. Waits until they are there.
   template <class T>
-  std::span<const T> read(std::size_t count) {
-    return {reinterpret_cast<const T*>(copy_.of(name_.get(), count * sizeof(T)).data()), count};
+  void append_to(std::vector<T>& values, std::size_t count) {
+    constexpr std::size_t kMost = MappedCopy::kMostBytes / sizeof(T);
+    for (std::size_t first = 0; first < count; first += kMost) {
+      const std::size_t part = std::min(kMost, count - first);
+      const auto* begin = reinterpret_cast<const T*>(copy_.of(get(), first * sizeof(T), part * sizeof(T)).data());
+      values.insert(values.end(), begin, begin + part);
+    }
   }
   void bind(std::uint32_t slot) const;  // as shader storage
   std::uint32_t get() const { return name_.get(); }

@@ -117,9 +117,8 @@ RenderResult RaycastGlRenderer::render_all(std::span<const XrayView> views,
     const std::size_t count = std::min(at_once, room_from_patient.size() - first);
     dispatch(views, room_from_patient.subspan(first, count), pixels_per_pose, !pixels.of_view.empty(),
              with_derivatives);
-    const auto append = [](const auto& part, auto& all) { all.insert(all.end(), part.begin(), part.end()); };
-    append(result_.read<float>(count * pixels_per_pose), line_integrals);
-    if (with_derivatives) append(derivatives_.read<MotionDerivatives>(count * pixels_per_pose), derivatives);
+    result_.append_to(line_integrals, count * pixels_per_pose);
+    if (with_derivatives) derivatives_.append_to(derivatives, count * pixels_per_pose);
   }
   context_.check("rendering");
   return RenderResult(std::move(line_integrals), std::move(begins), std::move(derivatives));

@@ -179,7 +179,8 @@ std::vector<std::vector<double>> GlSimilarity::of(const Buffer& line_integrals, 
   bind_views(line_integrals);
   result_.bind(kResult);
   dispatch(poses, view_count_);
-  const std::span<const float> similarities = result_.read<float>(poses * view_count_);
+  std::vector<float> similarities;
+  result_.append_to(similarities, poses * view_count_);
   context_.check("comparing");
 
   std::vector<std::vector<double>> of_pose;
@@ -208,7 +209,8 @@ std::vector<QuadraticModel> GlSimilarity::models(const Buffer& line_integrals, c
   sums_.bind(kResult);
   glUniform1ui(kTileCount, static_cast<GLuint>(tiles_.size()));
   dispatch(poses, tiles_.size());
-  const std::span<const float> products = sums_.read<float>(poses * tiles_.size() * kProducts);
+  std::vector<float> products;
+  sums_.append_to(products, poses * tiles_.size() * kProducts);
   context_.check("comparing");
 
   std::vector<QuadraticModel> models(poses * view_count_, no_correlation(6));
