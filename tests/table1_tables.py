@@ -24,7 +24,13 @@ def milliseconds(time):
     return f"{time['mean']:.{decimals}f} +/- {time['sd']:.{decimals}f}"
 
 
+def header(tables):
+    cells = [f"{table['volume']} {table['threshold_hu']:+.0f} HU ({100 * table['share_above']:.1f} % above)" for table in tables]
+    return "| method | " + " | ".join(f"{cell} | paper" for cell in cells) + " |"
+
+
 def rows(tables):
+    yield header(tables)
     for of_method in zip(*(table["rows"] for table in tables)):
         method = of_method[0]["method"]
         cells = [milliseconds(row["wall_ms"]) for row in of_method]

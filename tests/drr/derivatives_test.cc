@@ -101,8 +101,7 @@ TEST_P(DerivativesTest, OfAListOfPixelsAreThoseOfTheWholeImage) {
 }
 
 TEST_P(DerivativesTest, LineIntegralsAreThoseWithoutDerivatives) {
-  // Two variants of a shader may round differently: a ray that grazes a face can miss it in one of them (2e-5, on
-  // zink).
+  // Two variants of a shader may round differently (2e-5 on zink).
   const float rounding = uses_gl(GetParam()) ? 1e-4F : 0.0F;
   const RenderResult with = renderer_->render_with_derivatives(three_views(), poses_, PixelSet::all());
   const RenderResult without = renderer_->render(three_views(), poses_, PixelSet::all());
