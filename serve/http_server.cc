@@ -165,6 +165,7 @@ class HttpServer::Implementation {
     Place(const Place&) = delete;
     Place& operator=(const Place&) = delete;
     bool is_free() const { return is_free_; }
+    const std::string& from() const { return from_; }
 
    private:
     Open& open_;
@@ -182,24 +183,26 @@ class HttpServer::Implementation {
         co_await pause.async_wait(net::use_awaitable);
         continue;
       }
+      // Places are given out in the order in which connections came.
+      const net::ip::tcp::endpoint from = socket.remote_endpoint(failed);
+      if (failed) continue;  // it has gone already
+      auto place = std::make_unique<Place>(open_, from.address().to_string(), options_);
+      if (!place->is_free()) continue;  // closes it
       const auto executor = socket.get_executor();
       // If the other end has gone, is too slow or does not speak HTTP, there is nobody to tell.
-      net::co_spawn(executor, speak(std::move(socket)), [](const std::exception_ptr&) {});
+      net::co_spawn(executor, speak(std::move(socket), std::move(place)), [](const std::exception_ptr&) {});
     }
   }
 
-  net::awaitable<void> speak(net::ip::tcp::socket socket) {
-    const std::string from = socket.remote_endpoint().address().to_string();
-    const Place place(open_, from, options_);
-    if (!place.is_free()) co_return;  // closes it
+  net::awaitable<void> speak(net::ip::tcp::socket socket, std::unique_ptr<const Place> place) {
     if (!options_.tls) {
       Stream stream(std::move(socket));
-      co_await answer(stream, stream, from);
+      co_await answer(stream, stream, place->from());
     } else {
       TlsStream stream(std::move(socket), tls_);
       stream.next_layer().expires_after(options_.patience);
       co_await stream.async_handshake(net::ssl::stream_base::server, net::use_awaitable);
-      co_await answer(stream, stream.next_layer(), from);
+      co_await answer(stream, stream.next_layer(), place->from());
     }
   }
 
