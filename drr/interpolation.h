@@ -27,7 +27,17 @@ double interpolate_between(VoxelAt&& voxel_at, const Eigen::Vector3i& corner, co
 // The same of a volume.
 template <class T>
 double interpolate(const Volume<T>& volume, const Eigen::Vector3i& corner, const Eigen::Vector3d& fraction) {
-  return interpolate_between([&](const Eigen::Vector3i& at) { return voxel_or_zero(volume, at); }, corner, fraction);
+  const bool inside = (corner.array() >= 0).all() && (corner.array() + 1 < volume.size.array()).all();
+  if (!inside)
+    return interpolate_between([&](const Eigen::Vector3i& at) { return voxel_or_zero(volume, at); }, corner, fraction);
+  const auto along_row = [&](const T* at) { return at[0] + fraction.x() * (at[1] - at[0]); };
+  const auto in_slice = [&](const T* at) {
+    const double above = along_row(at);
+    return above + fraction.y() * (along_row(at + volume.size.x()) - above);
+  };
+  const T* at = &volume.at(corner.x(), corner.y(), corner.z());
+  const double below = in_slice(at);
+  return below + fraction.z() * (in_slice(at + volume.index(0, 0, 1)) - below);
 }
 
 }  // namespace isoshift

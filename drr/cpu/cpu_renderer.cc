@@ -76,8 +76,9 @@ MotionDerivatives motion_derivatives(const RayGradient& gradient, int column, in
 }  // namespace
 
 VoxelRay ray_to(int column, int row, const Camera& camera, const Eigen::Matrix3d& mm_from_voxel_axes) {
-  const Eigen::Vector3d way = camera.way_voxel_from_pixel * Eigen::Vector3d(column, row, 1.0);
-  return {.source = camera.source_voxel, .way = way, .length_mm = (mm_from_voxel_axes * way).norm()};
+  // Lazy products: GCC 12 calls a function for each of the others, which took 5 % of a registration of bodies.
+  const Eigen::Vector3d way = camera.way_voxel_from_pixel.lazyProduct(Eigen::Vector3d(column, row, 1.0));
+  return {.source = camera.source_voxel, .way = way, .length_mm = mm_from_voxel_axes.lazyProduct(way).norm()};
 }
 
 std::string CpuRenderer::device() const {
