@@ -66,8 +66,8 @@ struct GlContext::Handles {
 
   // Opens a display and makes an OpenGL 4.5 core context current on it, robust if that can be had; otherwise says why
   // not.
-  std::optional<std::string> open(EGLenum platform, void* native, bool& is_robust) {
-    display = eglGetPlatformDisplayEXT(platform, native, nullptr);
+  std::optional<std::string> open(void* device, bool& is_robust) {
+    display = eglGetPlatformDisplayEXT(EGL_PLATFORM_DEVICE_EXT, device, nullptr);
     EGLint major = 0, minor = 0;
     if (display == EGL_NO_DISPLAY || !eglInitialize(display, &major, &minor)) {
       display = EGL_NO_DISPLAY;
@@ -116,7 +116,7 @@ GlContext::GlContext(const GlChoice& choice) {
   try {
     const std::size_t chosen = first_usable(names, [&](std::size_t n) -> std::optional<std::string> {
       if (!choice.means_number(static_cast<int>(n))) return "is not the one asked for";
-      return open(choice, EGL_PLATFORM_DEVICE_EXT, devices[n].handle);
+      return open(choice, devices[n].handle);
     });
     device_name_ = names[chosen];
   } catch (const Error& none) {
@@ -126,13 +126,14 @@ GlContext::GlContext(const GlChoice& choice) {
 
 GlContext::~GlContext() { try_make_current(); }
 
-std::optional<std::string> GlContext::open(const GlChoice& choice, std::uint32_t platform, void* native) {
+std::optional<std::string> GlContext::open(const GlChoice& choice, void* device) {
   handles_ = std::make_unique<Handles>();
-  if (auto failure = handles_->open(platform, native, is_robust_)) return failure;
+  if (auto failure = handles_->open(device, is_robust_)) return failure;
   renderer_ = gl_string(GL_RENDERER);
   version_ = gl_string(GL_VERSION);
   uuid_ = device_uuid();
   is_software_ = names_software(renderer_);
+  glGetInteger64v(GL_MAX_SHADER_STORAGE_BLOCK_SIZE, &largest_buffer_bytes_);
   if (choice.kind == GlDevice::kHardware && is_software_) return fmt::format("what it offers is {}", renderer_);
   if (!choice.means_uuid(uuid_)) return "is not the one asked for";
   return std::nullopt;
@@ -140,6 +141,7 @@ std::optional<std::string> GlContext::open(const GlChoice& choice, std::uint32_t
 
 void GlContext::make_current() const {
   if (is_lost_) throw Error(fmt::format("OpenGL on {} was lost.{}", renderer_, kInstead));
+  if (eglGetCurrentContext() == handles_->context) return;
   if (!eglMakeCurrent(handles_->display, EGL_NO_SURFACE, EGL_NO_SURFACE, handles_->context))
     throw Error(fmt::format("OpenGL on {} cannot be used: {}.{}", renderer_, egl_error(), kInstead));
 }
@@ -154,13 +156,6 @@ std::int64_t GlContext::largest_volume_edge() const {
   GLint64 texels = 0;
   glGetInteger64v(GL_MAX_3D_TEXTURE_SIZE, &texels);
   return texels;
-}
-
-std::int64_t GlContext::largest_buffer_bytes() const {
-  make_current();
-  GLint64 bytes = 0;
-  glGetInteger64v(GL_MAX_SHADER_STORAGE_BLOCK_SIZE, &bytes);
-  return bytes;
 }
 
 const Program& GlContext::program(const ShaderSource& compute) {

@@ -38,7 +38,7 @@ class GlContext {
   bool is_software() const { return is_software_; }
   bool is_robust() const { return is_robust_; }  // says so if it is lost, and keeps shaders within their buffers
   std::int64_t largest_volume_edge() const;      // of 3D textures, texels
-  std::int64_t largest_buffer_bytes() const;     // of storage that shaders see
+  std::int64_t largest_buffer_bytes() const { return largest_buffer_bytes_; }  // of storage that shaders see
 
   // A program that is compiled when it is first asked for. Throws Error as Program does.
   const Program& program(const ShaderSource& compute);
@@ -52,11 +52,12 @@ class GlContext {
  private:
   struct Handles;
   // What speaks against a device; otherwise its context is open and described.
-  std::optional<std::string> open(const GlChoice& choice, std::uint32_t platform, void* native);
+  std::optional<std::string> open(const GlChoice& choice, void* device);
 
   std::unique_ptr<Handles> handles_;
   std::string renderer_, version_, uuid_, device_name_;
   bool is_software_ = false, is_robust_ = false;
+  std::int64_t largest_buffer_bytes_ = 0;
   mutable bool is_lost_ = false;
   std::map<std::string, Program> programs_;  // by their sources
 };

@@ -29,6 +29,8 @@ TEST(RenderingFlags, WhatARendererDoesNotHaveIsRefused) {
        "--precision below f32 works only with renderers other than references"},
       {{"--renderer", "cpu", "--gl", "software"}, "--gl works only with renderers on OpenGL"},
       {{"--renderer", "cpu", "--device", "1"}, "--device works only with renderers on OpenGL"},
+      {{"--device", "77"},
+       "--device works only with renderers on OpenGL, and the renderer is cpu (no hardware OpenGL: "},
       {{"--window", "0,100"}, "--window works only with --attenuation windowed"},
       {{"--renderer", "splat", "--gl", "software", "--wobble-sigma", "-1"}, "--wobble-sigma -1: expected 0 mm or more"},
   };

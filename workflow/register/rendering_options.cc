@@ -9,15 +9,6 @@
 #include "registration/gpu_check.h"
 
 namespace isoshift {
-namespace {
-
-// Throws UsageError if a flag was given that the renderer does not have.
-void refuse(bool given, const char* flag, const char* of, RendererKind kind) {
-  if (given) throw UsageError(fmt::format("{} works only with {}, and the renderer is {}", flag, of, to_string(kind)));
-}
-
-}  // namespace
-
 void RenderingOptions::default_to_paper() {
   if (!attenuation) attenuation = "windowed";
   if (!precision && !is_oracle(kind())) precision = "u8";
@@ -59,15 +50,22 @@ AttenuationModel RenderingOptions::model() const {
 RendererOptions RenderingOptions::options() const {
   const RendererKind chosen = kind();
   const bool splats = is_splatting(chosen);
-  refuse(gl && !uses_gl(chosen), "--gl", "renderers on OpenGL", chosen);
-  refuse(gpu && !uses_gl(chosen), "--device", "renderers on OpenGL", chosen);
+  // A flag that the renderer does not have is an error.
+  const auto refuse = [&](bool given, const char* flag, const char* of) {
+    if (!given) return;
+    const std::optional<std::string> why = why_cpu();
+    throw UsageError(fmt::format("{} works only with {}, and the renderer is {}{}", flag, of, to_string(chosen),
+                                 why ? fmt::format(" ({})", *why) : ""));
+  };
+  refuse(gl && !uses_gl(chosen), "--gl", "renderers on OpenGL");
+  refuse(gpu && !uses_gl(chosen), "--device", "renderers on OpenGL");
   refuse(precision.value_or("f32") != "f32" && is_oracle(chosen), "--precision below f32",
-         "renderers other than references", chosen);
-  refuse(block_edge && chosen != RendererKind::kRaycastCuberille, "--block-edge", "raycast-cuberille", chosen);
-  refuse(wobble && !splats, "--wobble", "splatting", chosen);
-  refuse(wobble_sigma_mm && !splats, "--wobble-sigma", "splatting", chosen);
-  refuse(wobble_seed && !splats, "--wobble-seed", "splatting", chosen);
-  refuse(deposit && !splats, "--deposit", "splatting", chosen);
+         "renderers other than references");
+  refuse(block_edge && chosen != RendererKind::kRaycastCuberille, "--block-edge", "raycast-cuberille");
+  refuse(wobble && !splats, "--wobble", "splatting");
+  refuse(wobble_sigma_mm && !splats, "--wobble-sigma", "splatting");
+  refuse(wobble_seed && !splats, "--wobble-seed", "splatting");
+  refuse(deposit && !splats, "--deposit", "splatting");
 
   RendererOptions result;
   result.gl = gl_choice_from(gl, gpu);
