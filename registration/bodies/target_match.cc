@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "base/median.h"
+#include "registration/pose_parameters.h"
 #include "registration/similarity/tiles.h"
 
 namespace isoshift {
@@ -16,7 +17,7 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr double kPixelMm = 2.0, kCoarsePixelMm = 4.0, kSurroundingsMm = 40.0, kTargetMm = 20.0, kPartMm = 12.0;
+constexpr double kPixelMm = 2.0, kCoarsePixelMm = 4.0, kTargetMm = 20.0, kPartMm = 12.0;
 constexpr std::size_t kLeastPixelsOfAPart = 6;
 constexpr int kLeastPixels = 100;  // near the target, with all neighbors: the circles have about 300
 constexpr double kFarther = 1.2;
@@ -159,7 +160,7 @@ struct Surroundings {
     return means(level, renderer, about, rendering, measures);
   }
   CoarseMatch coarse_match() const {
-    const std::vector<double> both = measured(kCoarsePixelMm, kSurroundingsMm, {of_all, of_parts});
+    const std::vector<double> both = measured(kCoarsePixelMm, kAboutTargetMm, {of_all, of_parts});
     return {.of_all = both[0], .of_parts = both[1]};
   }
 };
@@ -206,7 +207,7 @@ TargetMatch match_near_target(const BodyScene& scene, const Vector3d& target_roo
   };
   const Surroundings near{scene.views, *scene.fine.as_one, poses.front().front(), target_room_mm, rendering};
   const CoarseMatch coarse = near.coarse_match();
-  return {.of_most_within_40_mm = near.measured(kPixelMm, kSurroundingsMm, {of_most}).front(),
+  return {.of_most_within_40_mm = near.measured(kPixelMm, kAboutTargetMm, {of_most}).front(),
           .of_most_within_20_mm = near.measured(kPixelMm, kTargetMm, {of_most}).front(),
           .of_all = coarse.of_all,
           .of_parts = coarse.of_parts};
@@ -222,6 +223,23 @@ double match_of_parts_everywhere(const FixedViews& views, Renderer& renderer,
   return means(views.reduced_to(kCoarsePixelMm, room_from_patient, 0.0), renderer, room_from_patient,
                of_whole(room_from_patient), {of_parts})
       .front();
+}
+
+std::optional<Vector3d> place_wanted_near_target(const RendererPyramid& renderers, const FixedViews& views,
+                                                 const Eigen::Isometry3d& room_from_patient,
+                                                 const Vector3d& target_room_mm, const SearchOptions& options) {
+  FixedViews near{.images = {}, .region = views.region};
+  for (const FixedImage& image : views.images) {
+    std::optional<FixedImage> part = near_target(kAboutTargetMm, image, target_room_mm);
+    if (!part) return std::nullopt;
+    near.images.push_back(std::move(*part));
+  }
+  SearchOptions last_stage = options;
+  last_stage.stages = options.stages.last(1);
+  last_stage.parameters.clear();
+  const auto found = search_if_possible(renderers, near, room_from_patient, last_stage);
+  if (!found) return std::nullopt;
+  return setup_error_from_parameters(found->parameters) * target_room_mm;
 }
 
 }  // namespace isoshift

@@ -31,6 +31,19 @@ TEST_P(Bent, TheTargetIsRight) {
   }
 }
 
+// A sphere that holds what has moved against the target: nobody may take the answer for the target's.
+TEST(BentHead, ARegionThatHoldsMoreThanTheTargetNeedsReview) {
+  ISOSHIFT_NEED_REAL_DATA("head/head-bent");
+  const std::filesystem::path study = real_data() / "head/head-bent";
+  for (const char* radius_mm : {"87", "90", "95"}) {
+    TemporaryFolder folder;
+    const CommandOutcome outcome =
+        run_command({"register", study.string(), "--ct", (study.parent_path() / "CT").string(), "-o",
+                     (folder / "out").string(), "--around-isocenter", radius_mm});
+    EXPECT_EQ(outcome.exit_status, 3) << radius_mm << " mm: " << outcome.err;
+  }
+}
+
 INSTANTIATE_TEST_SUITE_P(All, Bent,
                          testing::Values("chest/chest-bent", "chest/chest-breathing", "chest/chest-breathing-5",
                                          "head/head-bent"),

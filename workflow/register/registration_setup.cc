@@ -32,6 +32,10 @@ RegistrationSetup::RegistrationSetup(const RegistrationRequest& request, const S
   else
     renderers_ = store.get(request.rendering, study.ct, beams);
   region_ = std::move(region.projected);
+  // X-rays show what lies before and behind a volume of interest, DRRs of that volume do not: intensities cannot be
+  // compared, edges can.
+  if (region_.has_volume() && !request.search.is_paper())
+    for (Stage& stage : options_.stages) stage.similarity = SimilarityKind::kGradientCorrelation;
   options_.region = &region_;
   options_.rectangles = request.region.rectangles_of(study);
 }

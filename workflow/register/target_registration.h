@@ -29,6 +29,7 @@ class TargetRegistration {
 
  private:
   const BentPatient& bent_patient() const;
+  void doubt_contradicted_region(std::span<const FixedImage> images, RegistrationResult& found) const;
 
   const Study& study_;
   const RegistrationRequest& request_;

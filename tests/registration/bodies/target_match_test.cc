@@ -4,6 +4,7 @@
 
 #include <random>
 
+#include "registration/presets.h"
 #include "tests/support/bent_scene.h"
 
 namespace isoshift::target_match_test {
@@ -37,6 +38,19 @@ TEST(TargetMatch, TellsTheRightPlaceFromOthers) {
   EXPECT_LT(wrong.of_most_within_20_mm, 0.7);
   EXPECT_LT(wrong.of_all, 0.7);
   EXPECT_LT(wrong.of_parts, 0.7);
+}
+
+// From where most of a bent patient lies, to where the target does.
+TEST(PlaceWantedNearTarget, IsThatOfTheTarget) {
+  const BentScene scene = column();
+  const RendererPyramid renderers(RendererKind::kCpu, scene.ct, {}, std::array{Beam::kKilovoltage});
+  const auto off_mm = [&](const Eigen::Isometry3d& setup_error) {
+    const auto wanted = place_wanted_near_target(renderers, scene.views(), setup_error * scene.planned,
+                                                 setup_error * Vector3d::Zero(), {.stages = preset("setup").stages});
+    return wanted ? (*wanted - scene.truth[1] * Vector3d::Zero()).norm() : 1e9;
+  };
+  EXPECT_LT(off_mm(scene.truth[1]), 0.5);  // voxels of 2 mm, and neighbors that have moved
+  EXPECT_LT(off_mm(Eigen::Translation3d(0.0, 2.0, -1.0) * scene.truth[1]), 0.5);
 }
 
 // Fluid whose level runs through the surroundings: one strong edge that the CT does not have.
