@@ -92,6 +92,11 @@ int run_isoshift(int argc, const char* const* argv, Console& console) {
   } catch (const std::exception& error) {
     return say(console, error, kExitFailed);
   }
+  if (!console.out.flush()) {
+    console.err
+        << "error: standard output cannot be written to (is the disk full?): not all that was printed is there\n";
+    return kExitFailed;
+  }
   return exit_status;
 }
 

@@ -15,13 +15,17 @@
 
 namespace {
 
-// SIGINT and SIGTERM end the program without leaving half a result behind, or ask its work to end
-// (base/graceful_end.h): a thread of its own waits for them, since hardly anything may be done in a handler.
+// SIGINT, SIGTERM and, if nobody wants it ignored (nohup), SIGHUP end the program without leaving half a result behind,
+// or ask its work to end (base/graceful_end.h): a thread of its own waits for them, since hardly anything may be done
+// in a handler.
 void end_cleanly_on_signals() {
   static sigset_t signals;
   sigemptyset(&signals);
   sigaddset(&signals, SIGINT);
   sigaddset(&signals, SIGTERM);
+  struct sigaction hang_up{};
+  sigaction(SIGHUP, nullptr, &hang_up);
+  if (hang_up.sa_handler != SIG_IGN) sigaddset(&signals, SIGHUP);
   pthread_sigmask(SIG_BLOCK, &signals, nullptr);  // inherited by every thread made later
   std::thread([] {
     int signal = 0;

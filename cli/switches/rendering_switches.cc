@@ -72,6 +72,13 @@ void add_gl_options(CLI::App& command, std::optional<std::string>& gl, std::opti
       .add_option("--device", gpu,
                   "For OpenGL renderers: which of several GPUs, by its number or UUID (isoshift inspect --devices) "
                   "[the first that works]")
+      ->check(CLI::Validator(
+          [](const std::string& device) {
+            return GlChoice(GlDevice::kHardware, device).is_number_or_uuid()
+                       ? std::string()
+                       : fmt::format("{} is neither a device's number nor a UUID of 32 hexadecimal digits", device);
+          },
+          "", "device"))
       ->type_name("N|UUID")
       ->group(kGroup);
 }

@@ -26,6 +26,13 @@ bool GlChoice::is_uuid() const {
   return gpu.size() > kLongestNumber || !std::ranges::all_of(gpu, [](unsigned char c) { return std::isdigit(c) != 0; });
 }
 
+bool GlChoice::is_number_or_uuid() const {
+  constexpr std::size_t kDigits = 32;
+  const std::string digits = hex_digits(gpu);
+  const bool are_hex = std::ranges::all_of(digits, [](unsigned char c) { return std::isxdigit(c) != 0; });
+  return !gpu.empty() && (!is_uuid() || (are_hex && digits.size() == kDigits));
+}
+
 bool GlChoice::means_number(int number) const { return gpu.empty() || is_uuid() || std::stoi(gpu) == number; }
 
 bool GlChoice::means_uuid(const std::string& uuid) const { return !is_uuid() || hex_digits(gpu) == hex_digits(uuid); }

@@ -26,6 +26,8 @@ struct GlChoice {
   bool means_number(int number) const;
   bool means_uuid(const std::string& uuid) const;
   bool is_uuid() const;  // and not a number
+  // Whether it can mean a device at all.
+  bool is_number_or_uuid() const;
 };
 
 // Takes devices, by their names for people, one after the other until `why_not` has nothing against one, and returns

@@ -271,6 +271,11 @@ DicomFile DicomFile::read(const std::filesystem::path& path, Extent extent) {
           ? file.file_->read(stream, EXS_Unknown, EGL_noChange, DCM_MaxReadLength)
           : file.file_->readUntilTag(stream, EXS_Unknown, EGL_noChange, DCM_MaxReadLength, DCM_PixelData);
   file.file_->transferEnd();
+  if (loaded == EC_InvalidStream || loaded == EC_EndOfStream)
+    throw Error(
+        fmt::format("{}: ends before what its elements announce: the file has been cut off, or is still being "
+                    "written",
+                    path.string()));
   if (loaded.bad()) throw Error(fmt::format("{}: cannot be read as a DICOM file: {}", path.string(), loaded.text()));
   // Where the character set is unknown to the converter, the bytes stay as they are, together with their set.
   (void)file.file_->getDataset()->convertToUTF8();

@@ -1,5 +1,6 @@
 // What goes wrong silently elsewhere must not be possible here: one test each.
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -91,6 +92,33 @@ TEST_F(SilentFailures, TheRegistrationObjectGivesThePoseOnTheWayBackAndNotItsInv
   };
   EXPECT_THAT(error_by(m), PoseNear(error, 1e-6, 1e-6));
   EXPECT_THAT(error_by(m.inverse()), testing::Not(PoseNear(error, 1.0, 1.0)));
+}
+
+TEST_F(SilentFailures, WhatCannotBePrintedIsAnError) {
+  const CommandOutcome outcome =
+      run_shell(fmt::format("({} inspect '{}' >/dev/full)", ISOSHIFT_PROGRAM, study_.path().string()));
+  EXPECT_EQ(outcome.exit_status, 1);
+  EXPECT_THAT(outcome.out, HasSubstr("error: standard output cannot be written to"));
+}
+
+TEST_F(SilentFailures, AClosedTerminalLeavesNoHalfResultBehind) {
+  // Under nohup the signal would be ignored, here as by the program.
+  const CommandOutcome outcome =
+      run_shell(fmt::format("env --default-signal=HUP {} register '{}' -o '{}' >/dev/null 2>&1 & process=$!; "
+                            "until ls -d '{}'.partial-* >/dev/null 2>&1 || ! kill -0 $process; do sleep 0.005; done; "
+                            "kill -HUP $process; wait $process; echo status $?; ls '{}'",
+                            ISOSHIFT_PROGRAM, study_.path().string(), study_.output().string(),
+                            study_.output().string(), study_.output().parent_path().string()));
+  EXPECT_EQ(outcome.out, "status 129\nstudy\n");
+}
+
+TEST_F(SilentFailures, ADeviceThatCanBeNoneIsRefused) {
+  for (const char* device : {"", "abc def", "0x0", "99999999999999999999"}) {
+    const CommandOutcome outcome =
+        register_study(study_, {"--gl", "software", "--renderer", "raycast", "--device", device});
+    EXPECT_EQ(outcome.exit_status, 2) << device;
+    EXPECT_THAT(outcome.err, HasSubstr("is neither a device's number nor a UUID")) << device;
+  }
 }
 
 }  // namespace
