@@ -1,6 +1,11 @@
 #include "drr/camera.h"
 
+#include <fmt/format.h>
+
+#include <algorithm>
 #include <stdexcept>
+
+#include "base/error.h"
 
 namespace isoshift {
 
@@ -22,12 +27,20 @@ Camera make_camera(const XrayView& view, const Eigen::Isometry3d& room_from_pati
                    const Eigen::Affine3d& voxel_from_patient) {
   const Eigen::Isometry3d patient_from_room = room_from_patient.inverse();
   const Eigen::Matrix3d voxel_from_room_axes = voxel_from_patient.linear() * patient_from_room.linear();
-  const Eigen::Matrix3d way_room_from_pixel = view.pixel_from_room.leftCols<3>().inverse();
+  Eigen::Matrix3d way_room_from_pixel = view.pixel_from_room.leftCols<3>().inverse();
+  if (view.is_line_scan()) way_room_from_pixel.col(1).setZero();  // the same way in all rows
   return {.source_voxel = voxel_from_patient * (patient_from_room * view.source_room_mm),
+          .row_step_voxel = voxel_from_room_axes * view.row_step_room_mm,
           .way_voxel_from_pixel = voxel_from_room_axes * way_room_from_pixel,
           .source_room_mm = view.source_room_mm,
+          .row_step_room_mm = view.row_step_room_mm,
           .way_room_from_pixel = way_room_from_pixel,
           .voxel_from_room_axes = voxel_from_room_axes};
+}
+
+void refuse_line_scans(std::span<const XrayView> views, RendererKind kind) {
+  if (std::ranges::any_of(views, &XrayView::is_line_scan))
+    throw UsageError(fmt::format("--renderer {} cannot render line scans; cpu and raycast can", to_string(kind)));
 }
 
 std::vector<std::size_t> checked_view_begins(std::span<const XrayView> views,

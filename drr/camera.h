@@ -11,11 +11,13 @@
 namespace isoshift {
 
 struct Camera {
-  Eigen::Vector3d source_voxel;          // in continuous voxel indices
+  Eigen::Vector3d source_voxel;          // in continuous voxel indices; of a line scan that of row 0
+  Eigen::Vector3d row_step_voxel;        // of a line scan, from row to row; else 0
   Eigen::Matrix3d way_voxel_from_pixel;  // (column, row, 1) to the way from the source to that pixel's center
 
   // The same in the room, and directions of the room in voxels.
   Eigen::Vector3d source_room_mm;
+  Eigen::Vector3d row_step_room_mm;
   Eigen::Matrix3d way_room_from_pixel;
   Eigen::Matrix3d voxel_from_room_axes;
 
@@ -23,6 +25,9 @@ struct Camera {
   Eigen::Matrix4d matrix() const;
   Eigen::Matrix4d room_matrix() const;
 };
+
+// Throws UsageError for a line scan: what every renderer of pinholes alone begins with.
+void refuse_line_scans(std::span<const XrayView> views, RendererKind kind);
 
 Camera make_camera(const XrayView& view, const Eigen::Isometry3d& room_from_patient,
                    const Eigen::Affine3d& voxel_from_patient);

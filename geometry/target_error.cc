@@ -43,8 +43,9 @@ double mean_projection_distance_mm(const Isometry3d& found, const Isometry3d& tr
 double mean_reprojection_distance_mm(const Isometry3d& found, const Isometry3d& truth,
                                      std::span<const Vector3d> targets_mm, const XrayView& view) {
   return mean_over(targets_mm, [&](const Vector3d& target) {
-    const Vector3d way = (found * target - view.source_room_mm).normalized();
-    const Vector3d from_source = truth * target - view.source_room_mm;
+    const Vector3d source = view.source_for_mm(found * target);
+    const Vector3d way = (found * target - source).normalized();
+    const Vector3d from_source = truth * target - source;
     return (from_source - from_source.dot(way) * way).norm();
   });
 }

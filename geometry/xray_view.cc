@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <stdexcept>
 
 #include "base/error.h"
 #include "geometry/rotation.h"
@@ -13,14 +14,20 @@ namespace isoshift {
 std::optional<Eigen::Vector2d> XrayView::project(const Eigen::Vector3d& point_room_mm) const {
   const Eigen::Vector3d h = pixel_from_room * point_room_mm.homogeneous();
   if (h.z() <= 0.0) return std::nullopt;
+  if (is_line_scan()) return Eigen::Vector2d(h.x() / h.z(), h.y());
   return Eigen::Vector2d(h.hnormalized());
 }
 
 Ray XrayView::ray(double column, double row) const {
-  // By its scaling, the matrix maps a receptor point to (column, row, 1) exactly.
+  // By its scaling, the matrix maps a receptor point to (column, row, 1) exactly; of a line scan, in its own row.
   const Eigen::Vector3d pixel_from_source =
-      pixel_from_room.leftCols<3>().partialPivLu().solve(Eigen::Vector3d(column, row, 1.0));
-  return {.source_room_mm = source_room_mm, .pixel_room_mm = source_room_mm + pixel_from_source};
+      pixel_from_room.leftCols<3>().partialPivLu().solve(Eigen::Vector3d(column, is_line_scan() ? 0.0 : row, 1.0));
+  const Eigen::Vector3d source = source_of_row_mm(row);
+  return {.source_room_mm = source, .pixel_room_mm = source + pixel_from_source};
+}
+
+Eigen::Vector3d XrayView::source_for_mm(const Eigen::Vector3d& point_room_mm) const {
+  return is_line_scan() ? source_of_row_mm(pixel_from_room.row(1) * point_room_mm.homogeneous()) : source_room_mm;
 }
 
 XrayView XrayView::downscaled(int factor) const {
@@ -29,6 +36,13 @@ XrayView XrayView::downscaled(int factor) const {
   block_from_pixel.col(2).head<2>().setConstant(-0.5 * (factor - 1) / factor);
   XrayView view = *this;
   view.pixel_from_room = block_from_pixel * pixel_from_room;
+  if (is_line_scan()) {  // its rows are not divided by the third coordinate
+    const double middle = 0.5 * (factor - 1);
+    view.pixel_from_room.row(1) = pixel_from_room.row(1) / factor;
+    view.pixel_from_room(1, 3) -= middle / factor;
+    view.source_room_mm = source_of_row_mm(middle);
+    view.row_step_room_mm = factor * row_step_room_mm;
+  }
   view.columns = columns / factor;
   view.rows = rows / factor;
   return view;
@@ -76,6 +90,24 @@ XrayView make_xray_view(const CarmGeometry& geometry, Beam beam) {
   view.rows = geometry.rows;
   view.beam = beam;
   lengthen_rays(view, geometry.sad_mm);
+  return view;
+}
+
+XrayView make_line_scan_view(const LineScanGeometry& geometry, Beam beam) {
+  // A point lies a columns, b rows and c ways away from the source of row 0: in row b, in column a / c.
+  Eigen::Matrix3d from_source;
+  from_source << geometry.sid_by_sad * geometry.column_step_room_mm, geometry.row_step_room_mm,
+      geometry.sid_by_sad * (geometry.first_pixel_room_mm - geometry.source_room_mm);
+  if (!(std::abs(from_source.determinant()) > 0.0))
+    throw std::invalid_argument("the steps of a line scan and its rays lie in a plane");
+  XrayView view;
+  view.source_room_mm = geometry.source_room_mm;
+  view.row_step_room_mm = geometry.row_step_room_mm;
+  view.pixel_from_room.leftCols<3>() = from_source.inverse();
+  view.pixel_from_room.col(3) = -view.pixel_from_room.leftCols<3>() * view.source_room_mm;
+  view.columns = geometry.columns;
+  view.rows = geometry.rows;
+  view.beam = beam;
   return view;
 }
 

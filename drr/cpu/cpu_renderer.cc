@@ -69,7 +69,8 @@ MotionDerivatives motion_derivatives(const RayGradient& gradient, int column, in
   const Eigen::Vector3d way = camera.way_room_from_pixel * Eigen::Vector3d(column, row, 1.0);
   MotionDerivatives derivatives;
   derivatives.head<3>() = -by_source.cast<float>();
-  derivatives.tail<3>() = -(camera.source_room_mm.cross(by_source) + way.cross(by_way)).cast<float>();
+  const Eigen::Vector3d source = camera.source_room_mm + row * camera.row_step_room_mm;
+  derivatives.tail<3>() = -(source.cross(by_source) + way.cross(by_way)).cast<float>();
   return derivatives;
 }
 
@@ -78,7 +79,9 @@ MotionDerivatives motion_derivatives(const RayGradient& gradient, int column, in
 VoxelRay ray_to(int column, int row, const Camera& camera, const Eigen::Matrix3d& mm_from_voxel_axes) {
   // Lazy products: GCC 12 calls a function for each of the others, which took 5 % of a registration of bodies.
   const Eigen::Vector3d way = camera.way_voxel_from_pixel.lazyProduct(Eigen::Vector3d(column, row, 1.0));
-  return {.source = camera.source_voxel, .way = way, .length_mm = mm_from_voxel_axes.lazyProduct(way).norm()};
+  return {.source = camera.source_voxel + row * camera.row_step_voxel,
+          .way = way,
+          .length_mm = mm_from_voxel_axes.lazyProduct(way).norm()};
 }
 
 std::string CpuRenderer::device() const {

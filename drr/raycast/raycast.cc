@@ -38,9 +38,17 @@ struct GlView {
   std::uint32_t first_pixel, columns, is_mv, in_squares;
 };
 
+struct GlCamera {
+  glm::mat4 voxel_from_pixel;
+  glm::vec4 row_step;
+};
+
 struct GlRoom {
   glm::mat4 room_from_pixel, room_from_gradient;
+  glm::vec4 row_step;
 };
+
+glm::vec4 vec4_of(const Eigen::Vector3d& vector) { return glm::vec4(vector.x(), vector.y(), vector.z(), 0.0F); }
 
 ShaderSource shader(Filtering filtering, bool with_derivatives) {
   std::string variant;
@@ -52,7 +60,9 @@ ShaderSource shader(Filtering filtering, bool with_derivatives) {
 GlRoom room_of(const Camera& camera) {
   Eigen::Matrix4d room_from_gradient = Eigen::Matrix4d::Identity();
   room_from_gradient.topLeftCorner<3, 3>() = camera.voxel_from_room_axes.transpose();
-  return {.room_from_pixel = to_glm(camera.room_matrix()), .room_from_gradient = to_glm(room_from_gradient)};
+  return {.room_from_pixel = to_glm(camera.room_matrix()),
+          .room_from_gradient = to_glm(room_from_gradient),
+          .row_step = vec4_of(camera.row_step_room_mm)};
 }
 
 template <class T>
@@ -190,12 +200,12 @@ void RaycastGlRenderer::upload_views(std::span<const XrayView> views, const std:
 
 void RaycastGlRenderer::dispatch(std::span<const XrayView> views, std::span<const Eigen::Isometry3d> poses,
                                  std::size_t pixels_per_pose, bool has_pixel_list, bool with_derivatives) {
-  std::vector<glm::mat4> cameras;
+  std::vector<GlCamera> cameras;
   std::vector<GlRoom> rooms;
   for (const Eigen::Isometry3d& pose : poses)
     for (const XrayView& view : views) {
       const Camera camera = make_camera(view, pose, voxel_from_patient_);
-      cameras.push_back(to_glm(camera.matrix()));
+      cameras.push_back({.voxel_from_pixel = to_glm(camera.matrix()), .row_step = vec4_of(camera.row_step_voxel)});
       if (with_derivatives) rooms.push_back(room_of(camera));
     }
   cameras_.upload(bytes_of(cameras));

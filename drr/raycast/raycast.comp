@@ -17,8 +17,13 @@ struct View {
   uint in_squares;   // whether its pixels can be taken in squares of 8 x 8
 };
 
-// Columns 0 to 2 take (column, row, 1) to the way from source to pixel; column 3 is the source.
-layout(std430, binding = 0) readonly buffer Cameras { mat4 voxel_from_pixel[]; };  // [pose][view]
+// Columns 0 to 2 take (column, row, 1) to the way from source to pixel; column 3 is the source, of row 0 in a line scan,
+// whose source moves on by row_step from row to row.
+struct Camera {
+  mat4 voxel_from_pixel;
+  vec4 row_step;
+};
+layout(std430, binding = 0) readonly buffer Cameras { Camera cameras[]; };         // [pose][view]
 layout(std430, binding = 1) readonly buffer Views { View views[]; };
 layout(std430, binding = 2) readonly buffer Pixels { uint pixels[]; };             // of one pose, where a list is given
 layout(std430, binding = 3) writeonly buffer Result { float line_integrals[]; };   // [pose][pixel]
@@ -27,6 +32,7 @@ layout(std430, binding = 3) writeonly buffer Result { float line_integrals[]; };
 struct Room {
   mat4 room_from_pixel;
   mat4 room_from_gradient;
+  vec4 row_step;
 };
 layout(std430, binding = 4) readonly buffer Rooms { Room rooms[]; };                // [pose][view]
 layout(std430, binding = 5) writeonly buffer Derivatives { float derivatives[]; };  // [pose][pixel][6]
@@ -166,7 +172,8 @@ Sums along(vec3 source, vec3 way, sampler3D volume, float unit_per_mm) {
 void put_derivatives(Sums sums, Room room, vec3 position, uint at) {
   vec3 by_source = mat3(room.room_from_gradient) * sums.by_source;
   vec3 by_way = mat3(room.room_from_gradient) * sums.by_way;
-  vec3 turned = cross(room.room_from_pixel[3].xyz, by_source) + cross(mat3(room.room_from_pixel) * position, by_way);
+  vec3 source = room.room_from_pixel[3].xyz + position.y * room.row_step.xyz;
+  vec3 turned = cross(source, by_source) + cross(mat3(room.room_from_pixel) * position, by_way);
   for (int axis = 0; axis < 3; ++axis) {
     derivatives[6u * at + uint(axis)] = -by_source[axis];
     derivatives[6u * at + 3u + uint(axis)] = -turned[axis];
@@ -189,8 +196,9 @@ void main() {
       }
       uint pixel = has_pixel_list != 0u ? pixels[n] : place;
       vec3 position = vec3(float(pixel % columns), float(pixel / columns), 1.0);
-      mat4 camera = voxel_from_pixel[pose * view_count + view];
-      vec3 source = camera[3].xyz, way = mat3(camera) * position;
+      Camera camera = cameras[pose * view_count + view];
+      vec3 source = camera.voxel_from_pixel[3].xyz + position.y * camera.row_step.xyz;
+      vec3 way = mat3(camera.voxel_from_pixel) * position;
       Sums sums;
       if (views[view].is_mv != 0u)
         sums = along(source, way, mv_attenuation, units_per_mm.y);

@@ -114,6 +114,7 @@ RenderResult SplatRenderer::render(std::span<const XrayView> views,
                                    std::span<const Eigen::Isometry3d> room_from_patient, const PixelSet& pixels) {
   context_.make_current();
   timer_.clear();
+  refuse_line_scans(views, kind_);
   std::vector<std::size_t> begins = checked_view_begins(views, room_from_patient, pixels);
   std::vector<float> line_integrals(begins.back() * room_from_patient.size());
   for (std::size_t p = 0; p < room_from_patient.size(); ++p)

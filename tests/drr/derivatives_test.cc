@@ -29,8 +29,8 @@ std::vector<XrayView> three_views() {
 
 // rms(found - differences) / rms(differences) of each of the six derivatives, over all poses, views and pixels.
 std::array<double, 6> relative_errors(const RenderResult& found, Renderer& differentiated, const PixelSet& pixels,
-                                      std::span<const Eigen::Isometry3d> poses) {
-  const std::vector<XrayView> views = three_views();
+                                      std::span<const Eigen::Isometry3d> poses,
+                                      const std::vector<XrayView>& views = three_views()) {
   std::array<double, 6> errors;
   for (int axis = 0; axis < 6; ++axis) {
     const double step = axis < 3 ? 0.1 : 0.001;
@@ -76,6 +76,14 @@ TEST_P(DerivativesTest, AreTheCentralDifferencesOfTheOracle) {
   // The oracle differs by what differences of finite steps leave.
   const double bound = GetParam() == RendererKind::kTrilinear ? 0.004 : kMostOfOthers;
   for (const double error : relative_errors(found, *oracle_, PixelSet::all(), poses_)) EXPECT_LT(error, bound);
+}
+
+TEST_P(DerivativesTest, OfLineScansAreTheCentralDifferencesOfTheOracle) {
+  const std::vector<XrayView> scans = {line_scan_view(24, 20, 6.0, 80.0), line_scan_view(20, 24, 6.0, 20.0),
+                                       line_scan_view(17, 16, 7.0, 53.0)};
+  const RenderResult found = renderer_->render_with_derivatives(scans, poses_, PixelSet::all());
+  const double bound = GetParam() == RendererKind::kTrilinear ? 0.004 : kMostOfOthers;
+  for (const double error : relative_errors(found, *oracle_, PixelSet::all(), poses_, scans)) EXPECT_LT(error, bound);
 }
 
 // `raycast` steps from where a ray enters the box: its own differences hold how its samples move, too.

@@ -20,6 +20,20 @@ XrayView centered_view(double gantry_deg, int pixels, double pixel_mm) {
   return make_xray_view(geometry, Beam::kKilovoltage);
 }
 
+XrayView line_scan_view(int columns, int rows, double pixel_mm, double beside_x_deg) {
+  const Eigen::Matrix3d turned = rotation_y(rad_from_deg(beside_x_deg));
+  const Eigen::Vector3d across = turned * Eigen::Vector3d::UnitZ(), along = Eigen::Vector3d::UnitY();
+  const Eigen::Vector3d first_row = -0.5 * (rows - 1) * pixel_mm * along;
+  return make_line_scan_view({.source_room_mm = 570.0 * (turned * Eigen::Vector3d::UnitX()) + first_row,
+                              .first_pixel_room_mm = first_row - 0.5 * (columns - 1) * pixel_mm * across,
+                              .column_step_room_mm = pixel_mm * across,
+                              .row_step_room_mm = pixel_mm * along,
+                              .sid_by_sad = 1040.0 / 570.0,
+                              .columns = columns,
+                              .rows = rows},
+                             Beam::kKilovoltage);
+}
+
 Volume<float> centered_volume(const Eigen::Vector3i& size, const Eigen::Vector3d& spacing_mm, float hu) {
   Eigen::Affine3d patient_from_voxel = Eigen::Affine3d::Identity();
   patient_from_voxel.linear() = spacing_mm.asDiagonal();

@@ -13,6 +13,10 @@ inline constexpr std::array kBothBeams = {Beam::kKilovoltage, Beam::kMegavoltage
 // A square panel at SID 1500 mm (SAD 1000), centered, `pixels` along each edge.
 XrayView centered_view(double gantry_deg, int pixels, double pixel_mm);
 
+// A scan of rows along the room's y axis, centered, by a tube 570 mm from the isocenter, so many degrees
+// beside the x axis. `pixel_mm` at the isocenter.
+XrayView line_scan_view(int columns, int rows, double pixel_mm, double beside_x_deg = 20.0);
+
 // A volume of one value, its center at the origin, its axes those of the room.
 Volume<float> centered_volume(const Eigen::Vector3i& size, const Eigen::Vector3d& spacing_mm, float hu);
 
