@@ -13,6 +13,10 @@ std::string allow_keys_help() {
 
 }  // namespace
 
+CLI::Option* add_allow_option(CLI::App& command, std::vector<std::string>& allow) {
+  return command.add_option("--allow", allow, allow_keys_help())->type_name("KEY=REASON");
+}
+
 void add_study_options(CLI::App& command, StudyOptions& options) {
   command
       .add_option("study", options.parts.study, "Folder of the exported study; files are recognized by their contents")
@@ -84,7 +88,7 @@ void add_study_switches(CLI::App& command, StudyOptions& options) {
                   "Machine profile: what a machine's files lack or say wrongly (docs/machine-profile.md)")
       ->type_name("FILE")
       ->group(lacking);
-  command.add_option("--allow", options.allow, allow_keys_help())->type_name("KEY=REASON")->group(lacking);
+  add_allow_option(command, options.allow)->group(lacking);
 }
 
 }  // namespace isoshift

@@ -8,6 +8,7 @@
 
 namespace isoshift {
 
+CLI::Option* add_allow_option(CLI::App& command, std::vector<std::string>& allow);
 void add_study_options(CLI::App& command, StudyOptions& options);
 // The flags that do not name the parts of a study.
 void add_study_switches(CLI::App& command, StudyOptions& options);

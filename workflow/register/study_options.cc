@@ -57,6 +57,17 @@ void StudyOptions::check_numbers() const {
   check_finite("--sid", std::array{sid_mm.value_or(0.0)});
 }
 
+Allowances allowances_from(std::span<const std::string> allow) {
+  Allowances allowed;
+  for (const std::string& text : allow) {
+    const auto [key, reason] = key_and_value(text, "--allow");
+    if (std::ranges::find(kAllowKeys, key, &AllowKey::key) == std::end(kAllowKeys))
+      throw UsageError(fmt::format("--allow {}: no check has this key", key));
+    allowed[key] = reason;
+  }
+  return allowed;
+}
+
 StudyRequest StudyOptions::request() const {
   check_numbers();
   StudyRequest request;
@@ -80,12 +91,7 @@ StudyRequest StudyOptions::request() const {
   if (!beam.empty()) request.switches.beam = beam == "kv" ? Beam::kKilovoltage : Beam::kMegavoltage;
   if (!patient_position.empty()) request.switches.patient_position = patient_position_from(patient_position);
   if (!machine.empty()) request.machine = read_machine_profile(machine);
-  for (const std::string& text : allow) {
-    const auto [key, reason] = key_and_value(text, "--allow");
-    if (std::ranges::find(kAllowKeys, key, &AllowKey::key) == std::end(kAllowKeys))
-      throw UsageError(fmt::format("--allow {}: no check has this key", key));
-    request.allowed[key] = reason;
-  }
+  request.allowed = allowances_from(allow);
   return request;
 }
 

@@ -17,6 +17,9 @@ void check_finite(const char* flag, std::span<const double> values);
 void check_couch_angles(const std::optional<double>& couch_angle_deg, const std::optional<double>& couch_pitch_deg,
                         const std::optional<double>& couch_roll_deg);
 
+// What --allow KEY=REASON says. Throws UsageError for a key that no check has.
+Allowances allowances_from(std::span<const std::string> allow);
+
 struct StudyOptions {
   StudyParts parts;
   std::filesystem::path machine;
