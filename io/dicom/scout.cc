@@ -1,0 +1,147 @@
+#include "io/dicom/scout.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "base/error.h"
+#include "io/dicom/decode.h"
+
+namespace isoshift {
+namespace {
+
+using Eigen::Vector3d;
+
+constexpr double kMostOffAxis = 1e-3;  // of the sine between an axis of the image and one of the patient
+
+// From the patient's axes, LPS.
+Vector3d direction_of(TubeSide side) {
+  switch (side) {
+    case TubeSide::kLeft: return Vector3d::UnitX();
+    case TubeSide::kRight: return -Vector3d::UnitX();
+    case TubeSide::kAnterior: return -Vector3d::UnitY();
+    case TubeSide::kPosterior: return Vector3d::UnitY();
+  }
+  return Vector3d::Zero();
+}
+
+double distance_from(const DicomItem& dataset, const DcmTagKey& tag, const std::optional<double>& given,
+                     std::string_view flag, Notes& notes) {
+  const std::optional<double> found = dataset.number(tag);
+  if (given) {
+    if (found != *given)
+      notes.overrides.push_back(fmt::format("{}: {} MM: {:g} mm for {}, {}", dataset.where(), flag, *given,
+                                            described(tag),
+                                            found ? fmt::format("which is {:g}", *found) : "which is missing"));
+    return *given;
+  }
+  if (!found)
+    throw Error(fmt::format("{}: {} is missing\n       {} MM supplies it", dataset.where(), described(tag), flag));
+  return *found;
+}
+
+}  // namespace
+
+std::string_view to_string(TubeSide side) {
+  switch (side) {
+    case TubeSide::kLeft: return "left";
+    case TubeSide::kRight: return "right";
+    case TubeSide::kAnterior: return "anterior";
+    case TubeSide::kPosterior: return "posterior";
+  }
+  return "";
+}
+
+std::optional<TubeSide> tube_side_from(std::string_view name) {
+  for (const TubeSide side : kTubeSides)
+    if (to_string(side) == name) return side;
+  return std::nullopt;
+}
+
+std::array<TubeSide, 2> Scout::possible_sides() const {
+  const Vector3d normal = column_step_patient_mm.cross(row_step_patient_mm);
+  if (std::abs(normal.x()) > std::abs(normal.y())) return {TubeSide::kLeft, TubeSide::kRight};
+  return {TubeSide::kAnterior, TubeSide::kPosterior};
+}
+
+XrayImage Scout::xray(TubeSide side, const Eigen::Isometry3d& room_from_patient) const {
+  const Vector3d middle = first_pixel_patient_mm + 0.5 * (values.columns - 1) * column_step_patient_mm;
+  XrayImage image;
+  image.label = "scout";
+  image.meaning = XrayImage::Meaning::kLineIntegral;
+  image.values = values;
+  image.view = make_line_scan_view({.source_room_mm = room_from_patient * (middle + sad_mm * direction_of(side)),
+                                    .first_pixel_room_mm = room_from_patient * first_pixel_patient_mm,
+                                    .column_step_room_mm = room_from_patient.linear() * column_step_patient_mm,
+                                    .row_step_room_mm = room_from_patient.linear() * row_step_patient_mm,
+                                    .sid_by_sad = sid_mm / sad_mm,
+                                    .columns = values.columns,
+                                    .rows = values.rows},
+                                   Beam::kKilovoltage);
+  return image;
+}
+
+Scout read_scout(const std::filesystem::path& path, const ScoutSwitches& switches, Notes& notes) {
+  const DicomFile file = DicomFile::read(path, DicomFile::Extent::kWhole);
+  const DicomItem dataset = file.dataset();
+  const std::vector<std::string> type = dataset.texts(DCM_ImageType);
+  if (dataset.text(DCM_Modality) != "CT" || type.size() < 3 || type[2] != "LOCALIZER")
+    throw Error(
+        fmt::format("{}: is no localizer of a CT: {} is {} and the third value of {} is {}, expected CT and "
+                    "LOCALIZER",
+                    path.string(), described(DCM_Modality), dataset.text(DCM_Modality).value_or("missing"),
+                    described(DCM_ImageType), type.size() < 3 ? "missing" : type[2]));
+  if (const auto tilt = dataset.number(DCM_GantryDetectorTilt); tilt.value_or(0.0) != 0.0)
+    throw Error(fmt::format("{}: {} is {:g} degrees, expected 0: scouts of tilted gantries are not read", path.string(),
+                            described(DCM_GantryDetectorTilt), *tilt));
+  Scout scout;
+  scout.identity = read_identity(dataset);
+  scout.sop_instance_uid = dataset.required_text(DCM_SOPInstanceUID);
+  scout.frame_of_reference_uid = dataset.required_text(DCM_FrameOfReferenceUID);
+  scout.patient_position = dataset.required_text(DCM_PatientPosition);
+  scout.sha256 = file.sha256();
+  scout.sad_mm = distance_from(dataset, DCM_DistanceSourceToPatient, switches.sad_mm, "--sad", notes);
+  scout.sid_mm = distance_from(dataset, DCM_DistanceSourceToDetector, switches.sid_mm, "--sid", notes);
+  if (!(scout.sad_mm > 0.0 && scout.sid_mm > scout.sad_mm))
+    throw Error(fmt::format("{}: {} is {:g} and {} is {:g} mm, expected a positive number and a larger one",
+                            path.string(), described(DCM_DistanceSourceToPatient), scout.sad_mm,
+                            described(DCM_DistanceSourceToDetector), scout.sid_mm));
+
+  const std::vector<double> orientation = dataset.required_numbers(DCM_ImageOrientationPatient, 6);
+  const Vector3d along_row(orientation.data()), along_column(orientation.data() + 3);
+  const bool is_lateral = std::abs(along_row.y()) > std::abs(along_row.x());
+  const Vector3d across = is_lateral ? Vector3d::UnitY() : Vector3d::UnitX();
+  if (!(along_column.cross(Vector3d::UnitZ()).norm() <= kMostOffAxis &&
+        along_row.cross(across).norm() <= kMostOffAxis && std::abs(along_row.norm() - 1.0) <= kMostOffAxis &&
+        std::abs(along_column.norm() - 1.0) <= kMostOffAxis))
+    throw Error(
+        fmt::format("{}: {} is {:g}\\{:g}\\{:g}\\{:g}\\{:g}\\{:g}, expected rows across the table along x or y, "
+                    "and columns along z",
+                    path.string(), described(DCM_ImageOrientationPatient), orientation[0], orientation[1],
+                    orientation[2], orientation[3], orientation[4], orientation[5]));
+  const std::vector<double> spacing = dataset.required_numbers(DCM_PixelSpacing, 2);
+  if (!(spacing[0] > 0.0 && spacing[1] > 0.0))
+    throw Error(fmt::format("{}: {} is {:g}\\{:g}, expected positive", path.string(), described(DCM_PixelSpacing),
+                            spacing[0], spacing[1]));
+  scout.first_pixel_patient_mm = Vector3d(dataset.required_numbers(DCM_ImagePositionPatient, 3).data());
+  scout.column_step_patient_mm = spacing[1] * along_row;
+  scout.row_step_patient_mm = spacing[0] * along_column;
+
+  const PixelFormat format = pixel_format(dataset);
+  if (format.frames != 1)
+    throw Error(fmt::format("{}: {} is {}, expected 1", path.string(), described(DCM_NumberOfFrames), format.frames));
+  const std::string photometric = dataset.required_text(DCM_PhotometricInterpretation);
+  if (photometric != "MONOCHROME2")
+    throw Error(fmt::format("{}: {} is {}, expected MONOCHROME2", path.string(),
+                            described(DCM_PhotometricInterpretation), photometric));
+  const double slope = dataset.number(DCM_RescaleSlope).value_or(1.0);
+  if (!(slope > 0.0))
+    throw Error(fmt::format("{}: {} is {:g}, expected positive", path.string(), described(DCM_RescaleSlope), slope));
+  scout.values = Image<float>(format.columns, format.rows);
+  std::ranges::transform(decode_frame(file, format, 0), scout.values.pixels.begin(),
+                         [&](std::int32_t stored) { return static_cast<float>(slope * stored); });
+  return scout;
+}
+
+}  // namespace isoshift
