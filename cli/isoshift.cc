@@ -47,6 +47,7 @@ void add_commands(CLI::App& app, Console& console, int& exit_status) {
   add_evaluate_command(app, console, exit_status);
   add_track_command(app, console, exit_status);
   add_predict_command(app, console, exit_status);
+  add_scout_command(app, console, exit_status);
   add_watch_command(app, console, exit_status);
   add_serve_command(app, console, exit_status);
   add_view_command(app, console, exit_status);

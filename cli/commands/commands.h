@@ -16,6 +16,7 @@ void add_report_command(CLI::App& app, Console& console, int& exit_status);
 void add_drr_command(CLI::App& app, Console& console, int& exit_status);
 void add_phantom_command(CLI::App& app, Console& console, int& exit_status);
 void add_track_command(CLI::App& app, Console& console, int& exit_status);
+void add_scout_command(CLI::App& app, Console& console, int& exit_status);
 void add_predict_command(CLI::App& app, Console& console, int& exit_status);
 void add_watch_command(CLI::App& app, Console& console, int& exit_status);
 void add_serve_command(CLI::App& app, Console& console, int& exit_status);
