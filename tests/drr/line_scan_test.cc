@@ -146,7 +146,7 @@ TEST_P(LineScanOfRenderer, ShowsBallsWhereTheScannerDoes) {
   EXPECT_GT(correlation(found, expected), has_steps ? 0.996 : 0.999);
 }
 
-TEST(LineScan, IsRefusedByRenderersOfPinholes) {
+TEST(SplatsAndFaces, RefuseLineScans) {
   const XrayView scan = line_scan_view(16, 16, 5.0);
   const Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
   for (const RendererKind kind : {RendererKind::kSplat, RendererKind::kRaycastBox}) {
