@@ -18,11 +18,13 @@ std::vector<T> large_vector(std::size_t count) {
   constexpr std::uintptr_t kLargePage = std::uintptr_t{2} << 20;
   std::vector<T> values;
   values.reserve(count);
-  const auto first = (reinterpret_cast<std::uintptr_t>(values.data()) + kLargePage - 1) / kLargePage;
-  const auto end = reinterpret_cast<std::uintptr_t>(values.data() + count) / kLargePage;
+  auto* begin = reinterpret_cast<std::byte*>(values.data());
+  const auto address = reinterpret_cast<std::uintptr_t>(begin);
+  const auto first = (address + kLargePage - 1) / kLargePage;
+  const auto end = (address + count * sizeof(T)) / kLargePage;
   // Advice: where the kernel does not follow it, nothing but time is lost.
-  const auto advise = [](std::uintptr_t page, std::uintptr_t pages, int advice) {
-    static_cast<void>(::madvise(reinterpret_cast<void*>(page * kLargePage), pages * kLargePage, advice));
+  const auto advise = [&](std::uintptr_t page, std::uintptr_t pages, int advice) {
+    static_cast<void>(::madvise(begin + (page * kLargePage - address), pages * kLargePage, advice));
   };
   if (first < end) {
     advise(first, end - first, MADV_HUGEPAGE);
