@@ -1,5 +1,7 @@
 #include "cli/switches/rendering_switches.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 
 namespace isoshift {
