@@ -90,8 +90,9 @@ class PacketMarcher {
     const int first = static_cast<int>(std::ceil(std::min(at_begin, at_end)));
     const int last = std::min(static_cast<int>(std::max(at_begin, at_end)), size_[main_axis_] - 2);
     if (first > last) return;
-    if (count_ > 0 && ray.source != source_) finish();  // the next row of a line scan
-    source_ = ray.source;
+    if (count_ > 0 && (source != packet_.source_plane || ray.source[axes_.column] != packet_.source_column ||
+                       ray.source[axes_.row] != packet_.source_row))
+      finish();  // the next row of a line scan
     if (count_ == 0) {
       packet_.plane = first;
       packet_.forward = way > 0.0;
@@ -156,7 +157,6 @@ class PacketMarcher {
   }
 
   RayPacket packet_;
-  Vector3d source_ = Vector3d::Zero();  // of the packet's rays
   PlaneLattice<T> lattice_;
   Vector3i size_;
   int main_axis_;
