@@ -94,6 +94,9 @@ void add_scout_command(CLI::App& app, Console& console, int& exit_status) {
   auto request = std::make_shared<ScoutRequest>();
   auto allow = std::make_shared<std::vector<std::string>>();
   auto as_json = std::make_shared<bool>(false);
+  std::vector<std::string> sides;
+  sides.reserve(kTubeSides.size());
+  for (const TubeSide side : kTubeSides) sides.emplace_back(to_string(side));
   CLI::App* command = app.add_subcommand(
       "scout", "Register a CT to its own scout, an X-ray at a known pose: the answer should be nothing");
   command->footer(
@@ -108,7 +111,7 @@ void add_scout_command(CLI::App& app, Console& console, int& exit_status) {
       ->add_option_function<std::string>(
           "--tube", [request](const std::string& side) { request->tube = tube_side_from(side); },
           "On which side of the patient the tube stood [the side from which the scout matches better]")
-      ->check(CLI::IsMember({"left", "right", "anterior", "posterior"}));
+      ->check(CLI::IsMember(sides));
   command->add_option("--sad", request->distances.sad_mm, "Distance Source to Patient, where the file lacks it")
       ->type_name("MM");
   command->add_option("--sid", request->distances.sid_mm, "Distance Source to Detector, where the file lacks it")

@@ -4,13 +4,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <random>
 
 #include "base/error.h"
 #include "geometry/rotation.h"
 #include "io/dicom/ct_series.h"
 #include "io/study/session.h"
 #include "io/study/study_files.h"
+#include "registration/evaluate.h"
 #include "registration/pose_parameters.h"
 #include "registration/presets.h"
 #include "registration/quality/judge.h"
@@ -121,15 +121,6 @@ std::array<ScoutAxis, 6> scout_axes(const Eigen::Isometry3d& offset, const std::
   return axes;
 }
 
-Eigen::Isometry3d displacement(std::mt19937_64& random) {
-  std::uniform_real_distribution<double> uniform(-1.0, 1.0);
-  const auto vector = [&] { return Vector3d(uniform(random), uniform(random), uniform(random)); };
-  Eigen::Isometry3d displaced = Eigen::Isometry3d::Identity();
-  displaced.translation() = ScoutRegistration::kStartMm / std::sqrt(3.0) * vector();
-  displaced.linear() = rotation_from_vector(kMostRad / std::sqrt(3.0) * vector());
-  return displaced;
-}
-
 }  // namespace
 
 ScoutRegistration register_scout(const ScoutRequest& request, Observer& observer) {
@@ -144,9 +135,10 @@ ScoutRegistration register_scout(const ScoutRequest& request, Observer& observer
   check_same_patient(ct, scout, request, result.notes);
   ScoutScene scene(request, ct, scout);
 
+  const std::array images = {scene.image(sides[0]), scene.image(sides[1])};
   std::array<RegistrationResult, 2> found;
   for (std::size_t n = 0; n < 2; ++n) {
-    found[n] = scene.registered(scene.image(sides[n]), Eigen::Isometry3d::Identity(), true);
+    found[n] = scene.registered(images[n], Eigen::Isometry3d::Identity(), true);
     observer.progress("Registering", n + 1, kStarts + 2);
   }
   const auto match_of = [&](std::size_t n) { return found[n].views.front().similarity_final; };
@@ -156,7 +148,7 @@ ScoutRegistration register_scout(const ScoutRequest& request, Observer& observer
   result.tube = sides[chosen];
   result.match = match_of(chosen);
   result.match_from_other_side = match_of(1 - chosen);
-  const FixedImage image = scene.image(result.tube);
+  const FixedImage& image = images[chosen];
   result.axes = scout_axes(scene.offset_of(answer), answer.uncertainty, image.view.central_direction_room());
   scene.judge_what_is_seen(result.axes, answer);
   if (!(result.match >= result.match_from_other_side + kClearlyBetter))
@@ -166,13 +158,17 @@ ScoutRegistration register_scout(const ScoutRequest& request, Observer& observer
                     to_string(sides[1 - chosen]), result.match < result.match_from_other_side ? "better" : "as well",
                     result.match_from_other_side, to_string(result.tube), result.match));
 
-  std::mt19937_64 random(request.seed);
   const std::array<double, 6> ends = axes_of(scene.offset_of(answer));
-  for (; result.starts < kStarts; ++result.starts) {
-    const std::array<double, 6> other = axes_of(scene.offset_of(scene.registered(image, displacement(random), false)));
+  const std::vector<StartPose> starts =
+      start_poses(Eigen::Isometry3d::Identity(), {.distance_mm = ScoutRegistration::kStartMm,
+                                                  .max_rotation_rad = kMostRad,
+                                                  .count = kStarts,
+                                                  .seed = request.seed});
+  for (const StartPose& start : starts) {
+    const std::array<double, 6> other = axes_of(scene.offset_of(scene.registered(image, start.setup_error, false)));
     for (std::size_t n = 0; n < 6; ++n)
       result.axes[n].repeatability = std::max(result.axes[n].repeatability, std::abs(other[n] - ends[n]));
-    observer.progress("Registering", result.starts + 3, kStarts + 2);
+    observer.progress("Registering", static_cast<std::size_t>(++result.starts) + 2, kStarts + 2);
   }
   result.verdict = answer.verdict;
   result.reasons = answer.reasons;
