@@ -3,6 +3,7 @@
 
 #include <string>
 #include <string_view>
+#include <vector>
 
 namespace isoshift {
 
@@ -11,5 +12,19 @@ std::string csv_quoted(std::string_view text);
 
 // The same for people: a text that a spreadsheet would take for a formula begins with an apostrophe.
 std::string csv_cell(std::string text);
+
+// A table whose first line names its columns. Every row has as many cells as there are columns; empty lines are left
+// out.
+struct CsvTable {
+  struct Row {
+    int line = 0;  // of the file, from 1
+    std::vector<std::string> cells;
+  };
+  std::vector<std::string> columns;
+  std::vector<Row> rows;
+};
+
+// Throws Error naming `where` and the line.
+CsvTable csv_table(std::string_view text, const std::string& where);
 
 }  // namespace isoshift

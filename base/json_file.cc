@@ -4,12 +4,11 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <fstream>
-#include <iterator>
 #include <set>
 
 #include "base/error.h"
 #include "base/sha256.h"
+#include "base/text_file.h"
 
 namespace isoshift {
 
@@ -33,10 +32,10 @@ nlohmann::json json_from(const std::string& text, const std::string& where) {
 JsonFile read_json_file(const std::filesystem::path& path) {
   if (std::filesystem::is_directory(path))
     throw Error(fmt::format("{}: is a folder, expected a JSON file", path.string()));
-  std::ifstream file(path, std::ios::binary);
-  const std::string content{std::istreambuf_iterator<char>(file), {}};
-  if (!file) throw Error(fmt::format("{}: cannot be read", path.string()));
-  return {.json = json_from(content, path.string()), .sha256 = sha256_of(content)};
+  std::string content = text_of_file(path);
+  nlohmann::json json = json_from(content, path.string());
+  std::string sha256 = sha256_of(content);
+  return {.json = std::move(json), .text = std::move(content), .sha256 = std::move(sha256)};
 }
 
 JsonSection::JsonSection(const nlohmann::json& json, std::string where) : json_(json), where_(std::move(where)) {

@@ -14,7 +14,8 @@ namespace isoshift {
 
 struct JsonFile {
   nlohmann::json json;
-  std::string sha256;  // of the file, hexadecimal
+  std::string text;    // of the file, as it is
+  std::string sha256;  // of that, hexadecimal
 };
 
 // Throws Error naming `where` for a text that is not JSON, or in which an object has a key twice.

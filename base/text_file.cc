@@ -1,0 +1,20 @@
+#include "base/text_file.h"
+
+#include <fmt/format.h>
+
+#include <fstream>
+#include <iterator>
+
+#include "base/error.h"
+
+namespace isoshift {
+
+std::string text_of_file(const std::filesystem::path& path) {
+  if (std::filesystem::is_directory(path)) throw Error(fmt::format("{}: is a folder, expected a file", path.string()));
+  std::ifstream file(path, std::ios::binary);
+  std::string text{std::istreambuf_iterator<char>(file), {}};
+  if (!file) throw Error(fmt::format("{}: cannot be read", path.string()));
+  return text;
+}
+
+}  // namespace isoshift
