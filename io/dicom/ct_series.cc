@@ -14,6 +14,7 @@
 #include "base/parallel.h"
 #include "base/sha256.h"
 #include "io/dicom/decode.h"
+#include "io/dicom/pixel_padding.h"
 
 namespace isoshift {
 namespace {
@@ -54,20 +55,10 @@ std::vector<float> hu_from_stored(const DicomItem& dataset, const DicomItem& res
   if (const auto type = rescale.text(DCM_RescaleType); type && *type != "HU")
     throw Error(fmt::format("{}: {} is {}, expected HU", rescale.where(), described(DCM_RescaleType), *type));
 
-  // The padding attributes are US or SS like the pixels (PS3.3 C.7.5.1.1.2); implicit VR files say US for both.
-  const bool is_signed = dataset.required_number(DCM_PixelRepresentation) != 0;
-  const auto padding_value = [&](const DcmTagKey& tag) -> std::optional<double> {
-    auto value = dataset.number(tag);
-    if (value && is_signed && *value > 32767) *value -= 65536;
-    return value;
-  };
-  const auto padding = padding_value(DCM_PixelPaddingValue);
-  const auto padding_limit = padding ? padding_value(DCM_PixelPaddingRangeLimit).value_or(*padding) : 0.0;
-
+  const PixelPadding padding(dataset);
   std::vector<float> hu(stored_values.size());
   std::ranges::transform(stored_values, hu.begin(), [&](std::int32_t value) {
-    if (padding && value >= std::min(*padding, padding_limit) && value <= std::max(*padding, padding_limit))
-      return kAirHu;
+    if (padding.holds(value)) return kAirHu;
     return std::max(kAirHu, static_cast<float>(slope * value + intercept));
   });
   return hu;

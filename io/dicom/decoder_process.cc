@@ -19,8 +19,10 @@
 namespace isoshift {
 namespace {
 
-constexpr std::chrono::seconds kMaxWallTime(10);  // per frame: the largest takes about one
+// Per frame: the largest takes about one. A child that computes without end meets the first limit, one that waits for a
+// file or for its turn on a busy computer the second.
 constexpr rlim_t kMaxCpuS = 10;
+constexpr std::chrono::seconds kMaxWallTime(30);
 constexpr rlim_t kMaxMemoryBytes = rlim_t{4} << 30;
 constexpr std::size_t kMaxErrorBytes = 4096;
 constexpr std::size_t kMaxAnswerBytes = 6 * kMaxErrorBytes + 64;  // an error whose every byte is escaped
@@ -80,7 +82,8 @@ class DecoderProcess {
     constexpr const char* kDamaged = "the pixel data are damaged, or made to do harm";
     const ProcessEnd end = process_.wait();
     if (end.is_late)
-      return fmt::format("its pixel data were not decoded within {} s: {}", kMaxWallTime.count(), kDamaged);
+      return fmt::format("its pixel data were not decoded within {} s: the computer is too busy, or {}",
+                         kMaxWallTime.count(), kDamaged);
     return fmt::format("the decoder ended with {} {}: {}", end.signal != 0 ? "signal" : "status",
                        end.signal != 0 ? end.signal : end.status, kDamaged);
   }

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "geometry/imager_error.h"
 #include "geometry/patient_setup.h"
 #include "geometry/xray_image.h"
 #include "io/dicom/identity.h"
@@ -70,6 +71,7 @@ struct RtImage {
 
   std::map<std::string, std::string, std::less<>> equipment;   // what machine profiles tell images apart by, by keyword
   std::optional<Eigen::Matrix<double, 3, 4>> pixel_from_room;  // replaces the geometry of the attributes above
+  std::optional<KnownImager> imager;                           // what a machine profile knows of its errors
 
   int columns = 0, rows = 0;
   std::optional<std::string> intensity_relationship;

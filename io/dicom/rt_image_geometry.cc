@@ -107,7 +107,12 @@ XrayView xray_view(const RtImage& image, Beam beam, Notes& notes) {
     notes.warnings.push_back(
         fmt::format("{}: {} is MONOCHROME1, which is for display only; pixel values are taken as they are", image.label,
                     described(DCM_PhotometricInterpretation)));
-  if (!image.pixel_from_room) return make_xray_view(carm_geometry(image, notes), beam);
+  if (!image.pixel_from_room) {
+    const CarmGeometry geometry = carm_geometry(image, notes);
+    const XrayView view = make_xray_view(geometry, beam);
+    if (!image.imager || !image.imager->is_corrected) return view;
+    return with_errors(view, geometry.gantry_angle_rad, image.sid_mm.value(), image.imager->values);
+  }
   try {
     return xray_view_from_matrix(*image.pixel_from_room, image.sid_mm.value(), image.columns, image.rows, beam);
   } catch (const Error& error) {

@@ -4,15 +4,20 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
+#include <limits>
+#include <vector>
 
 #include "base/error.h"
 #include "io/dicom/decode.h"
+#include "io/dicom/pixel_padding.h"
 
 namespace isoshift {
 namespace {
 
 using Eigen::Vector3d;
 
+constexpr double kLeastSadMm = 300.0, kMostSadMm = 1500.0;  // of CT scanners 500 to 700
 constexpr double kMostOffAxis = 1e-3;  // of the sine between an axis of the image and one of the patient
 
 // From the patient's axes, LPS.
@@ -39,6 +44,55 @@ double distance_from(const DicomItem& dataset, const DcmTagKey& tag, const std::
   if (!found)
     throw Error(fmt::format("{}: {} is missing\n       {} MM supplies it", dataset.where(), described(tag), flag));
   return *found;
+}
+
+void read_plane(const DicomItem& dataset, Scout& scout) {
+  const std::vector<double> orientation = dataset.required_numbers(DCM_ImageOrientationPatient, 6);
+  const Vector3d along_row(orientation.data()), along_column(orientation.data() + 3);
+  const bool is_lateral = std::abs(along_row.y()) > std::abs(along_row.x());
+  const Vector3d across = is_lateral ? Vector3d::UnitY() : Vector3d::UnitX();
+  if (!(along_column.cross(Vector3d::UnitZ()).norm() <= kMostOffAxis &&
+        along_row.cross(across).norm() <= kMostOffAxis && std::abs(along_row.norm() - 1.0) <= kMostOffAxis &&
+        std::abs(along_column.norm() - 1.0) <= kMostOffAxis))
+    throw Error(
+        fmt::format("{}: {} is {:g}\\{:g}\\{:g}\\{:g}\\{:g}\\{:g}, expected rows across the table along x or y, "
+                    "and columns along z",
+                    dataset.where(), described(DCM_ImageOrientationPatient), orientation[0], orientation[1],
+                    orientation[2], orientation[3], orientation[4], orientation[5]));
+  const std::vector<double> spacing = dataset.required_numbers(DCM_PixelSpacing, 2);
+  if (!(spacing[0] > 0.0 && spacing[1] > 0.0))
+    throw Error(fmt::format("{}: {} is {:g}\\{:g}, expected positive", dataset.where(), described(DCM_PixelSpacing),
+                            spacing[0], spacing[1]));
+  scout.first_pixel_patient_mm = Vector3d(dataset.required_numbers(DCM_ImagePositionPatient, 3).data());
+  scout.column_step_patient_mm = spacing[1] * along_row;
+  scout.row_step_patient_mm = spacing[0] * along_column;
+}
+
+// They grow with the attenuation along the ray.
+Image<float> read_values(const DicomFile& file, const DicomItem& dataset) {
+  const PixelFormat format = pixel_format(dataset);
+  if (format.frames != 1)
+    throw Error(fmt::format("{}: {} is {}, expected 1", dataset.where(), described(DCM_NumberOfFrames), format.frames));
+  const std::string photometric = dataset.required_text(DCM_PhotometricInterpretation);
+  if (photometric != "MONOCHROME2")
+    throw Error(fmt::format("{}: {} is {}, expected MONOCHROME2", dataset.where(),
+                            described(DCM_PhotometricInterpretation), photometric));
+  const double slope = dataset.number(DCM_RescaleSlope).value_or(1.0);
+  if (!(slope > 0.0))
+    throw Error(fmt::format("{}: {} is {:g}, expected positive", dataset.where(), described(DCM_RescaleSlope), slope));
+  Image<float> values(format.columns, format.rows);
+  // What the scanner has not measured shows nothing, as air does.
+  const PixelPadding padding(dataset);
+  const std::vector<std::int32_t> stored = decode_frame(file, format, 0);
+  std::int32_t air = std::numeric_limits<std::int32_t>::max();
+  for (const std::int32_t value : stored)
+    if (!padding.holds(value)) air = std::min(air, value);
+  std::ranges::transform(stored, values.pixels.begin(), [&](std::int32_t value) {
+    return static_cast<float>(slope * (padding.holds(value) ? air : value));
+  });
+  const auto [least, most] = std::ranges::minmax(values.pixels);
+  if (least == most) throw Error(fmt::format("{}: is blank: all its pixels hold {:g}", dataset.where(), least / slope));
+  return values;
 }
 
 }  // namespace
@@ -99,48 +153,16 @@ Scout read_scout(const std::filesystem::path& path, const ScoutSwitches& switche
   scout.identity = read_identity(dataset);
   scout.sop_instance_uid = dataset.required_text(DCM_SOPInstanceUID);
   scout.frame_of_reference_uid = dataset.required_text(DCM_FrameOfReferenceUID);
-  scout.patient_position = dataset.required_text(DCM_PatientPosition);
+  scout.patient_position = dataset.text(DCM_PatientPosition).value_or("");
   scout.sha256 = file.sha256();
   scout.sad_mm = distance_from(dataset, DCM_DistanceSourceToPatient, switches.sad_mm, "--sad", notes);
   scout.sid_mm = distance_from(dataset, DCM_DistanceSourceToDetector, switches.sid_mm, "--sid", notes);
-  if (!(scout.sad_mm > 0.0 && scout.sid_mm > scout.sad_mm))
-    throw Error(fmt::format("{}: {} is {:g} and {} is {:g} mm, expected a positive number and a larger one",
+  if (!(scout.sad_mm >= kLeastSadMm && scout.sad_mm <= kMostSadMm && scout.sid_mm > scout.sad_mm))
+    throw Error(fmt::format("{}: {} is {:g} and {} is {:g} mm, expected {:g} to {:g} mm and a larger one",
                             path.string(), described(DCM_DistanceSourceToPatient), scout.sad_mm,
-                            described(DCM_DistanceSourceToDetector), scout.sid_mm));
-
-  const std::vector<double> orientation = dataset.required_numbers(DCM_ImageOrientationPatient, 6);
-  const Vector3d along_row(orientation.data()), along_column(orientation.data() + 3);
-  const bool is_lateral = std::abs(along_row.y()) > std::abs(along_row.x());
-  const Vector3d across = is_lateral ? Vector3d::UnitY() : Vector3d::UnitX();
-  if (!(along_column.cross(Vector3d::UnitZ()).norm() <= kMostOffAxis &&
-        along_row.cross(across).norm() <= kMostOffAxis && std::abs(along_row.norm() - 1.0) <= kMostOffAxis &&
-        std::abs(along_column.norm() - 1.0) <= kMostOffAxis))
-    throw Error(
-        fmt::format("{}: {} is {:g}\\{:g}\\{:g}\\{:g}\\{:g}\\{:g}, expected rows across the table along x or y, "
-                    "and columns along z",
-                    path.string(), described(DCM_ImageOrientationPatient), orientation[0], orientation[1],
-                    orientation[2], orientation[3], orientation[4], orientation[5]));
-  const std::vector<double> spacing = dataset.required_numbers(DCM_PixelSpacing, 2);
-  if (!(spacing[0] > 0.0 && spacing[1] > 0.0))
-    throw Error(fmt::format("{}: {} is {:g}\\{:g}, expected positive", path.string(), described(DCM_PixelSpacing),
-                            spacing[0], spacing[1]));
-  scout.first_pixel_patient_mm = Vector3d(dataset.required_numbers(DCM_ImagePositionPatient, 3).data());
-  scout.column_step_patient_mm = spacing[1] * along_row;
-  scout.row_step_patient_mm = spacing[0] * along_column;
-
-  const PixelFormat format = pixel_format(dataset);
-  if (format.frames != 1)
-    throw Error(fmt::format("{}: {} is {}, expected 1", path.string(), described(DCM_NumberOfFrames), format.frames));
-  const std::string photometric = dataset.required_text(DCM_PhotometricInterpretation);
-  if (photometric != "MONOCHROME2")
-    throw Error(fmt::format("{}: {} is {}, expected MONOCHROME2", path.string(),
-                            described(DCM_PhotometricInterpretation), photometric));
-  const double slope = dataset.number(DCM_RescaleSlope).value_or(1.0);
-  if (!(slope > 0.0))
-    throw Error(fmt::format("{}: {} is {:g}, expected positive", path.string(), described(DCM_RescaleSlope), slope));
-  scout.values = Image<float>(format.columns, format.rows);
-  std::ranges::transform(decode_frame(file, format, 0), scout.values.pixels.begin(),
-                         [&](std::int32_t stored) { return static_cast<float>(slope * stored); });
+                            described(DCM_DistanceSourceToDetector), scout.sid_mm, kLeastSadMm, kMostSadMm));
+  read_plane(dataset, scout);
+  scout.values = read_values(file, dataset);
   return scout;
 }
 

@@ -27,8 +27,9 @@ struct ScoutSwitches {
 
 struct Scout {
   Identity identity;
-  std::string sop_instance_uid, frame_of_reference_uid, patient_position, sha256;
-  Image<float> values;  // they grow with the attenuation along the ray; scale and offset are the scanner's own
+  std::string sop_instance_uid, frame_of_reference_uid, sha256;
+  std::string patient_position;  // annotation only (C.7.3.1.1.2); may be empty
+  Image<float> values;           // they grow with the attenuation along the ray; scale and offset are the scanner's own
   Eigen::Vector3d first_pixel_patient_mm = Eigen::Vector3d::Zero();  // ImagePositionPatient
   Eigen::Vector3d column_step_patient_mm = Eigen::Vector3d::Zero();
   Eigen::Vector3d row_step_patient_mm = Eigen::Vector3d::Zero();  // along the table

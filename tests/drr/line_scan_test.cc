@@ -8,6 +8,7 @@
 #include "base/error.h"
 #include "drr/renderer.h"
 #include "tests/drr/test_views.h"
+#include "tests/support/gpu.h"
 #include "tests/support/pose_near.h"
 
 namespace isoshift::line_scan_test {
@@ -80,18 +81,30 @@ TEST(LineScan, DownscaledRowsAndColumnsAreTheMiddlesOfTheirs) {
 }
 
 // Every row by itself, as a pinhole.
-class LineScanOfRenderer : public testing::TestWithParam<RendererKind> {
+struct RowCaster {
+  RendererKind kind;
+  GlDevice gl = GlDevice::kSoftware;
+};
+
+std::string name_of(const RowCaster& tested) {
+  const char* device = tested.gl == GlDevice::kHardware ? "_hardware" : "_software";
+  return std::string(to_string(tested.kind)) + (uses_gl(tested.kind) ? device : "");
+}
+
+class LineScanOfRenderer : public testing::TestWithParam<RowCaster> {
  protected:
+  void SetUp() override {
+    if (uses_gl(GetParam().kind) && GetParam().gl == GlDevice::kHardware) ISOSHIFT_SKIP_WITHOUT_GPU();
+  }
   std::unique_ptr<Renderer> make(const Volume<float>& ct) const {
-    return make_renderer(GetParam(), ct, {}, kBothBeams, {.gl = GlDevice::kSoftware});
+    return make_renderer(GetParam().kind, ct, {}, kBothBeams, {.gl = GetParam().gl});
   }
 };
 INSTANTIATE_TEST_SUITE_P(All, LineScanOfRenderer,
-                         testing::Values(RendererKind::kSiddon, RendererKind::kTrilinear, RendererKind::kCpu,
-                                         RendererKind::kRaycast),
-                         [](const auto& kind) {
-                           return std::string(to_string(kind.param)) + (uses_gl(kind.param) ? "_software" : "");
-                         });
+                         testing::Values(RowCaster{RendererKind::kSiddon}, RowCaster{RendererKind::kTrilinear},
+                                         RowCaster{RendererKind::kCpu}, RowCaster{RendererKind::kRaycast},
+                                         RowCaster{RendererKind::kRaycast, GlDevice::kHardware}),
+                         [](const auto& tested) { return name_of(tested.param); });
 
 TEST_P(LineScanOfRenderer, IsABatchOfImagesOfOneRow) {
   const auto renderer = make(textured_volume());
@@ -108,7 +121,10 @@ TEST_P(LineScanOfRenderer, IsABatchOfImagesOfOneRow) {
   }
   const RenderResult whole = renderer->render(std::span(&scan, 1), poses, PixelSet::all());
   const RenderResult by_row = renderer->render(rows, poses, PixelSet::all());
-  const float rounding = is_oracle(GetParam()) ? 1e-6F : 1e-4F;
+  // Texture units of GPUs weigh voxels in 256ths (docs/renderers.md): a rounded position can be one of them away. On an
+  // H200 two of 1173 values differed by 2e-4 and 4e-4.
+  const bool has_texture_units = GetParam().gl == GlDevice::kHardware;
+  const float rounding = is_oracle(GetParam().kind) ? 1e-6F : has_texture_units ? 1e-3F : 1e-4F;
   for (std::size_t p = 0; p < poses.size(); ++p)
     for (std::size_t row = 0; row < rows.size(); ++row)
       for (std::size_t column = 0; column < 23; ++column)
@@ -141,7 +157,7 @@ TEST_P(LineScanOfRenderer, ShowsBallsWhereTheScannerDoes) {
       expected.push_back(static_cast<float>(per_mm * chord));
     }
   // Siddon's voxels do not fade from one to the next.
-  const bool has_steps = GetParam() == RendererKind::kSiddon;
+  const bool has_steps = GetParam().kind == RendererKind::kSiddon;
   EXPECT_LT(relative_error(found, expected), has_steps ? 0.08 : 0.03);
   EXPECT_GT(correlation(found, expected), has_steps ? 0.996 : 0.999);
 }

@@ -10,6 +10,7 @@
 
 #include "io/dicom/scout.h"
 #include "setup/verdict.h"
+#include "setup/view_picture.h"
 #include "workflow/observer.h"
 #include "workflow/register/rendering_options.h"
 
@@ -26,7 +27,7 @@ struct ScoutRequest {
 
 // Along and about the patient's axes, LPS: left, posterior, superior; translations in mm, then rotations in rad.
 struct ScoutAxis {
-  bool is_seen = false;  // across the rays, or known to within 1 mm or degree at two sigma
+  bool is_seen = false;  // known to within 1 mm or degree at two sigma, and not along the rays
   double offset = 0.0, sigma = 0.0;
   double repeatability = 0.0;  // the largest distance of the other starts' ends
 };
@@ -39,10 +40,18 @@ struct ScoutRegistration {
   // Where the CT's anatomy lies in the scout, against where the CT says, at the center of the CT.
   std::array<ScoutAxis, 6> axes;
   Eigen::Vector3d center_patient_mm = Eigen::Vector3d::Zero();
+  // How many times as wide, across the table, the scout shows the CT as spacing and distances say. It is what the match
+  // tells about the translation along the rays.
+  double width = 1.0, width_sigma = 0.0;
   int starts = 0;  // for repeatability: displaced by up to kStartMm
   static constexpr double kStartMm = 10.0;
-  std::string renderer, device, scout_sha256, ct_series_instance_uid;
+  std::string renderer, device;
+  Identity patient;
+  std::string ct_series_instance_uid, frame_of_reference_uid;
+  std::string scout_sop_instance_uid, scout_sha256, scout_patient_position;  // the last may be empty
   Notes notes;
+  ViewPicture picture;  // the part of the scout that the CT covers, with the CT as rendered from the tube's side
+  double picture_aspect = 1.0;  // how many times as high as wide its pixels are, in mm of the plane
 };
 
 // Throws Error where the two are of different patients or frames of reference, and for what read_ct_series() and
