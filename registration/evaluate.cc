@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <map>
 #include <random>
 
@@ -54,12 +55,14 @@ std::optional<Isometry3d> at_distance(const Isometry3d& truth, const Eigen::Angl
   return pose(low);
 }
 
-Isometry3d start_in_bin(const Isometry3d& truth, const StartProtocol& protocol, int number,
-                        std::span<const Vector3d> targets_mm, Random& random) {
+Isometry3d start_by_mtre(const Isometry3d& truth, const StartProtocol& protocol, int number,
+                         std::span<const Vector3d> targets_mm, Random& random) {
   const int bins = std::max(1, static_cast<int>(std::floor(protocol.distance_mm)));
   const double width_mm = protocol.distance_mm / bins;
   for (;;) {
-    const double wanted_mm = (number % bins + uniform(0.0, 1.0, random)) * width_mm;
+    const double wanted_mm = protocol.series == StartProtocol::Series::kMtre
+                                 ? protocol.distance_mm
+                                 : (number % bins + uniform(0.0, 1.0, random)) * width_mm;
     const Eigen::AngleAxisd rotation(uniform(-protocol.max_rotation_rad, protocol.max_rotation_rad, random),
                                      random_direction(random));
     if (const auto pose = at_distance(truth, rotation, random_direction(random), wanted_mm, targets_mm)) return *pose;
@@ -95,6 +98,23 @@ std::vector<double> values_of(std::span<const EvaluatedRun> runs, Value Evaluate
   std::vector<double> values;
   for (const EvaluatedRun& run : runs) values.push_back(static_cast<double>(run.*field));
   return values;
+}
+
+OverAllRuns over_all(std::span<const EvaluatedRun> runs) {
+  std::vector<EvaluatedRun> ended;
+  std::ranges::copy_if(runs, std::back_inserter(ended), [](const EvaluatedRun& run) { return run.has_pose(); });
+  const std::span<const EvaluatedRun> all = ended;
+  std::vector<double> search_seconds;
+  for (const EvaluatedRun& run : all) search_seconds.push_back(run.seconds_rendering + run.seconds_similarity);
+  OverAllRuns over{.runs = static_cast<int>(ended.size()),
+                   .mtre_mm = mean_and_sd_of(values_of(all, &EvaluatedRun::mtre_mm)),
+                   .mpd_mm = mean_and_sd_of(values_of(all, &EvaluatedRun::mpd_mm)),
+                   .mrpd_mm = mean_and_sd_of(values_of(all, &EvaluatedRun::mrpd_mm)),
+                   .search_seconds = mean_and_sd_of(search_seconds),
+                   .evaluations = mean_and_sd_of(values_of(all, &EvaluatedRun::evaluations))};
+  if (over.search_seconds.mean > 0.0)
+    over.rendering_share = mean_of(values_of(all, &EvaluatedRun::seconds_rendering)) / over.search_seconds.mean;
+  return over;
 }
 
 std::optional<std::array<double, 6>> share_within(std::span<const EvaluatedRun> runs, double sigmas) {
@@ -148,6 +168,15 @@ std::vector<BodySummary> body_summaries(std::span<const EvaluatedRun> runs) {
 
 }  // namespace
 
+std::string_view to_string(StartProtocol::Series series) {
+  switch (series) {
+    case StartProtocol::Series::kBins: return "bins";
+    case StartProtocol::Series::kPaper: return "paper";
+    case StartProtocol::Series::kMtre: return "mtre";
+  }
+  return "";
+}
+
 StartProtocol StartProtocol::paper() {
   return {.series = Series::kPaper, .distance_mm = 25.0, .max_rotation_rad = rad_from_deg(5.0), .count = 150};
 }
@@ -170,7 +199,7 @@ std::vector<StartPose> start_poses(const Isometry3d& truth, const StartProtocol&
     Random random(seed);
     const Isometry3d pose = protocol.series == StartProtocol::Series::kPaper
                                 ? start_of_paper(truth, protocol, random)
-                                : start_in_bin(truth, protocol, number, targets_mm, random);
+                                : start_by_mtre(truth, protocol, number, targets_mm, random);
     starts.push_back({.setup_error = pose, .mtre_mm = mean_target_registration_error_mm(pose, truth, targets_mm)});
   }
   return starts;
@@ -214,10 +243,10 @@ EvaluationSummary summarized(std::span<const EvaluatedRun> runs, bool by_mrpd) {
   summary.runs = static_cast<int>(runs.size());
   summary.successes = static_cast<int>(found.size());
   const std::vector<double> mtre_mm = values_of(std::span<const EvaluatedRun>(found), &EvaluatedRun::mtre_mm);
-  summary.mean_mm = mean_of(mtre_mm);
+  const MeanAndSd of_successes = mean_and_sd_of(mtre_mm);
+  summary.mean_mm = of_successes.mean;
+  summary.sd_mm = of_successes.sd;
   summary.median_mm = median_of(mtre_mm);
-  for (const double mm : mtre_mm) summary.sd_mm += std::pow(mm - summary.mean_mm, 2);
-  summary.sd_mm = mtre_mm.size() > 1 ? std::sqrt(summary.sd_mm / static_cast<double>(mtre_mm.size() - 1)) : 0.0;
   summary.mean_mpd_mm = mean_of(values_of(std::span<const EvaluatedRun>(found), &EvaluatedRun::mpd_mm));
   summary.mean_mrpd_mm = mean_of(values_of(std::span<const EvaluatedRun>(found), &EvaluatedRun::mrpd_mm));
   for (const SuccessBin& bin : success_bins(runs, by_mrpd)) {
@@ -235,6 +264,7 @@ EvaluationSummary summarized(std::span<const EvaluatedRun> runs, bool by_mrpd) {
   summary.within_one_sigma = share_within(runs, 1.0);
   summary.within_two_sigma = share_within(runs, 2.0);
   summary.bodies = body_summaries(runs);
+  summary.all = over_all(runs);
   return summary;
 }
 

@@ -27,6 +27,8 @@ nlopt::algorithm algorithm_of(OptimizerKind kind) {
   switch (kind) {
     case OptimizerKind::kBobyqa: return nlopt::LN_BOBYQA;
     case OptimizerKind::kNelderMead: return nlopt::LN_NELDERMEAD;
+    case OptimizerKind::kSbplx: return nlopt::LN_SBPLX;
+    case OptimizerKind::kNewuoa: return nlopt::LN_NEWUOA_BOUND;
     case OptimizerKind::kLbfgs: return nlopt::LD_LBFGS;
     case OptimizerKind::kLevenbergMarquardt: break;  // climb()
   }
@@ -232,6 +234,8 @@ std::string_view to_string(OptimizerKind kind) {
   switch (kind) {
     case OptimizerKind::kBobyqa: return "bobyqa";
     case OptimizerKind::kNelderMead: return "nelder-mead";
+    case OptimizerKind::kSbplx: return "sbplx";
+    case OptimizerKind::kNewuoa: return "newuoa";
     case OptimizerKind::kLbfgs: return "l-bfgs";
     case OptimizerKind::kLevenbergMarquardt: return "levenberg-marquardt";
   }

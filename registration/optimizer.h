@@ -17,12 +17,14 @@ namespace isoshift {
 enum class OptimizerKind {
   kBobyqa,      // quadratic models, no derivatives (Powell 2009)
   kNelderMead,  // simplex, no derivatives
+  kSbplx,       // simplex on subspaces, no derivatives (Rowan 1990)
+  kNewuoa,      // as kBobyqa, its predecessor (Powell 2006)
   kLbfgs,  // quasi-Newton (Nocedal 1980); without models on central differences, 13 evaluations per step in one batch
   kLevenbergMarquardt,  // Gauss-Newton with damping, on models that have a curvature (levenberg_marquardt.h)
 };
-// Those that need nothing but values.
 inline constexpr std::array kOptimizerKinds = {OptimizerKind::kBobyqa, OptimizerKind::kNelderMead,
-                                               OptimizerKind::kLbfgs};
+                                               OptimizerKind::kSbplx,  OptimizerKind::kNewuoa,
+                                               OptimizerKind::kLbfgs,  OptimizerKind::kLevenbergMarquardt};
 std::string_view to_string(OptimizerKind kind);
 std::optional<OptimizerKind> optimizer_kind_from(std::string_view name);
 

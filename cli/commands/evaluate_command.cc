@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <array>
 #include <memory>
 
 #include "base/error.h"
@@ -9,6 +10,8 @@
 #include "cli/switches/registration_switches.h"
 #include "cli/switches/study_switches.h"
 #include "workflow/evaluate/evaluate_study.h"
+#include "workflow/evaluate/table2.h"
+#include "workflow/evaluate/table2_configurations.h"
 #include "workflow/register/truth.h"
 
 namespace isoshift {
@@ -22,6 +25,8 @@ struct EvaluateFlags {
   std::uint64_t start_seed = 1;
   std::filesystem::path truth;
   std::vector<std::filesystem::path> table;
+  bool table2 = false;
+  std::vector<std::string> only;  // configurations of Table 2; empty: all
 };
 
 StartProtocol protocol_of(const EvaluateFlags& flags) {
@@ -49,15 +54,37 @@ void run_evaluate(EvaluateFlags& flags, Console& console) {
   if (flags.truth.empty() || options.output.empty())
     throw UsageError("an evaluation needs --truth and -o (or --table to look at earlier ones)");
   options.protocol = protocol_of(flags);
-  options.registration.settle();
   options.truth = read_setup_error(flags.truth);
   options.body_truths = read_body_truths(flags.truth);
   Notes notes;
   ConsoleObserver observer(console);
+  if (flags.table2) {
+    const std::string table = evaluate_table2(options, flags.only, notes, observer);
+    print_warnings(notes.warnings, console);
+    console.out << table;
+    return;
+  }
+  options.registration.settle();
   const EvaluationFolder folder = evaluate_study(options, notes, observer);
   print_warnings(notes.warnings, console);
   console.out << evaluation_table(
       {{options.output.filename().string(), summarized(folder.runs(), folder.judged_by_mrpd())}});
+}
+
+// What every configuration of Table 2 says itself is not asked for.
+void add_table2_flags(CLI::App& command, EvaluateFlags& flags) {
+  constexpr std::array kSaidByConfigurations = {"--series",    "--distance",       "--preset",   "--similarity",
+                                                "--optimizer", "--pixel-fraction", "--renderer", "--block-edge",
+                                                "--wobble",    "--check-vertebrae"};
+  CLI::Option* table2 = command.add_flag("--table2", flags.table2,
+                                         "Evaluate every configuration of the founding paper's Table 2, each in a "
+                                         "folder of its own; --starts is then the most of each");
+  for (const char* flag : kSaidByConfigurations) table2->excludes(command.get_option(flag));
+  std::vector<std::string> names;
+  for (const Table2Configuration& configuration : table2_configurations()) names.emplace_back(configuration.name);
+  command.add_option("--only", flags.only, "Of Table 2 only this configuration; may be repeated")
+      ->check(CLI::IsMember(names))
+      ->needs(table2);
 }
 
 }  // namespace
@@ -96,6 +123,7 @@ void add_evaluate_command(CLI::App& app, Console& console, int&) {
       ->check(CLI::PositiveNumber);
   command->add_option("--table", flags->table, "Print a table of evaluations made earlier")->type_name("FOLDER...");
   add_registration_switches(*command, options.registration);
+  add_table2_flags(*command, *flags);
   command->callback([flags, &console] { run_evaluate(*flags, console); });
 }
 

@@ -85,6 +85,7 @@ class Check {
     const std::unique_ptr<Renderer> tested = make(ct, model, kBeams);
     const auto oracle = make_renderer(RendererKind::kTrilinear, ct, model, kBeams);
     const PixelSet some = PixelSet::random(views, 0.05, 1);
+    largest_of_volume_ = 0.0;
     for (const PixelSet& pixels : {PixelSet::all(), some}) {
       poison(*tested, views, at.size(), pixels);
       const RenderResult drrs = tested->render(views, at, pixels), known = oracle->render(views, at, pixels);
@@ -127,6 +128,7 @@ class Check {
   }
 
   const RenderingCheck& result() const { return result_; }
+  double largest_of_volume() const { return largest_of_volume_; }  // of the last run(), as RenderingCheck::largest
 
  private:
   static void poison(Renderer& renderer, std::span<const XrayView> views, std::size_t poses, const PixelSet& pixels) {
@@ -147,6 +149,7 @@ class Check {
     const double scale = std::ranges::max(known), rms = std::sqrt(squares / static_cast<double>(drr.size())) / scale;
     result_.rms = std::max(result_.rms, rms);
     result_.largest = std::max(result_.largest, largest / scale);
+    largest_of_volume_ = std::max(largest_of_volume_, largest / scale);
     if (!(largest <= most * scale))
       fail(what, fmt::format("its line integrals differ from the reference by {:.2g} of the largest (rms {:.2g}), "
                              "expected at most {}",
@@ -175,6 +178,7 @@ class Check {
   }
 
   RenderingCheck result_;
+  double largest_of_volume_ = 0.0;
 };
 
 }  // namespace
@@ -185,7 +189,9 @@ RenderingCheck check_rendering(const MakeRayCaster& make) {
   check.run(make, "a cube of water", water_cube(), {}, kMostOfEdges);
   check.run(make, "a volume of waves", full, kAllAttenuates, kMostOfWaves, kMostOfSlopes);
   if (!check.result().failure) check.time(make, full);
-  return check.result();
+  RenderingCheck result = check.result();
+  result.largest_of_waves = check.largest_of_volume();
+  return result;
 }
 
 std::size_t rays_per_dispatch(double samples_per_second) {

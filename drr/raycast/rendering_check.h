@@ -16,6 +16,7 @@ struct RenderingCheck {
   // Differences from `trilinear` as shares of the largest line integral of their image: root mean square, and the
   // largest; of the worst image.
   double rms = 0.0, largest = 0.0;
+  double largest_of_waves = 0.0;       // the largest difference in the volume of waves alone
   double slopes = 0.0;                 // differences of derivatives as a share of these, rms; of the worst
   double samples_per_second = 0.0;     // taken along rays of the densest image, with the way to the device and back
   std::optional<std::string> failure;  // what is wrong, for people

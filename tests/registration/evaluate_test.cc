@@ -100,6 +100,26 @@ TEST(StartPoses, OfThePaperAre25MmAwayAndTurnedByUpTo5Degrees) {
   EXPECT_GT(largest_deg, 4.5);
 }
 
+TEST(StartPoses, OfThePaperNeedNotBeTurned) {
+  StartProtocol protocol = StartProtocol::paper();
+  protocol.max_rotation_rad = 0.0;
+  for (const StartPose& start : start_poses(some_truth(), protocol)) {
+    EXPECT_TRUE(start.setup_error.linear().isApprox(some_truth().linear(), 1e-12));
+    EXPECT_NEAR(start.mtre_mm, 25.0, 1e-9);  // every target moves by the same vector
+  }
+}
+
+TEST(StartPoses, OfOneMtreHaveItWhateverTheirRotation) {
+  double largest_deg = 0.0;
+  for (const StartPose& start : start_poses(
+           some_truth(), {.series = StartProtocol::Series::kMtre, .distance_mm = 25.0, .count = 50, .seed = 3})) {
+    EXPECT_NEAR(mean_target_registration_error_mm(start.setup_error, some_truth(), standard_targets_mm()), 25.0, 1e-6);
+    EXPECT_LE(angle_rad(start.setup_error, some_truth()), rad_from_deg(10.0) + 1e-9);
+    largest_deg = std::max(largest_deg, deg_from_rad(angle_rad(start.setup_error, some_truth())));
+  }
+  EXPECT_GT(largest_deg, 8.0);
+}
+
 TEST(StartPoses, RefuseNonsense) {
   constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
   for (const StartProtocol& protocol :
@@ -141,6 +161,31 @@ TEST(EvaluationSummary, AveragesTheSuccesses) {
 
   runs.erase(runs.begin() + 3);  // three successes: the one in the middle
   EXPECT_NEAR(summarized(runs, false).median_mm, 0.4, 1e-12);
+}
+
+// Worked by hand: 1, 2 and 6 mm have the mean 3 and the deviations -2, -1, 3, so that SD^2 = (4 + 1 + 9) / 2.
+TEST(EvaluationSummary, OverAllRunsCountsFailuresButNotRunsWithoutAPose) {
+  constexpr double kNothing = std::numeric_limits<double>::infinity();
+  std::vector<EvaluatedRun> runs = {run_with(25, 1.0), run_with(25, 2.0), run_with(25, 6.0), run_with(25, kNothing)};
+  for (std::size_t n = 0; n < runs.size(); ++n) {
+    runs[n].mpd_mm = 1.5 * runs[n].mtre_mm;
+    runs[n].evaluations = std::array{100, 200, 300, 0}[n];
+    runs[n].seconds = 10.0;  // with all checks
+    runs[n].seconds_rendering = std::array{1.0, 2.0, 3.0, 0.0}[n];
+    runs[n].seconds_similarity = std::array{0.5, 0.5, 1.0, 0.0}[n];
+  }
+  const EvaluationSummary summary = summarized(runs, /*by_mrpd=*/false);
+  EXPECT_EQ(summary.runs, 4);
+  EXPECT_EQ(summary.successes, 1);
+  EXPECT_EQ(summary.all.runs, 3);
+  EXPECT_NEAR(summary.all.mtre_mm.mean, 3.0, 1e-12);
+  EXPECT_NEAR(summary.all.mtre_mm.sd, std::sqrt(7.0), 1e-12);
+  EXPECT_NEAR(summary.all.mpd_mm.mean, 4.5, 1e-12);
+  EXPECT_NEAR(summary.all.mrpd_mm.mean, 3.0, 1e-12);
+  EXPECT_NEAR(summary.all.evaluations.mean, 200.0, 1e-12);
+  EXPECT_NEAR(summary.all.evaluations.sd, 100.0, 1e-12);
+  EXPECT_NEAR(summary.all.search_seconds.mean, 8.0 / 3.0, 1e-12);
+  EXPECT_NEAR(summary.all.rendering_share, 6.0 / 8.0, 1e-12) << "of rendering and similarity, not of the call";
 }
 
 TEST(EvaluationSummary, SuccessIsBelowTwoMillimeters) {

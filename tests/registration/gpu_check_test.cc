@@ -3,10 +3,12 @@
 
 #include "registration/gpu_check.h"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <limits>
+#include <utility>
 
 #include "drr/raycast/raycast.h"
 #include "tests/support/gpu.h"
@@ -89,6 +91,12 @@ class OtherDerivatives : public Renderer {
   Spoil spoil_;
 };
 
+// For the table of docs/renderers.md, "Before a GPU is trusted", which is made from this program's --gtest_output.
+void record(const std::string& what, const RenderingCheck& check) {
+  testing::Test::RecordProperty(what, fmt::format("{:.6g}", check.largest_of_waves));
+  testing::Test::RecordProperty(what + "_result", check.failure ? "fails" : "passes");
+}
+
 RenderingCheck check_of_derivatives(const OtherDerivatives::Spoil& spoil) {
   return check_rendering([&](const auto& ct_hu, const auto& model, auto beams) {
     return std::make_unique<OtherDerivatives>(make_renderer(RendererKind::kTrilinear, ct_hu, model, beams), spoil);
@@ -129,9 +137,13 @@ TEST(GpuCheck, TheGpuPasses_hardware) {
 }
 
 TEST(GpuCheck, WeightsOfEightBitsPass) {
-  for (const Filtering filtering : {Filtering::kTextureUnits, Filtering::kEightBitWeights}) {
-    const RenderingCheck check = check_rendering(
-        [&](const auto& ct_hu, const auto& model, auto beams) { return on_llvmpipe(ct_hu, model, beams, filtering); });
+  for (const auto& [filtering, name] : {std::pair(Filtering::kTextureUnits, "texture_units"),
+                                        std::pair(Filtering::kEightBitWeights, "eight_bit_weights")}) {
+    const RenderingCheck check =
+        check_rendering([&, filtering = filtering](const auto& ct_hu, const auto& model, auto beams) {
+          return on_llvmpipe(ct_hu, model, beams, filtering);
+        });
+    record(name, check);
     EXPECT_EQ(check.failure, std::nullopt);
   }
 }
@@ -140,8 +152,9 @@ TEST(GpuCheck, SamplesATenthOfAVoxelBesideFail) {
   for (int axis = 0; axis < 3; ++axis) {
     Vector3d moved = Vector3d::Zero();
     moved[axis] = 0.1;
-    EXPECT_THAT(check_of_moved(Eigen::Affine3d(Eigen::Translation3d(moved))).failure.value_or("passed"),
-                HasSubstr("its line integrals differ from the reference by"));
+    const RenderingCheck check = check_of_moved(Eigen::Affine3d(Eigen::Translation3d(moved)));
+    record(fmt::format("moved_along_{}", "xyz"[axis]), check);
+    EXPECT_THAT(check.failure.value_or("passed"), HasSubstr("its line integrals differ from the reference by"));
   }
 }
 
@@ -152,10 +165,11 @@ TEST(GpuCheck, AxesThatAreSwappedFail) {
 }
 
 TEST(GpuCheck, VoxelsWithoutInterpolationFail) {
-  EXPECT_NE(check_rendering([](const auto& ct_hu, const auto& model, auto beams) {
-              return make_renderer(RendererKind::kSiddon, ct_hu, model, beams);
-            }).failure,
-            std::nullopt);
+  const RenderingCheck check = check_rendering([](const auto& ct_hu, const auto& model, auto beams) {
+    return make_renderer(RendererKind::kSiddon, ct_hu, model, beams);
+  });
+  record("siddon", check);
+  EXPECT_NE(check.failure, std::nullopt);
 }
 
 TEST(GpuCheck, ABeamInsteadOfTheOtherFails) {

@@ -28,7 +28,8 @@ OptimizerResult maximize_alone(const BatchObjective& objective, const OptimizerO
 
 class EveryOptimizer : public testing::TestWithParam<OptimizerKind> {};
 INSTANTIATE_TEST_SUITE_P(All, EveryOptimizer,
-                         testing::Values(OptimizerKind::kBobyqa, OptimizerKind::kNelderMead, OptimizerKind::kLbfgs),
+                         testing::Values(OptimizerKind::kBobyqa, OptimizerKind::kNelderMead, OptimizerKind::kSbplx,
+                                         OptimizerKind::kNewuoa, OptimizerKind::kLbfgs),
                          [](const auto& kind) {
                            std::string name(to_string(kind.param));
                            std::erase(name, '-');

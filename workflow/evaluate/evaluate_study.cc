@@ -88,7 +88,12 @@ Json configuration_of(const EvaluateOptions& options, const Study& study, const 
           {"rectangles", request.region.rectangles},
           {"target", target.name},
           {"seed", request.search.seed},
-          {"series", protocol.series == StartProtocol::Series::kPaper ? "paper" : "bins"},
+          {"seed_per_run", options.has_seed_per_run},
+          {"pixel_mm", request.search.pixel_mm.value_or(0.0)},
+          {"relative_tolerance", request.search.relative_tolerance.value_or(0.0)},
+          {"searches", request.search.searches},
+          {"series", to_string(protocol.series)},
+          {"max_rotation_deg", deg_from_rad(protocol.max_rotation_rad)},
           {"start_seed", protocol.seed},
           {"starts", protocol.count},
           {"distance_mm", protocol.distance_mm},
@@ -158,8 +163,10 @@ EvaluatedRun evaluated(int number, const StartPose& start, const EvaluateOptions
                    .target_mm = kNothing};
   Observer nobody;
   try {
+    const std::uint64_t seed =
+        options.registration.search.seed + (options.has_seed_per_run ? static_cast<std::uint64_t>(number) : 0);
     const RegistrationResult result =
-        registration.from(start.setup_error * study.planned_room_from_patient, images, nobody);
+        registration.from(start.setup_error * study.planned_room_from_patient, images, nobody, seed);
     add_errors(result, options.truth, study, target, run);
     run.bodies = compared_bodies(result.bodies, options.body_truths, options.truth, study.planned_room_from_patient);
     run.verdict = result.verdict;
@@ -211,14 +218,17 @@ void run_missing(EvaluationFolder& folder, const Study& study, const Target& tar
 
 }  // namespace
 
-EvaluationFolder evaluate_study(EvaluateOptions options, Notes& notes, Observer& observer) {
+EvaluationFolder evaluate_study(const EvaluateOptions& options, Notes& notes, Observer& observer) {
+  return evaluate_loaded(load(options.study, notes, observer), options, observer);
+}
+
+EvaluationFolder evaluate_loaded(const Study& study, EvaluateOptions options, Observer& observer) {
   const RendererKind kind = options.registration.rendering.kind();
   if (uses_gl(kind) && options.jobs > 1)
     throw UsageError(
         fmt::format("--jobs {}: {} renders for one registration at a time", options.jobs, to_string(kind)));
   const int cores = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
   const int jobs = uses_gl(kind) ? 1 : options.jobs > 0 ? options.jobs : cores;
-  const Study study = load(options.study, notes, observer);
   const TargetChoice choice = target_of(study, {.by_person = options.target});
   if (!options.target.empty())
     options.truth = truth_at(study.planned_room_from_patient.inverse() * choice.target.center_room_mm, options.truth,

@@ -17,7 +17,8 @@ struct EvaluateOptions {
   StudyOptions study;
   RegistrationRequest registration;  // settle() must have been called
   StartProtocol protocol;
-  std::string target;  // the structure whose error counts, or "isocenter"; empty: as target_of() finds it
+  bool has_seed_per_run = false;  // run n searches with the request's seed + n: every run draws other pixels
+  std::string target;             // the structure whose error counts, or "isocenter"; empty: as target_of() finds it
   int jobs = 0;  // registrations at a time, each on one thread; 1: one on all cores; 0: as many as the machine's cores
   Eigen::Isometry3d truth = Eigen::Isometry3d::Identity();  // the true setup error, at the isocenter
   std::vector<BodyTruth> body_truths;                       // empty: nobody knows what single bones did
@@ -26,6 +27,9 @@ struct EvaluateOptions {
 
 // Runs the registrations that are not yet in the folder, and writes summary and plots. Throws UsageError if several
 // jobs are asked of a renderer that can only do one registration at a time.
-EvaluationFolder evaluate_study(EvaluateOptions options, Notes& notes, Observer& observer);
+EvaluationFolder evaluate_study(const EvaluateOptions& options, Notes& notes, Observer& observer);
+
+// The same of a study that options.study has loaded.
+EvaluationFolder evaluate_loaded(const Study& study, EvaluateOptions options, Observer& observer);
 
 }  // namespace isoshift

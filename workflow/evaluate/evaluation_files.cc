@@ -104,6 +104,18 @@ EvaluatedRun run_of(const std::string& line) {
 
 Json if_determined(const BodySummary& body, double value) { return body.determined > 0 ? Json(value) : Json(nullptr); }
 
+Json json_of(const MeanAndSd& values) { return {{"mean", values.mean}, {"sd", values.sd}}; }
+
+Json json_of(const OverAllRuns& all) {
+  return {{"runs", all.runs},
+          {"mtre_mm", json_of(all.mtre_mm)},
+          {"mpd_mm", json_of(all.mpd_mm)},
+          {"mrpd_mm", json_of(all.mrpd_mm)},
+          {"search_seconds", json_of(all.search_seconds)},
+          {"evaluations", json_of(all.evaluations)},
+          {"rendering_share_of_an_iteration", all.rendering_share}};
+}
+
 Json json_of(const EvaluationSummary& summary) {
   Json json = {{"runs", summary.runs},
                {"successes", summary.successes},
@@ -123,7 +135,8 @@ Json json_of(const EvaluationSummary& summary) {
                 {{"median_mm", summary.median_target_mm},
                  {"within_1_mm", summary.target_within_1_mm},
                  {"within_1_mm_accepted", summary.target_within_1_mm_accepted},
-                 {"beyond_2_mm_accepted", summary.target_beyond_2_mm_accepted}}}};
+                 {"beyond_2_mm_accepted", summary.target_beyond_2_mm_accepted}}},
+               {"all_with_a_pose", json_of(summary.all)}};
   for (const BodySummary& body : summary.bodies)
     json["bodies"].push_back({{"name", body.name},
                               {"runs", body.runs},
