@@ -4,11 +4,11 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <array>
-#include <cmath>
+#include <fstream>
 
 #include "base/error.h"
 #include "base/json_file.h"
+#include "geometry/rotation.h"
 
 namespace isoshift {
 namespace {
@@ -22,6 +22,45 @@ Eigen::Matrix<double, 3, 4> matrix_from(const std::vector<std::vector<double>>& 
     matrix.row(static_cast<Eigen::Index>(row)) = Eigen::RowVector4d(rows[row].data());
   }
   return matrix;
+}
+
+// What isoshift geometry --json says of an imager; every error, so that none counts as known by being left out.
+std::optional<KnownImager> known_imager_from(JsonSection& section) {
+  std::optional<JsonSection> errors = section.section("imager_errors");
+  const bool is_corrected = section.find<bool>("correct_imager", "true or false").value_or(false);
+  if (!errors) {
+    if (is_corrected) section.refuse_missing("imager_errors", "what correct_imager corrects");
+    return std::nullopt;
+  }
+  KnownImager imager{.is_corrected = is_corrected};
+  for (std::size_t n = 0; n < kImagerParameters; ++n) {
+    const ImagerParameterInfo& info = imager_parameters()[n];
+    const std::string key(info.key);
+    std::optional<JsonSection> error = errors->section(key.c_str());
+    if (!error) errors->refuse_missing(key.c_str(), R"({"value": ..., "sigma": ...})");
+    const double most = info.is_angle ? 10.0 : 200.0, unit = info.is_angle ? rad_from_deg(1.0) : 1.0;
+    const std::optional<double> sigma = error->number("sigma", 0.0, most);
+    if (!sigma) error->refuse_missing("sigma", "one standard deviation");
+    imager.sigmas[n] = unit * *sigma;
+    if (const auto value = error->find<nlohmann::json>("value", "a number or null"); value && !value->is_null())
+      imager.values[n] = unit * error->number("value", -most, most).value();
+    error->find<bool>("is_determined", "true or false");
+    error->end();
+  }
+  errors->end();
+  return imager;
+}
+
+// Those that are not 0.
+std::string words_of(const ImagerErrors& values) {
+  std::vector<std::string> words;
+  for (std::size_t n = 0; n < values.size(); ++n) {
+    const ImagerParameterInfo& info = imager_parameters()[n];
+    if (values[n] == 0.0) continue;
+    words.push_back(info.is_angle ? fmt::format("{} {:+.3f} deg", info.name, deg_from_rad(values[n]))
+                                  : fmt::format("{} {:+.2f} mm", info.name, values[n]));
+  }
+  return fmt::format("{}", fmt::join(words, ", "));
 }
 
 MachineProfile::Rule rule_from(JsonSection section) {
@@ -40,8 +79,7 @@ MachineProfile::Rule rule_from(JsonSection section) {
     if (plane != "SID" && plane != "SAD") section.refuse("spacing_plane", "SID or SAD");
     rule.spacing_at_axis = plane == "SAD";
   }
-  if (const auto offset = section.find<std::array<double, 2>>("receptor_offset_mm", "two numbers, x and y"))
-    rule.receptor_offset_mm = Eigen::Vector2d(offset->data());
+  rule.imager = known_imager_from(section);
   rule.switches.assume_centered = section.find<bool>("assume_centered", "true or false").value_or(false);
   rule.switches.sad_mm = section.number("sad_mm", 1, 5000);
   rule.switches.sid_mm = section.number("sid_mm", 1, 5000);
@@ -63,13 +101,25 @@ MachineProfile::Rule rule_from(JsonSection section) {
     rule.rows = section.required<int>("rows", "the height of the images, in pixels");
     if (!rule.switches.sid_mm)
       throw Error(fmt::format("{}: sid_mm is missing, which pixel_from_room needs", section.where()));
-    if (rule.gantry_angle_offset_deg != 0.0 || rule.spacing_at_axis || !rule.receptor_offset_mm.isZero() ||
-        rule.switches.assume_centered)
+    if (rule.gantry_angle_offset_deg != 0.0 || rule.spacing_at_axis || rule.imager || rule.switches.assume_centered)
       throw Error(fmt::format("{}: pixel_from_room says where all pixels are; it goes with no other geometry",
                               section.where()));
   }
   section.end();
   return rule;
+}
+
+// FILE.sig beside FILE, as openssl pkeyutl writes it.
+void require_signature(const std::filesystem::path& path, const std::string& text, const VerifyingKey& key) {
+  const std::string name = path.string() + ".sig";
+  std::ifstream file(name, std::ios::binary);
+  if (!file) throw Error(fmt::format("{}: cannot be read; --machine-key needs the signature of the profile", name));
+  const std::string signature{std::istreambuf_iterator<char>(file), {}};
+  if (!key.accepts(text, signature))
+    throw Error(
+        fmt::format("{}: is not the signature of {} by the key of --machine-key: the profile was changed after "
+                    "it was signed, or somebody else signed it",
+                    name, path.string()));
 }
 
 bool fits(const MachineProfile::Rule& rule, const RtImage& image) {
@@ -81,8 +131,9 @@ bool fits(const MachineProfile::Rule& rule, const RtImage& image) {
 
 }  // namespace
 
-MachineProfile read_machine_profile(const std::filesystem::path& path) {
+MachineProfile read_machine_profile(const std::filesystem::path& path, const std::optional<VerifyingKey>& key) {
   const JsonFile file = read_json_file(path);
+  if (key) require_signature(path, file.text, *key);
   JsonSection section(file.json, path.string());
   if (const int version = section.required<int>("machine_profile", "1, the version of its format"); version != 1)
     section.refuse("machine_profile", "1, the version of its format");
@@ -91,6 +142,13 @@ MachineProfile read_machine_profile(const std::filesystem::path& path) {
   for (std::size_t n = 0; n < images.size(); ++n)
     profile.rules.push_back(rule_from(JsonSection(images[n], fmt::format("{}: images[{}]", path.string(), n))));
   section.end();
+  const auto corrects = [](const MachineProfile::Rule& rule) { return rule.imager && rule.imager->is_corrected; };
+  if (!key && std::ranges::any_of(profile.rules, corrects))
+    throw Error(
+        fmt::format("{0}: correct_imager changes where X-rays are taken to lie: such a profile must be "
+                    "signed.\n       Sign it: openssl pkeyutl -sign -rawin -inkey PRIVATE -in {0} -out {0}.sig\n"
+                    "       and name the public key: --machine-key FILE",
+                    path.string()));
   if (profile.rules.empty()) throw Error(fmt::format("{}: images is empty, expected a list of rules", path.string()));
   return profile;
 }
@@ -128,11 +186,10 @@ RtImage with_machine(RtImage image, const MachineProfile& profile, const RtImage
     if (image.position_mm) *image.position_mm *= magnified;
     note(fmt::format("{} brought from the axis to the receptor", described(DCM_ImagePlanePixelSpacing)));
   }
-  if (!rule->receptor_offset_mm.isZero() && sad_mm && sid_mm) {
-    if (!image.receptor_translation_mm) image.receptor_translation_mm = {0.0, 0.0, *sad_mm - *sid_mm};
-    image.receptor_translation_mm->head<2>() += rule->receptor_offset_mm;
-    note(fmt::format("{} moved by ({:.2f}) mm", described(DCM_XRayImageReceptorTranslation),
-                     fmt::join(rule->receptor_offset_mm, ", ")));
+  if (rule->imager) {
+    image.imager = rule->imager;
+    image.imager->number = static_cast<std::size_t>(rule - profile.rules.begin());
+    if (rule->imager->is_corrected) note(fmt::format("receptor corrected ({})", words_of(rule->imager->values)));
   }
   return image;
 }

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "base/signing_key.h"
 #include "io/dicom/rt_image.h"
 
 namespace isoshift {
@@ -16,8 +17,8 @@ struct MachineProfile {
   struct Rule {
     std::map<std::string, std::string, std::less<>> where;  // keyword of kEquipmentAttributes to value; all must match
     double gantry_angle_offset_deg = 0.0;                   // source angle = GantryAngle + this
-    bool spacing_at_axis = false;  // spacing and position count in the plane of the axis, not of the receptor
-    Eigen::Vector2d receptor_offset_mm = Eigen::Vector2d::Zero();  // added to the receptor translation, x and y
+    bool spacing_at_axis = false;       // spacing and position count in the plane of the axis, not of the receptor
+    std::optional<KnownImager> imager;  // what is known of its errors
     RtImageSwitches switches;
     std::optional<Eigen::Matrix<double, 3, 4>> pixel_from_room;  // for images of this size
     int columns = 0, rows = 0;
@@ -29,8 +30,10 @@ struct MachineProfile {
   std::vector<Rule> rules;
 };
 
-// Throws Error naming the file, the place in it and what is expected there.
-MachineProfile read_machine_profile(const std::filesystem::path& path);
+// With the public half of a key, FILE.sig must hold the signature of FILE by that key. Throws Error naming the file,
+// the place in it and what is expected there; for a signature that is missing or wrong; and without a key for a profile
+// that corrects an imager.
+MachineProfile read_machine_profile(const std::filesystem::path& path, const std::optional<VerifyingKey>& key = {});
 
 // Applies the first rule that fits the image, and notes each change as an override. If a rule needs SAD or SID and the
 // command line will replace them afterwards, the values of the command line are used. Throws Error if no rule fits.

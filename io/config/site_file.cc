@@ -80,6 +80,16 @@ SiteFile::Sessions sessions_from(JsonSection section) {
   return sessions;
 }
 
+LocalizationLimits limits_from(JsonSection section) {
+  constexpr double kMaxMm = 10.0, kMaxDeg = 5.0;
+  const auto translation_mm = section.number("translation_mm", 0.0, kMaxMm);
+  const auto rotation_deg = section.number("rotation_deg", 0.0, kMaxDeg);
+  if (!translation_mm) section.refuse_missing("translation_mm", "mm, along any axis");
+  if (!rotation_deg) section.refuse_missing("rotation_deg", "degrees, about any axis");
+  section.end();
+  return {.translation_mm = *translation_mm, .rotation_deg = *rotation_deg};
+}
+
 // Of an object with a name per anatomy; empty if the file has none.
 NameByAnatomy names_by_anatomy(JsonSection& section, const char* key, const char* expected) {
   NameByAnatomy names;
@@ -123,6 +133,7 @@ SiteFile read_site_file(const std::filesystem::path& path) {
     site.length_unit = unit == "mm" ? LengthUnit::kMm : LengthUnit::kCm;
   }
   if (auto sessions = section.section("sessions")) site.sessions = sessions_from(std::move(*sessions));
+  if (auto limits = section.section("localization_limits")) site.localization_limits = limits_from(std::move(*limits));
   if (auto release = section.section("release")) site.automatic_release = release_from(std::move(*release));
   section.end();
   return site;

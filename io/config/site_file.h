@@ -35,6 +35,7 @@ struct SiteFile {
   std::optional<ValidatedScale> couch_scale;  // shown beside IEC 61217
   LengthUnit length_unit = LengthUnit::kMm;
   std::optional<Sessions> sessions;
+  std::optional<LocalizationLimits> localization_limits;  // for commission
   std::optional<AutomaticRelease> automatic_release;  // who allowed it, and when; unset: a person releases every result
 };
 

@@ -5,11 +5,14 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <cstdlib>
 #include <fstream>
 #include <nlohmann/json.hpp>
 
 #include "base/error.h"
 #include "base/output_folder.h"
+#include "geometry/rotation.h"
 #include "tests/support/pose_near.h"
 #include "tests/support/small_study.h"
 #include "workflow/register/truth.h"
@@ -101,20 +104,78 @@ TEST_F(MachineProfileTest, SpacingMayCountAtTheAxis) {
   EXPECT_TRUE(found.position_mm->isApprox(*expected.position_mm, 1e-9));
 }
 
-TEST_F(MachineProfileTest, ReceptorOffsetsAddToTheTranslation) {
-  const RtImage found = with_machine(image(), profile({{{"receptor_offset_mm", {1.5, -2.0}}}}), {}, notes_);
-  EXPECT_THAT(*found.receptor_translation_mm, VectorNear(Eigen::Vector3d(1.5, -2.0, -500.0), 1e-12));
+// What isoshift geometry --json says of an imager: here a panel that lies 1.5 mm off along x and is rolled by 0.2
+// degrees.
+nlohmann::json imager_errors() {
+  nlohmann::json errors;
+  for (const ImagerParameterInfo& info : imager_parameters())
+    errors[std::string(info.key)] = {{"value", nullptr}, {"sigma", 0.1}, {"is_determined", false}};
+  errors["shift_x_mm"]["value"] = 1.5;
+  errors["roll_deg"]["value"] = 0.2;
+  return errors;
+}
+
+TEST_F(MachineProfileTest, KnownErrorsOfAnImagerCorrectNothing) {
+  const RtImage found = with_machine(image(), profile({{{"imager_errors", imager_errors()}}}), {}, notes_);
+  EXPECT_TRUE(xray_view(found, Beam::kKilovoltage, notes_)
+                  .pixel_from_room.isApprox(xray_view(image(), Beam::kKilovoltage, notes_).pixel_from_room));
+  EXPECT_NEAR(found.imager.value().left()[0], std::hypot(1.5, 0.1), 1e-12);
+  EXPECT_TRUE(notes_.overrides.empty());
+}
+
+// By a signature alone: one of the file as it is, by the key that is named.
+TEST_F(MachineProfileTest, OnlyASignedProfileCorrects) {
+  const nlohmann::json images = {{{"imager_errors", imager_errors()}, {"correct_imager", true}}};
+  EXPECT_THAT(error_of(images), HasSubstr("must be signed"));
+  const auto make_key = [&](const std::string& name) {
+    const std::filesystem::path file = path_.parent_path() / name;
+    replace_text(file, new_signing_key());
+    std::filesystem::permissions(file, std::filesystem::perms::owner_read | std::filesystem::perms::owner_write);
+    const std::string command =
+        fmt::format("openssl pkey -in '{}' -pubout -out '{}.pub' 2>/dev/null", file.string(), file.string());
+    EXPECT_EQ(std::system(command.c_str()), 0);
+    return file;
+  };
+  const std::filesystem::path key = make_key("release.key"), other = make_key("other.key");
+  const VerifyingKey pub(key.string() + ".pub"), other_pub(other.string() + ".pub");
+  const auto error_with = [&](const VerifyingKey& with) -> std::string {
+    try {
+      read_machine_profile(path_, with);
+    } catch (const Error& error) {
+      return error.what();
+    }
+    return "no error";
+  };
+  EXPECT_THAT(error_with(pub), HasSubstr("machine.json.sig: cannot be read"));
+  const std::string command =
+      fmt::format("openssl pkeyutl -sign -rawin -inkey '{0}' -in '{1}' -out '{1}.sig'", key.string(), path_.string());
+  ASSERT_EQ(std::system(command.c_str()), 0);
+  EXPECT_THAT(error_with(other_pub), HasSubstr("is not the signature"));
+
+  const RtImage found = with_machine(image(), read_machine_profile(path_, pub), {}, notes_);
+  EXPECT_THAT(notes_.overrides, ElementsAre(HasSubstr("receptor corrected (shift x +1.50 mm, roll (about the central "
+                                                      "ray) +0.200 deg) by machine profile")));
+  const XrayView view = xray_view(found, Beam::kKilovoltage, notes_),
+                 as_filed = xray_view(image(), Beam::kKilovoltage, notes_);
+  const ImagerModel model(as_filed, rad_from_deg(image().gantry_angle_deg.value()), image().sid_mm.value());
+  EXPECT_THAT(view.project(Eigen::Vector3d(10, 20, 30)).value(),
+              VectorNear(model.pixel_of({10, 20, 30}, found.imager->values), 1e-9));
+  EXPECT_NEAR(found.imager->left()[0], 0.1, 1e-12);
+
+  replace_text(path_, [&] {
+    std::ifstream file(path_);
+    return std::string{std::istreambuf_iterator<char>(file), {}} + " ";
+  }());
+  EXPECT_THAT(error_with(pub), HasSubstr("was changed after it was signed"));
 }
 
 // The SID may come from the command line: what rules make of it must not depend on where it comes from.
 TEST_F(MachineProfileTest, RulesCountWithTheSidOfTheCommandLine) {
   RtImage lacking = image();
   lacking.sid_mm.reset();
-  lacking.receptor_translation_mm.reset();
-  const MachineProfile rules = profile({{{"spacing_plane", "SAD"}, {"receptor_offset_mm", {1.5, -2.0}}}});
+  const MachineProfile rules = profile({{{"spacing_plane", "SAD"}}});
   const RtImage found = with_machine(lacking, rules, {.sid_mm = 1600.0}, notes_);
   EXPECT_TRUE(found.pixel_spacing_mm->isApprox(1.6 * *lacking.pixel_spacing_mm, 1e-9));
-  EXPECT_THAT(*found.receptor_translation_mm, VectorNear(Eigen::Vector3d(1.5, -2.0, -600.0), 1e-12));
 }
 
 TEST_F(MachineProfileTest, TheFirstRuleThatFitsCounts) {
@@ -148,7 +209,13 @@ TEST_F(MachineProfileTest, MistakesAreNamed) {
   EXPECT_THAT(error_of({{{"where", {{"PatientName", "X"}}}}}), HasSubstr("images are not told apart by PatientName"));
   EXPECT_THAT(error_of({{{"pixel_from_room", {{1, 0, 0}}}, {"columns", 1}, {"rows", 1}}}),
               HasSubstr("expected three rows of four finite numbers"));
-  EXPECT_THAT(error_of({{{"receptor_offset_mm", {1, 2, 3}}}}), HasSubstr("is [1,2,3], expected two numbers, x and y"));
+  EXPECT_THAT(error_of({{{"correct_imager", true}}}), HasSubstr("imager_errors is missing"));
+  nlohmann::json errors = imager_errors();
+  errors.erase("distance_mm");
+  EXPECT_THAT(error_of({{{"imager_errors", errors}}}), HasSubstr("imager_errors: distance_mm is missing"));
+  errors = imager_errors();
+  errors["roll_deg"] = {{"value", 0.1}};
+  EXPECT_THAT(error_of({{{"imager_errors", errors}}}), HasSubstr("imager_errors: roll_deg: sigma is missing"));
   EXPECT_THAT(error_of({{{"pixel_from_room", {{1, 0, 0}}}, {"columns", 96.7}, {"rows", 1}}}), HasSubstr("expected"));
   EXPECT_THAT(error_of(nlohmann::json::array()), HasSubstr("images is empty, expected a list of rules"));
 }
@@ -176,8 +243,9 @@ TEST_F(MachineProfileTest, TheExamplesInTheDocumentationAreProfiles) {
     std::ofstream(path_, std::ios::trunc) << text.substr(begin + 7, text.find("```", begin + 7) - begin - 7);
     examples.push_back(read_machine_profile(path_));
   }
-  ASSERT_EQ(examples.size(), 2U);
-  const MachineProfile::Rule& rule = examples[1].rules.front();
+  ASSERT_EQ(examples.size(), 3U);
+  EXPECT_DOUBLE_EQ(examples[1].rules.front().imager.value().values[0], 0.42);
+  const MachineProfile::Rule& rule = examples[2].rules.front();
   const XrayView view = xray_view_from_matrix(rule.pixel_from_room.value(), rule.switches.sid_mm.value(), rule.columns,
                                               rule.rows, Beam::kKilovoltage);
   EXPECT_THAT(view.source_room_mm, VectorNear(Eigen::Vector3d(1344, 0, -1792), 0.05));

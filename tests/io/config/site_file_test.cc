@@ -73,6 +73,17 @@ TEST_F(SiteFileTest, MistakesAreNamed) {
   EXPECT_THAT(error_of("\"releases\": 1"), HasSubstr("there is no key releases"));
 }
 
+TEST_F(SiteFileTest, LocalizationLimitsHaveBothNumbers) {
+  const auto with = [](const std::string& limits) {
+    return R"({"site_file": 1, "name": "A", "localization_limits": )" + limits + "}";
+  };
+  const SiteFile site = read(with(R"({"translation_mm": 1, "rotation_deg": 0.5})"));
+  EXPECT_EQ(site.localization_limits->translation_mm, 1.0);
+  EXPECT_EQ(site.localization_limits->rotation_deg, 0.5);
+  EXPECT_THROW(read(with(R"({"translation_mm": 1})")), Error);
+  EXPECT_THROW(read(with(R"({"translation_mm": 11, "rotation_deg": 0.5})")), Error);
+}
+
 TEST_F(SiteFileTest, TargetsAreOfAnatomies) {
   const SiteFile site = read(R"({"site_file": 1, "name": "A", "targets": {"head": "PTV 60", "default": "isocenter"}})");
   EXPECT_EQ(target_named(site, "head"), "PTV 60");

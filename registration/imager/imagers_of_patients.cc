@@ -1,0 +1,156 @@
+#include "registration/imager/imagers_of_patients.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/QR>
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "base/error.h"
+#include "registration/imager/imager_effect.h"
+
+namespace isoshift {
+namespace {
+
+using Motion = Eigen::Matrix<double, 6, 1>;
+
+// What the sigmas of wanted motions leave out: voxels of finite size and the model of the beam.
+constexpr double kFloorMm = 0.03, kFloorRad = 0.03 / 100.0;
+constexpr double kFreedom = 4.0;  // of the t-distribution
+
+// The motions that look like a unit of each error in a view.
+Eigen::Matrix<double, 6, kImagerParameters> motions_like_errors(const ImagerModel& model) {
+  const SeenBy seen = seen_by(model);
+  return seen.motions.colPivHouseholderQr().solve(seen.errors);
+}
+
+// What a session tells of the errors, its own pose eliminated: errors' information * errors = seen.
+struct Told {
+  Eigen::MatrixXd information;
+  Eigen::VectorXd seen;
+  double squares = 0.0;  // of what is wanted, without any errors, in sigmas
+  double freedom = 0.0;  // how many numbers that are
+
+  double misfit(const Eigen::VectorXd& errors) const {
+    return squares - 2.0 * errors.dot(seen) + errors.dot(information * errors);
+  }
+};
+
+Told told_by(const PatientSession& session, std::size_t imagers) {
+  const auto parameters = static_cast<Eigen::Index>(imagers * kImagerParameters);
+  Told told{.information = Eigen::MatrixXd::Zero(parameters, parameters), .seen = Eigen::VectorXd::Zero(parameters)};
+  Eigen::Matrix<double, 6, 6> of_pose = Eigen::Matrix<double, 6, 6>::Zero();
+  Eigen::MatrixXd pose_by_errors = Eigen::MatrixXd::Zero(6, parameters);
+  Motion pose_seen = Motion::Zero();
+  for (const PatientView& view : session.views) {
+    Eigen::Matrix<double, 6, 6> covariance = view.wanted.covariance;
+    covariance.diagonal().head<3>().array() += kFloorMm * kFloorMm;
+    covariance.diagonal().tail<3>().array() += kFloorRad * kFloorRad;
+    const Eigen::Matrix<double, 6, 6> weight = covariance.inverse();
+    Eigen::MatrixXd like = Eigen::MatrixXd::Zero(6, parameters);
+    like.middleCols<kImagerParameters>(static_cast<Eigen::Index>(view.imager * kImagerParameters)) =
+        motions_like_errors(view.model);
+    told.information += like.transpose() * weight * like;
+    told.seen += like.transpose() * weight * view.wanted.motion;
+    told.squares += view.wanted.motion.dot(weight * view.wanted.motion);
+    of_pose += weight;
+    pose_by_errors += weight * like;
+    pose_seen += weight * view.wanted.motion;
+    told.freedom += 6.0;
+  }
+  const Eigen::LDLT<Eigen::Matrix<double, 6, 6>> solver(of_pose);
+  told.information -= pose_by_errors.transpose() * solver.solve(pose_by_errors);
+  told.seen -= pose_by_errors.transpose() * solver.solve(pose_seen);
+  told.squares -= pose_seen.dot(solver.solve(pose_seen));
+  told.freedom -= 6.0;
+  return told;
+}
+
+// Errors that differ from a motion of the patient by perspective alone, a tenth of a degree per mm or less, or that act
+// like the scale of a CT, whose bones may look larger by partial volume. Many sessions bring their sigmas down to that,
+// but not what is wrong with registrations of patients.
+bool only_balls_tell(ImagerParameter parameter) {
+  using enum ImagerParameter;
+  return parameter == kShiftY || parameter == kDistance || parameter == kTiltX || parameter == kTiltY;
+}
+
+struct Fit {
+  Eigen::VectorXd errors;
+  Eigen::MatrixXd covariance;
+  double misfit = 0.0;
+};
+
+Fit fitted(std::span<const Told> sessions, std::size_t imagers) {
+  Eigen::VectorXd expected(static_cast<Eigen::Index>(imagers * kImagerParameters));
+  for (Eigen::Index n = 0; n < expected.size(); ++n)
+    expected[n] = imager_parameters()[static_cast<std::size_t>(n) % kImagerParameters].expected;
+  const Eigen::MatrixXd prior = expected.cwiseAbs2().cwiseInverse().asDiagonal();
+  Fit fit{.errors = Eigen::VectorXd::Zero(expected.size()), .covariance = {}, .misfit = 1.0};
+  constexpr int kRounds = 30;
+  for (int round = 0; round < kRounds; ++round) {
+    Eigen::MatrixXd information = Eigen::MatrixXd::Zero(expected.size(), expected.size());
+    Eigen::VectorXd seen = Eigen::VectorXd::Zero(expected.size());
+    double squares = 0.0, freedom = 0.0;
+    for (const Told& told : sessions) {
+      const double misfit = told.misfit(fit.errors);
+      // At first no session is known to be odd: what all of them show may be the imager.
+      const double weight =
+          round == 0 ? 1.0 : (kFreedom + told.freedom) / (kFreedom + misfit / (fit.misfit * fit.misfit));
+      information += weight * told.information;
+      seen += weight * told.seen;
+      squares += weight * misfit;
+      freedom += told.freedom;
+    }
+    fit.misfit = std::sqrt(squares / freedom);
+    const double scale = 1.0 / std::max(1.0, fit.misfit * fit.misfit);
+    fit.covariance = (scale * information + prior).inverse();
+    fit.errors = fit.covariance * (scale * seen);
+  }
+  return fit;
+}
+
+// The variances that leaving out each CT lets expect.
+Eigen::VectorXd jackknifed(const std::map<std::string, std::vector<std::size_t>>& groups, std::span<const Told> told,
+                           std::size_t imagers) {
+  Eigen::MatrixXd without(static_cast<Eigen::Index>(imagers * kImagerParameters),
+                          static_cast<Eigen::Index>(groups.size()));
+  Eigen::Index column = 0;
+  for (const auto& [name, members] : groups) {
+    std::vector<Told> others;
+    others.reserve(told.size());
+    for (std::size_t n = 0; n < told.size(); ++n)
+      if (std::ranges::find(members, n) == members.end()) others.push_back(told[n]);
+    without.col(column++) = fitted(others, imagers).errors;
+  }
+  without.colwise() -= without.rowwise().mean().eval();
+  const auto count = static_cast<double>(groups.size());
+  return (count - 1.0) / count * without.rowwise().squaredNorm();
+}
+
+}  // namespace
+
+ImagersOfPatients imagers_of_patients(std::span<const PatientSession> sessions, std::size_t imagers) {
+  std::vector<Told> told;
+  told.reserve(sessions.size());
+  for (const PatientSession& session : sessions) told.push_back(told_by(session, imagers));
+  if (std::ranges::none_of(told, [](const Told& of) { return of.freedom > 0.0; }))
+    throw Error("no session has two views, without which nothing can be told of an imager");
+  const Fit fit = fitted(told, imagers);
+  std::map<std::string, std::vector<std::size_t>> by_ct;
+  for (std::size_t n = 0; n < sessions.size(); ++n) by_ct[sessions[n].ct].push_back(n);
+  const bool are_enough = by_ct.size() >= kLeastCts;
+  const Eigen::VectorXd variances = fit.covariance.diagonal().cwiseMax(
+      are_enough ? jackknifed(by_ct, told, imagers) : Eigen::VectorXd::Zero(fit.errors.size()));
+  ImagersOfPatients found{.imagers = std::vector<ImagerEstimate>(imagers), .misfit = fit.misfit};
+  for (Eigen::Index n = 0; n < variances.size(); ++n) {
+    const std::size_t parameter = static_cast<std::size_t>(n) % kImagerParameters;
+    ImagerEstimate& imager = found.imagers[static_cast<std::size_t>(n) / kImagerParameters];
+    if (!are_enough || only_balls_tell(static_cast<ImagerParameter>(parameter)))
+      imager.set(parameter, 0.0, imager_parameters()[parameter].expected);
+    else
+      imager.set(parameter, fit.errors[n], std::sqrt(variances[n]));
+  }
+  return found;
+}
+
+}  // namespace isoshift
