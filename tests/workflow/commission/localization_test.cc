@@ -1,0 +1,252 @@
+#include "workflow/commission/localization.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+#include <random>
+
+#include "base/error.h"
+#include "geometry/rotation.h"
+#include "tests/support/pose_near.h"
+
+namespace isoshift::localization_test {
+namespace {
+
+using testing::DoubleNear;
+using testing::HasSubstr;
+
+constexpr LocalizationLimits kLimits{.translation_mm = 0.5, .rotation_deg = 0.3};
+
+Eigen::Isometry3d motion(const Eigen::Vector3d& mm, const Eigen::Vector3d& deg = Eigen::Vector3d::Zero()) {
+  Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
+  pose.translation() = mm;
+  pose.linear() = rotation_from_zxy({rad_from_deg(deg.z()), rad_from_deg(deg.x()), rad_from_deg(deg.y())});
+  return pose;
+}
+
+NamedResult session(const std::string& name, const Eigen::Isometry3d& setup_error, double sigma_mm = 0.1,
+                    double sigma_deg = 0.05) {
+  NamedResult one{.name = name, .result = {}};
+  one.result.verdict = Verdict::kAccepted;
+  one.result.patient_position = "HFS";
+  one.result.views.resize(1);
+  one.result.isocenter_patient_mm = {10, -20, 30};
+  one.result.setup_error = setup_error;
+  one.result.uncertainty = uncertainty_of_independent_axes(Eigen::Vector3d::Constant(sigma_mm),
+                                                           Eigen::Vector3d::Constant(rad_from_deg(sigma_deg)));
+  return one;
+}
+
+NamedResult on_table(NamedResult one, const Eigen::Vector3d& position_mm, double support_deg = 0.0) {
+  one.result.table_position_mm = position_mm;
+  one.result.table.support_rad = rad_from_deg(support_deg);
+  return one;
+}
+
+// Two moves along x, found 0.1 and 0.3 mm too far: bias 0.2, SD 0.1 sqrt(2); t of one degree of freedom is 12.706, and
+// the first session's own error turns 1/2 into 1/2 + 1.
+TEST(Localization, MovesAreAgainstTheFirstSession) {
+  const Localization found = localization_of(
+      {session("a", motion({1, 1, 1})), session("b", motion({4.1, 1, 1})), session("c", motion({-1.7, 1, 1}))},
+      Known::kMoves, {{{"a", motion({7, 0, 0})}, {"b", motion({10, 0, 0})}, {"c", motion({4, 0, 0})}}}, kLimits);
+  EXPECT_EQ(found.reference, "a");
+  ASSERT_EQ(found.all.size(), 2U);
+  const AxisOfLocalization& x = found.axes[0];
+  EXPECT_NEAR(x.errors->bias, 0.2, 1e-12);
+  EXPECT_NEAR(x.errors->sd.value(), 0.1 * std::numbers::sqrt2, 1e-12);
+  EXPECT_NEAR(x.errors->bias_within.value(), 12.706 * 0.1 * std::numbers::sqrt2 * std::sqrt(1.5), 1e-3);
+  EXPECT_NEAR(x.largest, 0.3, 1e-12);
+  EXPECT_EQ(x.least_known, -3.0);
+  EXPECT_EQ(x.most_known, 3.0);
+  EXPECT_EQ(x.limit, Outcome::kPassed);
+  EXPECT_EQ(found.polarity(0), Outcome::kPassed);
+  EXPECT_EQ(found.polarity(1), Outcome::kUntested);
+  // Both sessions have a sigma of 0.1 mm.
+  EXPECT_NEAR(found.all[0].sigma[0].value(), 0.1 * std::numbers::sqrt2, 1e-9);
+}
+
+TEST(Localization, PositionsHaveABiasOfTheirOwn) {
+  const Localization found =
+      localization_of({session("a", motion({1.2, 0, 0})), session("b", motion({4.2, 0, -0.6}))}, Known::kPositions,
+                      {{{"a", motion({1, 0, 0})}, {"b", motion({4, 0, 0})}}}, kLimits);
+  EXPECT_TRUE(found.reference.empty());
+  EXPECT_NEAR(found.axes[0].errors->bias, 0.2, 1e-12);
+  EXPECT_NEAR(found.axes[0].errors->bias_within.value(), 0.0, 1e-9);
+  EXPECT_EQ(found.axes[2].limit, Outcome::kFailed) << "0.6 mm, where the limit is 0.5";
+}
+
+TEST(Localization, AWrongSignOfAnyAxisIsFound) {
+  for (std::size_t axis = 0; axis < 6; ++axis) {
+    Eigen::Vector3d mm = Eigen::Vector3d::Zero(), deg = Eigen::Vector3d::Zero();
+    (axis < 3 ? mm : deg)[static_cast<Eigen::Index>(axis % 3)] = 2.0;
+    const auto polarity = [&](double sign) {
+      return localization_of({session("a", motion({0, 0, 0})), session("b", motion(sign * mm, sign * deg))},
+                             Known::kMoves, {{{"a", motion({0, 0, 0})}, {"b", motion(mm, deg)}}}, std::nullopt)
+          .polarity(axis);
+    };
+    EXPECT_EQ(polarity(1.0), Outcome::kPassed) << axis;
+    EXPECT_EQ(polarity(-1.0), Outcome::kFailed) << axis;
+    EXPECT_EQ(polarity(0.0), Outcome::kFailed) << axis;
+  }
+}
+
+TEST(Localization, ABiasIsNoWrongSign) {
+  const Localization found =
+      localization_of({session("a", motion({1.2, 0, 0})), session("b", motion({2.7, 0, 0}))}, Known::kPositions,
+                      {{{"a", motion({0, 0, 0})}, {"b", motion({1.5, 0, 0})}}}, kLimits);
+  EXPECT_EQ(found.polarity(0), Outcome::kPassed);
+  EXPECT_EQ(found.axes[0].limit, Outcome::kFailed);
+}
+
+TEST(Localization, ASinglePositionShowsNoSign) {
+  const Localization found = localization_of({session("a", motion({5, 5, 5}, {3, 3, 3}))}, Known::kPositions,
+                                             {{{"a", motion({5, 5, 5}, {3, 3, 3})}}}, kLimits);
+  for (std::size_t axis = 0; axis < 6; ++axis) EXPECT_EQ(found.polarity(axis), Outcome::kUntested) << axis;
+}
+
+// Moves between patient positions, or between beams, show no sign within one of them.
+TEST(Localization, EveryPatientPositionAndBeamHasSignsOfItsOwn) {
+  NamedResult prone = session("c", motion({0, 0, 0})), moved = session("d", motion({-3, 0, 0}));
+  NamedResult portal = session("e", motion({3, 0, 0}));
+  for (NamedResult* one : {&prone, &moved}) one->result.patient_position = "HFP";
+  portal.result.views.front().is_megavoltage = true;
+  const Localization found = localization_of(
+      {session("a", motion({0, 0, 0})), session("b", motion({3, 0, 0})), prone, moved, portal}, Known::kPositions,
+      {{{"a", motion({0, 0, 0})},
+        {"b", motion({3, 0, 0})},
+        {"c", motion({0, 0, 0})},
+        {"d", motion({3, 0, 0})},
+        {"e", motion({3, 0, 0})}}},
+      kLimits);
+  EXPECT_EQ(found.polarities.at("HFS, kV")[0], Outcome::kPassed);
+  EXPECT_EQ(found.polarities.at("HFP, kV")[0], Outcome::kFailed);
+  EXPECT_EQ(found.polarities.at("HFS, MV")[0], Outcome::kUntested);
+  EXPECT_EQ(found.polarity(0), Outcome::kFailed);
+}
+
+// A view from the front does not see the room's y of the first session. A table turned by 90 degrees makes it the x of
+// the second one.
+TEST(Localization, WhatTheFirstSessionDoesNotSeeIsInNoMove) {
+  NamedResult first = on_table(session("a", motion({0, 0, 0})), {0, 0, 0});
+  first.result.unobservable_room = {Eigen::Vector3d::UnitY()};
+  const Localization found = localization_of({first, on_table(session("b", motion({0, 0, 0})), {0, 0, 0}, 90.0)},
+                                             Known::kReadOuts, {}, kLimits);
+  EXPECT_FALSE(found.all.front().error[0]);
+  EXPECT_TRUE(found.all.front().error[1]);
+  EXPECT_TRUE(found.all.front().error[2]);
+}
+
+TEST(Localization, WithoutKnownAnglesRotationsAreNotJudged) {
+  const Localization found = localization_of(
+      {session("a", motion({0, 0, 0}, {2, 0, 0})), session("b", motion({3, 0, 0}))}, Known::kPositions,
+      {.by_session = {{"a", motion({0, 0, 0})}, {"b", motion({3, 0, 0})}}, .have_angles = false}, kLimits);
+  EXPECT_TRUE(found.axes[0].errors);
+  for (std::size_t axis = 3; axis < 6; ++axis) EXPECT_FALSE(found.axes[axis].errors) << axis;
+}
+
+// A table at 90 degrees carries its lateral axis to the room's y. The planned pose turns with the table, so that a
+// phantom that is carried along keeps its setup error but for the translation.
+TEST(Localization, ReadOutsMoveThePhantomWithTheTable) {
+  const NamedResult before = on_table(session("a", motion({0, 0, 0})), {10, 1000, -150}, 90.0);
+  const Localization moved = localization_of(
+      {before, on_table(session("b", motion({0, 5, 2})), {15, 1000, -148}, 90.0)}, Known::kReadOuts, {}, kLimits);
+  EXPECT_THAT(moved.all.front().known[1], DoubleNear(5.0, 1e-9));
+  EXPECT_THAT(moved.all.front().known[2], DoubleNear(2.0, 1e-9));
+  for (const auto& error : moved.all.front().error) EXPECT_THAT(error.value(), DoubleNear(0.0, 1e-9));
+
+  // A turn about the isocenter carries a phantom that lies off it along an arc.
+  const Eigen::Isometry3d off = motion({30, 0, 0});
+  const Localization turned = localization_of(
+      {on_table(session("a", off), {0, 0, 0}), on_table(session("b", motion({0, 30, 0})), {0, 0, 0}, 90.0)},
+      Known::kReadOuts, {}, kLimits);
+  EXPECT_THAT(turned.all.front().known[5], DoubleNear(90.0, 1e-9));
+  for (const auto& error : turned.all.front().error) EXPECT_THAT(error.value(), DoubleNear(0.0, 1e-9));
+}
+
+TEST(Localization, WhatReadOutsDoNotSayIsRefused) {
+  const auto refusal = [](const NamedResult& second) {
+    try {
+      localization_of({on_table(session("a", motion({0, 0, 0})), {0, 0, 0}), second}, Known::kReadOuts, {}, kLimits);
+    } catch (const Error& error) {
+      return std::string(error.what());
+    }
+    return std::string("not refused");
+  };
+  EXPECT_THAT(refusal(session("b", motion({0, 0, 0}))), HasSubstr("session b: its X-rays do not say where the table"));
+  NamedResult pitched = on_table(session("b", motion({0, 0, 0})), {0, 0, 0});
+  pitched.result.table.pitch_rad = rad_from_deg(1.0);
+  EXPECT_THAT(refusal(pitched), HasSubstr("the table's pitch differs by 1.00 degrees"));
+}
+
+TEST(Localization, SessionsAndKnownPosesNameEachOther) {
+  const std::vector<NamedResult> sessions = {session("a", motion({0, 0, 0})), session("b", motion({0, 0, 0}))};
+  const auto locate = [&](const KnownPoses& poses) { localization_of(sessions, Known::kMoves, poses, kLimits); };
+  EXPECT_THROW(locate({{{"a", motion({0, 0, 0})}}}), Error);
+  EXPECT_THROW(locate({{{"a", motion({0, 0, 0})}, {"b", motion({0, 0, 0})}, {"c", motion({0, 0, 0})}}}), Error);
+  EXPECT_THROW(localization_of({sessions.front()}, Known::kMoves, {{{"a", motion({0, 0, 0})}}}, kLimits), Error);
+}
+
+TEST(Localization, AxesThatXraysDoNotDetermineHaveNoErrors) {
+  NamedResult a = session("a", motion({0, 0, 0})), b = session("b", motion({1, 0, 0}));
+  for (NamedResult* one : {&a, &b}) {
+    one->result.translation_only = true;
+    one->result.unobservable_room = {Eigen::Vector3d::UnitZ()};
+  }
+  const Localization found =
+      localization_of({a, b}, Known::kMoves, {{{"a", motion({0, 0, 0})}, {"b", motion({1, 0, 0})}}}, kLimits);
+  EXPECT_TRUE(found.axes[0].errors);
+  for (const std::size_t axis : {2U, 3U, 4U, 5U}) {
+    EXPECT_FALSE(found.axes[axis].errors) << axis;
+    EXPECT_EQ(found.axes[axis].limit, Outcome::kUntested) << axis;
+  }
+}
+
+// 20 positions, 6 axes each: errors of three sigma everywhere must fail, of half a sigma pass.
+TEST(Localization, UncertaintiesThatAreTooSmallFail) {
+  const auto calibrated = [](double sigmas) {
+    std::vector<NamedResult> sessions;
+    KnownPoses poses;
+    for (int n = 0; n < 20; ++n) {
+      const double mm = 0.1 * sigmas, deg = 0.05 * sigmas;
+      sessions.push_back(session(std::to_string(n), motion({mm, -mm, mm}, {deg, -deg, deg})));
+      poses.by_session[std::to_string(n)] = motion({0, 0, 0});
+    }
+    return localization_of(sessions, Known::kPositions, poses, kLimits);
+  };
+  EXPECT_EQ(calibrated(3.0).sigma, Outcome::kFailed);
+  EXPECT_EQ(calibrated(3.0).within_one_sigma->of, 0U);
+  EXPECT_EQ(calibrated(0.5).sigma, Outcome::kPassed);
+  EXPECT_EQ(calibrated(0.5).within_two_sigma->of, 120U);
+}
+
+// Moves share the first session, whose error is in all of them; the test of the sigmas must not take that for many.
+// Errors are drawn with the sigmas that are given.
+TEST(Localization, UncertaintiesThatAreRightSeldomFailWithMoves) {
+  constexpr int kSites = 200, kSessions = 20;
+  std::mt19937 random(20261127);
+  std::normal_distribution<double> normal;
+  int failed = 0;
+  for (int site = 0; site < kSites; ++site) {
+    std::vector<NamedResult> sessions;
+    KnownPoses poses;
+    for (int n = 0; n < kSessions; ++n) {
+      const auto drawn = [&](double sigma) {
+        const double x = normal(random), y = normal(random), z = normal(random);
+        return Eigen::Vector3d(sigma * Eigen::Vector3d(x, y, z));
+      };
+      const Eigen::Vector3d mm = drawn(0.1), deg = drawn(0.05);
+      sessions.push_back(session(std::to_string(n), motion(mm, deg)));
+      poses.by_session[std::to_string(n)] = motion({0, 0, 0});
+    }
+    const Localization found = localization_of(sessions, Known::kMoves, poses, kLimits);
+    EXPECT_EQ(found.within_one_sigma->total, 6U * (kSessions - 1));
+    failed += found.sigma == Outcome::kFailed ? 1 : 0;
+  }
+  // Two one-sided tests at 2.5 %.
+  EXPECT_LE(failed, kSites / 20);
+}
+
+}  // namespace
+}  // namespace isoshift::localization_test

@@ -1,0 +1,30 @@
+#pragma once
+// Where a phantom is known to have lain: a table by people, or the read-outs of the treatment table.
+
+#include <Eigen/Geometry>
+#include <filesystem>
+#include <map>
+#include <string>
+
+#include "setup/setup_result.h"
+
+namespace isoshift {
+
+struct KnownPoses {
+  // The pose as a setup error (IEC 61217 fixed): what was planned at x lies at the pose times x. Of moves only the
+  // differences between sessions are known.
+  std::map<std::string, Eigen::Isometry3d> by_session;
+  bool have_angles = true;  // otherwise rotations are unknown, and nothing is turned in the poses
+};
+
+// CSV with the columns session, x_mm, y_mm, z_mm, rx_deg, ry_deg, rz_deg, in any order: R x + t, R = Rz Rx Ry. The
+// columns of angles may be missing, all three of them. Throws Error naming line and column.
+KnownPoses read_known_poses(const std::filesystem::path& csv);
+
+// How the table had moved an object that lies on it from session `before` to `now`: motion of the room. Throws Error
+// naming the session whose X-rays lack the table's position, and for a table that pitched or rolled between the two,
+// since read-outs do not say about which point.
+Eigen::Isometry3d moved_by_table(const std::string& before_name, const SetupResult& before, const std::string& now_name,
+                                 const SetupResult& now);
+
+}  // namespace isoshift
