@@ -42,6 +42,14 @@ struct Contradiction {
   double sigma_mm = 0.0;
 };
 
+// The motion that one view alone would want of the patient as a whole, on top of the pose that all views together want:
+// in the room and about the isocenter, its translation (mm) and then its rotation vector (rad). What the view hardly
+// sees has a large variance. Errors of the view's geometry are in it (isoshift geometry).
+struct WantedMotion {
+  Eigen::Matrix<double, 6, 1> motion = Eigen::Matrix<double, 6, 1>::Zero();
+  Eigen::Matrix<double, 6, 6> covariance = Eigen::Matrix<double, 6, 6>::Zero();
+};
+
 // How well one view matches: gradient correlation over all compared pixels, twice as large as those of the last stage.
 struct ViewMatch {
   std::string label;  // of the X-ray
@@ -52,6 +60,7 @@ struct ViewMatch {
   ViewConsistency consistency;   // of its parts with the pose found
   std::optional<LeftOutView> left_out;         // with three or more views
   std::optional<Contradiction> contradiction;  // with two or more views
+  std::optional<WantedMotion> wanted;          // likewise, if rotations were searched, too
 };
 
 // How well the images would match if they were not what they say they are.
@@ -142,6 +151,7 @@ struct Registration {
   Eigen::Isometry3d actual_room_from_patient = Eigen::Isometry3d::Identity();
   std::vector<Eigen::Vector3d> unobservable_room;  // unit directions along which the views cannot tell
   std::optional<Uncertainty> uncertainty;          // nothing: the images do not determine the pose
+  std::optional<Uncertainty> by_imagers;           // the imagers' part of it; nothing: no machine profile tells of any
   std::vector<StageReport> stages;
   std::vector<Alternative> alternatives;  // empty: the preset does not check them
   // Where the patient has bent: what bones did against the target. The pose is then the target's. Empty: the patient as

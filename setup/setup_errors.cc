@@ -27,6 +27,7 @@ PatientErrors errors_of_patient(std::string patient, std::vector<ErrorComponents
   if (errors.fractions.size() > 1) errors.sd.emplace();
   for (std::size_t component = 0; component < kErrorComponents.size(); ++component) {
     std::vector<double> values;
+    values.reserve(errors.fractions.size());
     for (const ErrorComponents& fraction : errors.fractions) values.push_back(fraction[component]);
     errors.mean[component] = mean_of(values);
     if (errors.sd) (*errors.sd)[component] = sd_of(values);
@@ -50,6 +51,13 @@ std::optional<PopulationErrors> errors_of_population(const std::vector<PatientEr
     population.random[component] = std::sqrt(mean_of(variances));
   }
   return population;
+}
+
+std::array<double, 3> van_herk_margin_mm(const PopulationErrors& population) {
+  std::array<double, 3> margin_mm{};
+  for (std::size_t axis = 0; axis < margin_mm.size(); ++axis)
+    margin_mm[axis] = 2.5 * population.systematic[axis] + 0.7 * population.random[axis];
+  return margin_mm;
 }
 
 }  // namespace isoshift

@@ -30,10 +30,15 @@ struct SetupResult : Registration {
     std::string acquired;              // "2026-03-01 10:15:00"; empty: unknown
     std::string origin;                // ReportedValuesOrigin: ACTUAL, PLAN; empty: unknown
     std::optional<double> gantry_deg;  // absent for a view given by its matrix
+    std::string machine;               // RadiationMachineName; empty: unknown
+    // XrayView's; nothing: made by a version of isoshift that did not say.
+    std::optional<Eigen::Matrix<double, 3, 4>> pixel_from_room;
+    std::optional<double> sid_mm;  // RTImageSID, or what supplied it; nothing: likewise
     Eigen::Vector3d source_room_mm = Eigen::Vector3d::Zero();
     double pixel_mm = 0.0;  // at the isocenter
     int columns = 0, rows = 0;
     bool is_megavoltage = false;
+    bool is_receptor_corrected = false;  // by a machine profile: pixel_from_room is not that of the files
     ViewMatch match;
     ViewPicture picture;
   };

@@ -19,6 +19,13 @@ struct ActionLevel {
   std::optional<double> rotation_deg;    // about any axis
 };
 
+// How far a known position or move of a phantom may be mistaken, along and about any axis
+// (docs/commands/commission.md).
+struct LocalizationLimits {
+  double translation_mm = 0.0;
+  double rotation_deg = 0.0;
+};
+
 // The scale of the couch's display, and who compared this scale with the couch.
 struct ValidatedScale {
   CouchScale scale = CouchScale::kIec61217;

@@ -4,13 +4,12 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <fstream>
-#include <iterator>
 #include <memory>
 
 #include "base/error.h"
 #include "base/json_file.h"
 #include "base/system_user.h"
+#include "base/text_file.h"
 #include "cli/commands/commands.h"
 #include "cli/switches/text_on_one_line.h"
 #include "workflow/room/audit_chain.h"
@@ -25,13 +24,6 @@ struct AuditOptions {
   std::vector<std::string> heads;
   std::string reason, by;
 };
-
-std::string content_of(const std::filesystem::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  std::string text{std::istreambuf_iterator<char>(file), {}};
-  if (!file || !std::filesystem::is_regular_file(path)) throw Error(fmt::format("{}: cannot be read", path.string()));
-  return text;
-}
 
 // What the releases beside a log, and the person, say that the log held; where each comes from.
 std::vector<std::pair<std::string, std::string>> heads_to_find(const AuditOptions& options) {
@@ -51,7 +43,7 @@ std::vector<std::pair<std::string, std::string>> heads_to_find(const AuditOption
 
 // Prints what is wrong with a log; whether it is whole.
 bool examine(const AuditOptions& options, Console& console) {
-  const AuditChain chain = chain_of(content_of(options.log));
+  const AuditChain chain = chain_of(text_of_file(options.log));
   console.out << fmt::format("{} lines", chain.lines);
   if (chain.without_link > 0) console.out << fmt::format(", the first {} without links", chain.without_link);
   console.out << fmt::format("\nhead {}\n", chain.head());
@@ -74,7 +66,7 @@ bool examine(const AuditOptions& options, Console& console) {
 void repair(const AuditOptions& options, Console& console) {
   check_text_on_one_line("--by", options.by, "the name of the person who has looked");
   check_text_on_one_line("--repair", options.reason, "the reason");
-  const AuditChain chain = chain_of(content_of(options.log));
+  const AuditChain chain = chain_of(text_of_file(options.log));
   if (chain.broken.empty()) throw Error(fmt::format("{}: no link is broken", options.log.string()));
   const SystemUser user = system_user();
   nlohmann::ordered_json line = {{"by", options.by}, {"user", user.name}};

@@ -1,0 +1,163 @@
+// isoshift audit-setup, from folders of results to the page.
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <nlohmann/json.hpp>
+
+#include "base/output_folder.h"
+#include "io/dicom/decode.h"
+#include "tests/support/audited_archive.h"
+#include "tests/support/small_study.h"
+#include "tests/support/temporary_folder.h"
+
+namespace isoshift::audit_setup_command_test {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::HasSubstr;
+using testing::Not;
+using testing::UnorderedElementsAre;
+using Json = nlohmann::json;
+
+std::string text_of(const fs::path& path) {
+  std::ifstream file(path);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+class AuditSetupCommandTest : public testing::Test {
+ protected:
+  fs::path results() const { return folder_ / "results"; }
+  fs::path table() const { return folder_ / "used.csv"; }
+  fs::path output() const { return folder_ / "audit"; }
+  CommandOutcome run(std::vector<std::string> flags = {}) {
+    flags.insert(flags.begin(), {"audit-setup", results().string()});
+    return run_command(flags);
+  }
+
+  TemporaryFolder folder_;
+};
+
+// A year of 60 fractions with what is to be found in it: a drift, a swapped patient, two wrong signs; and one setup
+// that isoshift rejected, because its X-rays are of another patient.
+TEST_F(AuditSetupCommandTest, FindsDriftSwappedPatientAndWrongSignsAndNothingElse) {
+  MadeArchive archive = made_archive(1, 2.5, true);
+  const std::size_t other_patient = 2;
+  archive.sessions[other_patient].result.verdict = Verdict::kRejected;
+  archive.sessions[other_patient].result.reasons = {"the target's surroundings match poorly"};
+  write_archive(archive, results(), table());
+  const CommandOutcome outcome = run({"--used", table().string(), "-o", output().string(), "--json"});
+  ASSERT_EQ(outcome.exit_status, 0) << outcome.err;
+  EXPECT_EQ(outcome.err, "");
+  EXPECT_EQ(outcome.out, text_of(output() / "audit.json"));
+
+  const Json audit = Json::parse(outcome.out);
+  EXPECT_EQ(audit["counted"], 59);
+  EXPECT_EQ(audit["compared"], 59);
+  std::map<std::string, std::string> outliers;
+  for (const Json& session : audit["sessions"])
+    if (!session["outlier"].is_null()) outliers[session["session"]] = session["outlier"]["explanation"];
+  ASSERT_EQ(outliers.size(), 3U) << audit.dump(2);
+  EXPECT_THAT(
+      outliers[MadeArchive::name_of(archive.swapped)],
+      HasSubstr("swapped patient: the used shift is that of session " + MadeArchive::name_of(archive.swapped ^ 1)));
+  for (const std::size_t n : {0U, 1U})
+    EXPECT_THAT(outliers[MadeArchive::name_of(archive.signs[n])],
+                HasSubstr(std::string("wrong sign of ") + kCouchAxes[archive.sign_axes[n]]));
+  for (const auto& [axis, agreement] : audit["agreement"].items())
+    EXPECT_EQ(agreement["drift"]["is_significant"], axis == "longitudinal_mm") << axis << agreement;
+  EXPECT_NEAR(audit["agreement"]["longitudinal_mm"]["drift"]["slope_per_30_days"].get<double>(), 2.5 * 30.0 / 365.0,
+              0.08);
+  for (const auto& [component, drift] : audit["setup_error_drift"].items())
+    EXPECT_EQ(drift["is_significant"], false) << component;
+
+  const std::string page = text_of(output() / "audit.html"), csv = text_of(output() / "audit.csv");
+  EXPECT_THAT(page, HasSubstr("href=\"../results/" + MadeArchive::name_of(archive.swapped) + "/report.html\""));
+  EXPECT_THAT(page, HasSubstr("isoshift did not accept it (rejected): the target&#39;s surroundings match poorly"));
+  EXPECT_TRUE(fs::exists(output() / "../results" / MadeArchive::name_of(archive.swapped) / "report.html"));
+  EXPECT_THAT(page, Not(HasSubstr("http://"))) << "the page needs no network";
+  EXPECT_EQ(std::ranges::count(csv, '\n'), 61);
+
+  // The same in words; nothing is overwritten unless asked for.
+  EXPECT_THAT(run({"--used", table().string()}).out, HasSubstr("drift of longitudinal: +0."));
+  EXPECT_EQ(run({"--used", table().string(), "-o", output().string()}).exit_status, 1);
+  EXPECT_EQ(run({"--used", table().string(), "-o", output().string(), "--overwrite"}).exit_status, 0);
+}
+
+// Also where the output is named from the working directory, and where names mean something in a URL.
+TEST_F(AuditSetupCommandTest, LinksReportsWhateverTheyAreCalled) {
+  write_archive(made_archive(1, 0.0, false), results(), table());
+  fs::rename(results() / MadeArchive::name_of(3), results() / "day #3? 50% M\xC3\xBCller");
+  const fs::path before = fs::current_path();
+  fs::current_path(folder_.path());
+  const CommandOutcome outcome = run_command({"audit-setup", "results", "-o", "audit"});
+  fs::current_path(before);
+  ASSERT_EQ(outcome.exit_status, 0) << outcome.err;
+  const std::string page = text_of(output() / "audit.html"), csv = text_of(output() / "audit.csv");
+  EXPECT_THAT(page, HasSubstr("href=\"../results/day%20%233%3F%2050%25%20M%C3%BCller/report.html\""));
+  EXPECT_THAT(page, HasSubstr("href=\"../results/" + MadeArchive::name_of(1) + "/report.html\""));
+  EXPECT_THAT(csv, HasSubstr(",../results/" + MadeArchive::name_of(1) + "\n"));
+}
+
+// Registered by translations alone: every rotation is 0, and so is its scatter.
+TEST_F(AuditSetupCommandTest, RotationsThatAreAllAlikeAreAudited) {
+  MadeArchive archive = made_archive(1, 0.0, false);
+  for (MadeSession& session : archive.sessions) {
+    session.result.setup_error.linear().setIdentity();
+    for (std::size_t axis = 3; axis < 6; ++axis) session.used[axis] = 0.0;
+  }
+  write_archive(archive, results(), table());
+  const CommandOutcome outcome = run({"--used", table().string(), "--json"});
+  ASSERT_EQ(outcome.exit_status, 0) << outcome.err;
+  const Json audit = Json::parse(outcome.out);
+  EXPECT_EQ(audit["agreement"]["yaw_deg"]["drift"]["is_significant"], false);
+  EXPECT_EQ(audit["setup_error_drift"]["rx_deg"]["is_significant"], false) << audit["setup_error_drift"];
+}
+
+TEST_F(AuditSetupCommandTest, DescribesWhatIsoshiftFoundWithoutUsedShifts) {
+  write_archive(made_archive(1, 0.0, false), results(), table());
+  const CommandOutcome outcome = run();
+  EXPECT_EQ(outcome.exit_status, 0) << outcome.err;
+  EXPECT_THAT(outcome.out, HasSubstr("60 sessions, 60 of 10 patients counted, 2026-01-01 to"));
+  EXPECT_THAT(outcome.out, HasSubstr("0 compared with used shifts"));
+  EXPECT_THAT(outcome.out, Not(HasSubstr("AGREEMENT")));
+  EXPECT_THAT(outcome.out, HasSubstr("MARGINS"));
+}
+
+// What register wrote is its own used shift; the object of another patient, or of no session, is of no use.
+TEST_F(AuditSetupCommandTest, ReadsRegistrationObjectsByTheXraysTheyName) {
+  const SmallStudy study;
+  ASSERT_EQ(run_command({"register", study.path().string(), "-o", (results() / "a").string()}).exit_status, 0);
+  const fs::path objects = folder_ / "used";
+  fs::create_directories(objects);
+  fs::copy_file(results() / "a" / "spatial_registration.dcm", objects / "a.dcm");
+  fs::remove(results() / "a" / "spatial_registration.dcm");
+  const auto session = [&] {
+    const CommandOutcome outcome = run({"--used", objects.string(), "--json"});
+    EXPECT_EQ(outcome.exit_status, 0) << outcome.err;
+    return Json::parse(outcome.out)["sessions"][0];
+  };
+  Json found = session();
+  for (const auto& [axis, difference] : found["difference"].items())
+    EXPECT_NEAR(difference.is_null() ? 1.0 : difference.get<double>(), 0.0, 1e-4) << axis << found;
+
+  edit(objects / "a.dcm", [](DicomItem d) { d.put(DCM_PatientID, "SOMEBODY"); });
+  found = session();
+  EXPECT_TRUE(found["used"]["lateral_mm"].is_null());
+  EXPECT_THAT(found["not_compared"], HasSubstr("PatientID (0010,0020) differs"));
+}
+
+TEST_F(AuditSetupCommandTest, WhatCannotBeAuditedIsAnError) {
+  fs::create_directories(results());
+  EXPECT_THAT(run().err, HasSubstr("holds no result of isoshift"));
+  EXPECT_EQ(run({"--used", (folder_ / "nothing.csv").string()}).exit_status, 2);
+  write_text(table(), "");
+  EXPECT_EQ(run({"--used", table().string(), "--source-isocenter", "0,0,0"}).exit_status, 2);
+}
+
+}  // namespace
+}  // namespace isoshift::audit_setup_command_test

@@ -1,0 +1,149 @@
+// The table of used shifts, registration objects in its place, and the archive that they are compared with.
+
+#include "workflow/audit_setup/used_shifts.h"
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+
+#include "base/error.h"
+#include "base/output_folder.h"
+#include "io/report/formats.h"
+#include "io/report/result_folder.h"
+#include "tests/support/oblique_report.h"
+#include "tests/support/temporary_folder.h"
+#include "workflow/audit_setup/archive.h"
+
+namespace isoshift::used_shifts_test {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::ElementsAre;
+using testing::HasSubstr;
+
+class AuditArchive : public testing::Test {
+ protected:
+  // The worked example of docs/conventions.md, with X-rays and times of its own.
+  static SetupResult example(const std::string& xray, const std::string& acquired) {
+    SetupResult result = oblique_report(Verdict::kAccepted);
+    result.views.front().sop_instance_uid = xray;
+    result.views.front().acquired = acquired;
+    return result;
+  }
+  void write(const std::string& folder, const SetupResult& result) {
+    fs::create_directories(archive() / folder);
+    write_text(archive() / folder / kResultFile, json_report(result));
+  }
+  fs::path archive() const { return folder_ / "archive"; }
+  std::vector<AuditedSession> read(ComparedShift compared = ComparedShift::kFull) const {
+    return read_archive(archive(), compared);
+  }
+  // The message about a table with this text, for a session "a".
+  std::string error_of(const std::string& text) {
+    replace_text(folder_ / "used.csv", text);
+    std::vector<AuditedSession> sessions = {{.name = "a"}};
+    try {
+      read_used_table(folder_ / "used.csv", sessions);
+    } catch (const Error& error) {
+      return std::string(error.what()).substr((folder_ / "used.csv").string().size());
+    }
+    return "";
+  }
+
+  TemporaryFolder folder_;
+};
+
+constexpr const char* kHeader = "session,lateral_mm,longitudinal_mm,vertical_mm,yaw_deg,pitch_deg,roll_deg\n";
+
+TEST_F(AuditArchive, IsReadInTheOrderOfTimeWithTheShiftsOfTheReports) {
+  write("cases/later", example("1.2", "2026-03-02 10:00:00"));
+  write("sessions/first", example("1.1", "2026-03-01 10:00:00"));
+  write("superseded/old", example("1.1", "2026-03-01 10:00:00"));
+  write(".half-written", example("1.3", "2026-03-01 10:00:00"));
+  const std::vector<AuditedSession> sessions = read();
+  ASSERT_EQ(sessions.size(), 2U);
+  EXPECT_EQ(sessions[0].name, "first");
+  EXPECT_EQ(sessions[1].name, "later");
+  EXPECT_DOUBLE_EQ(sessions[1].day - sessions[0].day, 1.0);
+  const double expected[] = {6.610, -5.126, 5.200, 2.969, 1.861, -2.172};
+  for (std::size_t axis = 0; axis < 6; ++axis) EXPECT_NEAR(*sessions[0].found[axis], expected[axis], 1e-3) << axis;
+}
+
+TEST_F(AuditArchive, NamesFoldersOfOneNameWithThoseAboveThem) {
+  write("p1/f1", example("1.1", "2026-03-01 10:00:00"));
+  write("p2/f1", example("1.2", "2026-03-01 11:00:00"));
+  write("p2/f2", example("1.3", "2026-03-02 11:00:00"));
+  std::vector<std::string> names;
+  for (const AuditedSession& session : read()) names.push_back(session.name);
+  EXPECT_THAT(names, ElementsAre("p1/f1", "p2/f1", "f2"));
+}
+
+TEST_F(AuditArchive, CountsTheLastResultOfTheSameXraysAndWhatWasAccepted) {
+  SetupResult first = example("1.1", "2026-03-01 10:00:00"), again = first;
+  first.made_on = "2026-03-01T10:05:00+0100";
+  again.made_on = "2026-03-01T11:05:00+0100";
+  write("a", first);
+  write("a-2", again);
+  SetupResult review = example("1.2", "2026-03-02 10:00:00");
+  review.verdict = Verdict::kReview;
+  review.reasons = {"the target's surroundings match poorly"};
+  write("b", review);
+  write("c", example("1.3", ""));
+  fs::create_directories(archive() / "d");
+  write_text(archive() / "d" / kResultFile, "{}");
+  std::map<std::string, std::string> left_out;
+  for (const AuditedSession& session : read()) left_out[session.name] = session.left_out;
+  EXPECT_EQ(left_out["a"], "its X-rays have a later result: a-2");
+  EXPECT_EQ(left_out["a-2"], "");
+  EXPECT_EQ(left_out["b"], "isoshift did not accept it (review)");
+  EXPECT_EQ(left_out["c"], "the time of its X-rays is not known");
+  EXPECT_THAT(left_out["d"], HasSubstr("result.json"));
+}
+
+TEST_F(AuditArchive, ComparesATableWithWhatTheSitesCouchCanDo) {
+  SetupResult result = example("1.1", "2026-03-01 10:00:00");
+  result.site = small_couch();  // without pitch and roll
+  write("a", result);
+  const CouchAxes of_couch = read(ComparedShift::kOfSitesCouch).front().found;
+  EXPECT_TRUE(of_couch[3]);
+  EXPECT_FALSE(of_couch[4] || of_couch[5]);
+  EXPECT_TRUE(read(ComparedShift::kFull).front().found[4]);
+}
+
+TEST_F(AuditArchive, WithoutResultsIsAnError) {
+  fs::create_directories(archive() / "empty");
+  EXPECT_THROW(read(), Error);
+}
+
+TEST_F(AuditArchive, ATableFillsInWhatItKnows) {
+  write_text(folder_ / "used.csv", std::string("\xEF\xBB\xBF") + kHeader + "a,1.5,-2,+3.25,,,0\n\n");
+  std::vector<AuditedSession> sessions = {{.name = "a"}, {.name = "b"}};
+  read_used_table(folder_ / "used.csv", sessions);
+  EXPECT_THAT(sessions[0].used, ElementsAre(1.5, -2.0, 3.25, std::nullopt, std::nullopt, 0.0));
+  EXPECT_THAT(sessions[0].used_from, HasSubstr("line 2"));
+  EXPECT_FALSE(sessions[1].used[0]);
+}
+
+TEST_F(AuditArchive, MistakesInATableAreNamedWithLineAndColumn) {
+  const std::string header = kHeader;
+  EXPECT_THAT(error_of("session,x\n"),
+              HasSubstr(", line 1: the columns are \"session,x\", expected session,lateral_mm"));
+  EXPECT_THAT(error_of(header + "b,1,2,3,,,\n"), HasSubstr(", line 2, column session: there is no session \"b\""));
+  EXPECT_THAT(error_of(header + "a,1,2,3,,,\na,1,2,3,,,\n"),
+              HasSubstr(", line 3, column session: \"a\" is there twice"));
+  EXPECT_THAT(error_of(header + "a,1,2 cm,3,,,\n"),
+              HasSubstr(", line 2, column longitudinal_mm: \"2 cm\" is not a finite"));
+  EXPECT_THAT(error_of(header + "a,1,2,nan,,,\n"), HasSubstr(", line 2, column vertical_mm: \"nan\" is not a finite"));
+  EXPECT_THAT(error_of(header + "a,1,2,3,1e999,,\n"), HasSubstr(", line 2, column yaw_deg: \"1e999\" is not a finite"));
+  EXPECT_THAT(error_of(header + "a,1,2,3\n"), HasSubstr(", line 2: 4 cells, expected 7"));
+  EXPECT_THAT(error_of(header + "a,\"1,2,3,,,\n"), HasSubstr(", line 2: "));
+  EXPECT_THAT(error_of(""), HasSubstr(", line 1: the columns are"));
+  EXPECT_THAT(error_of(header), HasSubstr(": names no session"));
+  EXPECT_THAT(error_of(header + "a,1,2e6,3,,,\n"),
+              HasSubstr(", line 2, column longitudinal_mm: 2e+06 is no couch shift"));
+}
+
+}  // namespace
+}  // namespace isoshift::used_shifts_test

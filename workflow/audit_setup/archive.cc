@@ -1,0 +1,127 @@
+#include "workflow/audit_setup/archive.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <map>
+#include <set>
+#include <utility>
+
+#include "base/error.h"
+#include "base/local_time.h"
+#include "geometry/rotation.h"
+#include "io/report/result_folder.h"
+#include "setup/shown_shift.h"
+#include "workflow/results_below.h"
+
+namespace isoshift {
+namespace {
+
+namespace fs = std::filesystem;
+
+void set_found(const SetupResult& result, ComparedShift compared, AuditedSession& session) {
+  const ShownShift shown = shown_shift(result);
+  if (shown.withheld) return;
+  session.setup_error = result.translation_only ? std::nullopt : complete_components(shown);
+  const bool is_full = compared == ComparedShift::kFull;
+  const Eigen::Matrix3d table_from_room = rotation_z(-result.table.yaw_rad());
+  // Of yaw, pitch and roll: about z, x and y of the table top.
+  constexpr std::array<Eigen::Index, 3> kAbout = {2, 0, 1};
+  for (std::size_t n = 0; n < 3; ++n) {
+    session.found[n] = is_full ? shown.couch_mm[n] : shown.applied_mm[n];
+    session.sigma[n] = shown.couch_sigma_mm[n];
+    if (result.translation_only || !(is_full || shown.can_rotate[n])) continue;
+    session.found[n + 3] = shown.couch_deg[n];
+    if (!result.uncertainty) continue;
+    const Eigen::Matrix3d about_room_rad2 = result.uncertainty->covariance.bottomRightCorner<3, 3>();
+    const Eigen::Matrix3d about_table_rad2 = table_from_room * about_room_rad2 * table_from_room.transpose();
+    session.sigma[n + 3] = deg_from_rad(std::sqrt(about_table_rad2(kAbout[n], kAbout[n])));
+  }
+}
+
+struct ReadSession {
+  AuditedSession session;
+  std::string made_on;
+};
+
+ReadSession read_session(const fs::path& folder, std::string name, ComparedShift compared) {
+  ReadSession read{.session = {.name = std::move(name), .folder = folder}, .made_on = ""};
+  AuditedSession& session = read.session;
+  try {
+    const SetupResult result = read_report(folder);
+    read.made_on = result.made_on;
+    session.verdict = result.verdict;
+    session.reasons = result.reasons;
+    session.identity = result.identity;
+    for (const SetupResult::View& view : result.views) {
+      session.xrays.insert(view.sop_instance_uid);
+      if (!view.acquired.empty() && (session.acquired.empty() || view.acquired < session.acquired))
+        session.acquired = view.acquired;
+    }
+    set_found(result, compared, session);
+    if (const auto position = patient_position_from(result.patient_position))
+      session.planned = {.patient_position = *position,
+                         .isocenter_patient_mm = result.isocenter_patient_mm,
+                         .couch_angle_deg = deg_from_rad(result.table.yaw_rad()),
+                         .couch_pitch_deg = deg_from_rad(result.table.pitch_rad),
+                         .couch_roll_deg = deg_from_rad(result.table.roll_rad)};
+    if (result.verdict != Verdict::kAccepted)
+      session.left_out = fmt::format("isoshift did not accept it ({})", to_string(result.verdict));
+    if (const auto seconds = seconds_at(session.acquired))
+      session.day = *seconds / 86400.0;
+    else if (session.counts())
+      session.left_out = "the time of its X-rays is not known";
+  } catch (const std::exception& error) {
+    session.left_out = error.what();
+  }
+  return read;
+}
+
+// Of several results of the same X-rays only the one made last counts.
+void leave_out_earlier_results(std::vector<ReadSession>& all) {
+  std::map<std::set<std::string>, ReadSession*> newest;
+  for (ReadSession& one : all) {
+    if (one.session.xrays.empty()) continue;
+    const auto [place, is_first] = newest.try_emplace(one.session.xrays, &one);
+    if (is_first) continue;
+    ReadSession* earlier = std::exchange(place->second, &one);
+    if (one.made_on < earlier->made_on) std::swap(earlier, place->second);
+    earlier->session.left_out = "its X-rays have a later result: " + place->second->session.name;
+  }
+}
+
+void find_first_of_days(std::vector<AuditedSession>& sessions) {
+  std::set<std::pair<std::string, double>> seen;
+  for (AuditedSession& session : sessions)
+    if (session.counts())
+      session.is_first_of_day = seen.emplace(patient_key(session.identity), std::floor(session.day)).second;
+}
+
+}  // namespace
+
+CouchAxes AuditedSession::difference() const {
+  CouchAxes off;
+  for (std::size_t axis = 0; axis < off.size(); ++axis)
+    if (used[axis] && found[axis]) off[axis] = *used[axis] - *found[axis];
+  return off;
+}
+
+bool AuditedSession::is_compared() const {
+  return counts() && std::ranges::any_of(difference(), [](const auto& off) { return off.has_value(); });
+}
+
+std::vector<AuditedSession> read_archive(const fs::path& folder, ComparedShift compared) {
+  std::vector<ReadSession> all;
+  for (const NamedFolder& one : result_folders_below(folder)) all.push_back(read_session(one.path, one.name, compared));
+  leave_out_earlier_results(all);
+  std::vector<AuditedSession> sessions;
+  sessions.reserve(all.size());
+  for (ReadSession& one : all) sessions.push_back(std::move(one.session));
+  std::ranges::stable_sort(sessions, {}, &AuditedSession::day);
+  find_first_of_days(sessions);
+  return sessions;
+}
+
+}  // namespace isoshift
