@@ -8,7 +8,7 @@ tests=$(for program in "$@"; do
   "$program" --gtest_list_tests | awk '/^[^ ]/ {sub(/ *#.*/, ""); sub(/.*\//, "", $1); sub(/\/.*/, "", $1); suite = $1}
                                        /^  / {sub(/\/.*/, "", $1); print suite $1; print suite "*"; print substr(suite, 1, length(suite) - 1)}'
 done
-  grep -oE 'add_test\(NAME [A-Za-z.]+' "$source_dir/tests/CMakeLists.txt" | cut -d' ' -f2)
+  grep -oE 'add_test\(NAME [A-Za-z0-9.]+' "$source_dir/tests/CMakeLists.txt" | cut -d' ' -f2)
 cd "$source_dir"
 status=0
 complain() {
