@@ -4,11 +4,14 @@
 #include <algorithm>
 #include <exception>
 #include <sstream>
+#include <string>
+#include <string_view>
 
 #include "base/error.h"
 #include "base/version.h"
 #include "cli/commands/commands.h"
 #include "cli/man_pages.h"
+#include "io/report/canvas.h"
 
 namespace isoshift {
 namespace {
@@ -23,8 +26,19 @@ constexpr const char* kDescription =
 
 constexpr const char* kFooter = "\nExit status: 0 accepted (or done), 1 failed, 2 usage, 3 review, 4 rejected.";
 
+// Names of files and sessions may hold what a terminal would obey.
+std::string printable_lines(std::string_view text) {
+  std::string lines;
+  for (std::size_t begin = 0; begin <= text.size();) {
+    const std::size_t end = std::min(text.find('\n', begin), text.size());
+    lines += printable(text.substr(begin, end - begin)) + (end < text.size() ? "\n" : "");
+    begin = end + 1;
+  }
+  return lines;
+}
+
 int say(Console& console, const std::exception& error, int status) {
-  console.err << "error: " << error.what() << "\n";
+  console.err << "error: " << printable_lines(error.what()) << "\n";
   return status;
 }
 
@@ -47,6 +61,8 @@ void add_commands(CLI::App& app, Console& console, int& exit_status) {
   add_evaluate_command(app, console, exit_status);
   add_track_command(app, console, exit_status);
   add_predict_command(app, console, exit_status);
+  add_commission_command(app, console, exit_status);
+  add_geometry_command(app, console, exit_status);
   add_scout_command(app, console, exit_status);
   add_watch_command(app, console, exit_status);
   add_serve_command(app, console, exit_status);
@@ -54,6 +70,7 @@ void add_commands(CLI::App& app, Console& console, int& exit_status) {
   add_release_command(app, console, exit_status);
   add_delete_command(app, console, exit_status);
   add_audit_command(app, console, exit_status);
+  add_audit_setup_command(app, console, exit_status);
   add_bench_command(app, console, exit_status);
 }
 
@@ -83,7 +100,8 @@ int run_isoshift(int argc, const char* const* argv, Console& console) {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() == 0) return app.exit(error, console.out, console.err);
-    console.err << "error: " << error.what() << "\n       isoshift COMMAND --help explains the flags\n";
+    console.err << "error: " << printable_lines(error.what())
+                << "\n       isoshift COMMAND --help explains the flags\n";
     return kExitUsage;
   } catch (const UsageError& error) {
     return say(console, error, kExitUsage);

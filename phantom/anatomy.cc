@@ -1,6 +1,7 @@
 // The bodies that isoshift phantom makes. Not anatomy lessons: enough bone, air and irregularity that a DRR of them
 // asks of a registration what a patient's does.
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <random>
@@ -273,6 +274,28 @@ PhantomParts spine_parts(const Vector3d& center_patient_mm, std::uint64_t seed) 
 }
 PhantomParts thorax_parts(const Vector3d& target_patient_mm, std::uint64_t seed, const Vector3d& displacement_mm) {
   return thorax(target_patient_mm, seed, displacement_mm).take();
+}
+
+PhantomParts ball_parts(const Vector3d& center_patient_mm, std::uint64_t seed) {
+  constexpr int kBalls = 14;
+  constexpr double kReachMm = 72.0, kRadiusMm = 3.0, kApartMm = 45.0;
+  constexpr Material kAcrylic{.water = 1.1, .bone = 0.0}, kSteelInAcrylic{.water = -1.1, .bone = 6.0};
+  PhantomParts parts;
+  parts.shapes.push_back(make_shape(Kind::kBox, center_patient_mm, Vector3d::Constant(85.0), kAcrylic));
+  std::mt19937_64 random(seed);
+  std::uniform_real_distribution<double> along(-kReachMm, kReachMm);
+  std::vector<Vector3d> centers;
+  while (centers.size() < kBalls) {
+    const double x = along(random), y = along(random), z = along(random);
+    const Vector3d next(x, y, z);
+    const bool is_near =
+        std::ranges::any_of(centers, [&](const Vector3d& other) { return (next - other).norm() < kApartMm; });
+    if (!is_near) centers.push_back(next);
+  }
+  for (const Vector3d& center : centers)
+    parts.shapes.push_back(
+        make_shape(Kind::kEllipsoid, center_patient_mm + center, Vector3d::Constant(kRadiusMm), kSteelInAcrylic));
+  return parts;
 }
 
 void add_shoulders(PhantomParts& thorax, const Vector3d& target_patient_mm, std::uint64_t seed) {

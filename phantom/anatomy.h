@@ -39,6 +39,9 @@ PhantomParts spine_parts(const Eigen::Vector3d& center_patient_mm, std::uint64_t
 PhantomParts thorax_parts(const Eigen::Vector3d& target_patient_mm, std::uint64_t seed,
                           const Eigen::Vector3d& displacement_mm);
 
+// Steel balls of 6 mm in a block of acrylic, for the geometry of imagers.
+PhantomParts ball_parts(const Eigen::Vector3d& center_patient_mm, std::uint64_t seed);
+
 // Clavicles, scapulae and the heads of the arms, which the usual thorax has not.
 void add_shoulders(PhantomParts& thorax, const Eigen::Vector3d& target_patient_mm, std::uint64_t seed);
 

@@ -36,6 +36,7 @@ ScannedPart part_of(PhantomOptions::Anatomy anatomy) {
     case PhantomOptions::Anatomy::kHead: return {{190, 230, 216}, {0, 0, 4}, "HEAD"};
     case PhantomOptions::Anatomy::kSpine: return {{320, 220, 180}, {0, -25, 0}, "LSPINE"};
     case PhantomOptions::Anatomy::kThorax: return {{350, 250, 210}, {65, 10, 0}, "CHEST"};
+    case PhantomOptions::Anatomy::kBalls: return {{186, 186, 186}, {0, 0, 0}, "PHANTOM"};
   }
   return {};
 }
@@ -49,7 +50,8 @@ struct DrawnTarget {
 DrawnTarget target_of(PhantomOptions::Anatomy anatomy) {
   switch (anatomy) {
     case PhantomOptions::Anatomy::kHead: return {"PTV", "PTV", 25.0};
-    case PhantomOptions::Anatomy::kSpine: return {"PTV", "PTV", 20.0};
+    case PhantomOptions::Anatomy::kSpine:
+    case PhantomOptions::Anatomy::kBalls: return {"PTV", "PTV", 20.0};
     case PhantomOptions::Anatomy::kThorax: return {"Target", "GTV", kTargetRadiusMm};
   }
   return {};
@@ -200,6 +202,7 @@ void write_xray(const PhantomOptions& options, const StudyUids& study, const std
   imager.is_megavoltage = std::ranges::find(mv, options.gantry_angles_deg[number]) != mv.end();
   imager.gantry_angle_deg = options.gantry_angles_deg[number];
   imager.receptor_angle_deg = options.receptor_angle_deg;
+  imager.fault = options.panel_fault;
   imager.pixels = options.image_pixels;
   imager.pixel_mm = kPanelMm / options.image_pixels;
   const Image<float> intensity = simulate_xray(phantom_of(options, moment.displacement_mm).in_xrays, options.placement,

@@ -143,6 +143,7 @@ std::string_view anatomy_name(PhantomOptions::Anatomy anatomy) {
     case PhantomOptions::Anatomy::kHead: return "head";
     case PhantomOptions::Anatomy::kSpine: return "spine";
     case PhantomOptions::Anatomy::kThorax: return "thorax";
+    case PhantomOptions::Anatomy::kBalls: return "balls";
   }
   return "";
 }
@@ -155,14 +156,15 @@ void PhantomOptions::check() const {
     throw UsageError(fmt::format("voxel size {} mm is not within 0.5 to 5", voxel_mm));
   if (image_pixels < 64 || image_pixels > 2048)
     throw UsageError(fmt::format("{} image pixels are not within 64 to 2048", image_pixels));
-  if (gantry_angles_deg.empty() || gantry_angles_deg.size() > 6) throw UsageError("1 to 6 gantry angles are needed");
+  if (gantry_angles_deg.empty() || gantry_angles_deg.size() > 12) throw UsageError("1 to 12 gantry angles are needed");
   std::set<std::string> labels;
   for (const double angle_deg : gantry_angles_deg)
     if (!std::isfinite(angle_deg) || !labels.insert(image_label(angle_deg)).second)
       throw UsageError(fmt::format("gantry angle {}: expected finite angles, a degree or more apart", angle_deg));
   if (!placement.translation_mm.allFinite() || !placement.rotation_deg.allFinite() ||
-      !std::isfinite(placement.couch_angle_deg) || !std::isfinite(receptor_angle_deg))
-    throw UsageError("the setup error, the couch angle and the receptor angle must be finite numbers");
+      !std::isfinite(placement.couch_angle_deg) || !std::isfinite(receptor_angle_deg) ||
+      !panel_fault.shift_mm.allFinite() || !panel_fault.turn_deg.allFinite())
+    throw UsageError("setup error, couch angle, receptor angle and the panel's fault must be finite numbers");
   if (!(std::abs(ct_tilt_deg) <= 30.0))
     throw UsageError(fmt::format("a CT tilt of {} degrees is not within 30", ct_tilt_deg));
   check_bends(bends, anatomy_name(anatomy), placement.patient_position);
@@ -206,6 +208,7 @@ BentPhantom phantom_of(const PhantomOptions& options, const Eigen::Vector3d& tar
       anatomy.couch_top_from_isocenter_mm = 123.0;
       anatomy.couch_width_mm = 400.0;
       break;
+    case PhantomOptions::Anatomy::kBalls: parts = ball_parts(isocenter, options.seed); break;
   }
   if (!options.bends.empty()) make_vertebrae_differ(parts, options.seed);
   return bent(std::move(parts), options.bends, anatomy);

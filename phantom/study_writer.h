@@ -15,11 +15,12 @@
 namespace isoshift {
 
 struct PhantomOptions {
-  enum class Anatomy { kHead, kSpine, kThorax };
+  enum class Anatomy { kHead, kSpine, kThorax, kBalls };
   Anatomy anatomy = Anatomy::kHead;
   Placement placement;                                  // how the patient lies, set-up error included
   std::vector<double> gantry_angles_deg = {0.0, 90.0};  // one X-ray each
   double receptor_angle_deg = 0.0;                      // of the imager's panel, about the central ray
+  PanelFault panel_fault;                               // of which the X-rays' files do not know
   double ct_tilt_deg = 0.0;                             // of the CT's slices about the patient's x axis
   double voxel_mm = 1.0;                                // of the CT, in plane; slices are 1.5 times as thick
   int image_pixels = 512;                               // along each edge; the panel is 410 mm wide

@@ -164,7 +164,15 @@ Eigen::Vector3d Imager::pixel_fixed_mm(double column, double row) const {
   const double turned_s = sin_deg(receptor_angle_deg), turned_c = cos_deg(receptor_angle_deg);
   const double right_mm = turned_c * along_rows_mm - turned_s * along_columns_mm;  // along the gantry's x axis
   const double up_mm = turned_s * along_rows_mm + turned_c * along_columns_mm;     // toward the gantry
-  return {-below_mm * s + right_mm * c, up_mm, -below_mm * c - right_mm * s};
+  // Turned by the fault and shifted, in the gantry's axes; the last is depth toward the source.
+  const Eigen::Vector3d& turn = fault.turn_deg;
+  const Eigen::Vector3d about_y(right_mm * cos_deg(turn.y()), up_mm, -right_mm * sin_deg(turn.y()));
+  const Eigen::Vector3d about_x(about_y.x(), cos_deg(turn.x()) * about_y.y() - sin_deg(turn.x()) * about_y.z(),
+                                sin_deg(turn.x()) * about_y.y() + cos_deg(turn.x()) * about_y.z());
+  const double x = cos_deg(turn.z()) * about_x.x() - sin_deg(turn.z()) * about_x.y() + fault.shift_mm.x();
+  const double y = sin_deg(turn.z()) * about_x.x() + cos_deg(turn.z()) * about_x.y() + fault.shift_mm.y();
+  const double z = about_x.z() - below_mm;
+  return {c * x + s * z, y, c * z - s * x};
 }
 
 Image<float> simulate_xray(const std::vector<Shape>& shapes, const Placement& placement, const Imager& imager,

@@ -28,6 +28,14 @@ struct Placement {
   Eigen::Vector3d fixed_from_patient(const Eigen::Vector3d& point_patient_mm) const;
 };
 
+// How the panel really lies against what the X-rays' files say, along and about the gantry's axes: x to the right and
+// y toward the gantry with the source at the top, z toward the source. First it is turned about its center, by y, then
+// x, then z.
+struct PanelFault {
+  Eigen::Vector2d shift_mm = Eigen::Vector2d::Zero();  // along x, y
+  Eigen::Vector3d turn_deg = Eigen::Vector3d::Zero();  // about x, y (tilts), z (the panel's roll)
+};
+
 // An imager at some gantry angle, its panel perpendicular to the central ray and centered on it.
 struct Imager {
   double gantry_angle_deg = 0.0;  // clockwise seen facing the gantry: 90 puts the source at the viewer's right
@@ -38,6 +46,7 @@ struct Imager {
   double receptor_angle_deg = 0.0;  // the panel's turn about the central ray, counter-clockwise seen from the source
   double scatter_share = 0.12;      // of the primary beam, reaching the panel blurred
   bool is_megavoltage = false;      // 6 MV instead of 120 kVp
+  PanelFault fault;
 
   Eigen::Vector3d source_fixed_mm() const;
   // Center of a pixel; column 0 at the left and row 0 at the top, seen from the source with the gantry at the top.

@@ -70,6 +70,8 @@ void report_uncertainty(const RendererPyramid& renderers, const FixedViews& view
   for (const StageReport& stage : result.stages)
     if (result.uncertainty && stage.spread_mm)
       result.uncertainty = widened_to_spread(*result.uncertainty, *stage.spread_mm, *stage.spread_rad);
+  result.by_imagers = options.by_imagers;
+  if (result.uncertainty && result.by_imagers) result.uncertainty->covariance += result.by_imagers->covariance;
 }
 
 }  // namespace
@@ -130,6 +132,8 @@ RegistrationResult register_views(const RendererPyramid& renderers, std::span<co
       contradictions(renderers, fixed, start_room_from_patient, result.actual_room_from_patient, last, options.dof);
   for (std::size_t view = 0; view < found_alone.of_views.size(); ++view)
     result.views[view].contradiction = found_alone.of_views[view];
+  for (std::size_t view = 0; view < found_alone.wanted.size(); ++view)
+    result.views[view].wanted = found_alone.wanted[view];
   result.turn = std::move(found_alone.turn);
   result.wanted_by_views = std::move(found_alone.wanted_room_from_patient);
 

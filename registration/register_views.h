@@ -37,6 +37,8 @@ struct RegistrationOptions {
   bool check_vertebrae = false;             // along the spine; on request, for it takes as long as the registration
   RectanglesByLabel rectangles;             // of the views with these labels: nothing else of them is compared
   const ProjectedRegion* region = nullptr;  // borrowed; what of the views is compared. nullptr: all
+  // How far errors of the imagers may have put the pose off: as Uncertainty, and added to what the images say.
+  std::optional<Uncertainty> by_imagers;
   std::optional<Eigen::Vector3d> target_patient_mm;  // where its place must be certain; nothing: at the isocenter
 
   // Throws UsageError naming the field and its value.

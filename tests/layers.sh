@@ -58,10 +58,12 @@ may_include tests/real_data/campaign base io/dicom phantom/dicom tests/support
 only_in 'dcmtk/' io phantom
 only_in 'opencv2/' registration/preprocess/
 only_in 'nlopt' registration/optimizer.cc
+only_in 'ceres/' registration/imager/bundle_adjustment.cc
 only_in '(EGL|GL|epoxy|glm)/' drr registration/similarity/
 only_in 'CLI/' cli
 only_in 'curl/' io/network/
-only_in 'boost/' serve/http_server.cc
+only_in 'boost/(asio|beast)' serve/http_server.cc
+only_in 'boost/math' setup/agreement.cc workflow/audit_setup/
 only_in 'security/' serve/pam.cc
 only_in '(cairo|pango)' io/report/ io/objects/image_files.cc
 

@@ -16,6 +16,8 @@ void add_report_command(CLI::App& app, Console& console, int& exit_status);
 void add_drr_command(CLI::App& app, Console& console, int& exit_status);
 void add_phantom_command(CLI::App& app, Console& console, int& exit_status);
 void add_track_command(CLI::App& app, Console& console, int& exit_status);
+void add_commission_command(CLI::App& app, Console& console, int& exit_status);
+void add_geometry_command(CLI::App& app, Console& console, int& exit_status);
 void add_scout_command(CLI::App& app, Console& console, int& exit_status);
 void add_predict_command(CLI::App& app, Console& console, int& exit_status);
 void add_watch_command(CLI::App& app, Console& console, int& exit_status);
@@ -24,6 +26,7 @@ void add_view_command(CLI::App& app, Console& console, int& exit_status);
 void add_delete_command(CLI::App& app, Console& console, int& exit_status);
 void add_release_command(CLI::App& app, Console& console, int& exit_status);
 void add_audit_command(CLI::App& app, Console& console, int& exit_status);
+void add_audit_setup_command(CLI::App& app, Console& console, int& exit_status);
 void add_evaluate_command(CLI::App& app, Console& console, int& exit_status);
 void add_bench_command(CLI::App& app, Console& console, int& exit_status);
 

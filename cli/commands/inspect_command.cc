@@ -12,6 +12,7 @@
 #include "registration/gpu_check.h"
 #include "workflow/register/rendering_options.h"
 #include "workflow/register/study_bodies.h"
+#include "workflow/register/study_options.h"
 
 namespace isoshift {
 namespace {
@@ -76,6 +77,8 @@ std::string describe_rt_image(RtImage image, const std::optional<std::string>& p
       line("isocenter in that frame", or_missing(image.isocenter_mm, "mm")) +
       line("acquired", or_missing(image.acquisition_date) + " " + or_missing(image.acquisition_time));
   for (const std::string& applied_override : applied.overrides) text += line("profile", applied_override);
+  if (image.imager && !image.imager->is_corrected)
+    text += line("profile", "the imager's errors are not corrected; they widen the uncertainty of every registration");
   for (const std::string& problem : image.jaws.problems) text += line("note", problem);
   const auto missing = missing_attributes(image);
   for (const MissingAttribute& attribute : missing)
@@ -244,7 +247,7 @@ void run_inspect_devices(Console& console) {
 void add_inspect_command(CLI::App& app, Console& console, int&) {
   struct Options {
     std::vector<std::filesystem::path> paths;
-    std::filesystem::path machine, bodies;
+    std::filesystem::path machine, machine_key, bodies;
     bool devices = false, overwrite = false;
   };
   auto options = std::make_shared<Options>();
@@ -256,6 +259,8 @@ void add_inspect_command(CLI::App& app, Console& console, int&) {
       "bodies\n  isoshift inspect --devices");
   auto* paths = command->add_option("path", options->paths, "Files or folders")->type_name("PATH");
   command->add_option("--machine", options->machine, "Machine profile to apply to the X-rays before they are shown")
+      ->type_name("FILE");
+  command->add_option("--machine-key", options->machine_key, "Public key by which the profile must be signed")
       ->type_name("FILE");
   auto* bodies = command
                      ->add_option("--bodies", options->bodies,
@@ -270,9 +275,7 @@ void add_inspect_command(CLI::App& app, Console& console, int&) {
     if (!options->bodies.empty())
       return run_inspect_bodies(options->paths, options->bodies, options->overwrite, console);
     if (!options->devices)
-      return run_inspect(
-          options->paths,
-          options->machine.empty() ? std::nullopt : std::optional(read_machine_profile(options->machine)), console);
+      return run_inspect(options->paths, named_machine(options->machine, options->machine_key), console);
     run_inspect_devices(console);
   });
 }

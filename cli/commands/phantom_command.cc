@@ -18,13 +18,18 @@ struct PhantomCommandOptions {
   std::vector<std::string> bends;
   std::vector<double> translation_mm = {4.3, -6.1, 3.2};
   std::vector<double> rotation_deg = {1.4, -2.1, 1.8};
+  std::vector<double> panel_shift_mm = {0.0, 0.0};
+  std::vector<double> panel_turn_deg = {0.0, 0.0, 0.0};
   bool overwrite = false;
 };
 
 void run_phantom(PhantomCommandOptions options, Console& console) {
   PhantomOptions& phantom = options.phantom;
   using enum PhantomOptions::Anatomy;
-  phantom.anatomy = options.anatomy == "head" ? kHead : options.anatomy == "spine" ? kSpine : kThorax;
+  for (const auto anatomy : {kHead, kSpine, kThorax, kBalls})
+    if (anatomy_name(anatomy) == options.anatomy) phantom.anatomy = anatomy;
+  phantom.panel_fault = {.shift_mm = Eigen::Vector2d(options.panel_shift_mm.data()),
+                         .turn_deg = Eigen::Vector3d(options.panel_turn_deg.data())};
   for (const std::string& bend : options.bends) phantom.bends.push_back(Bend::from_text(bend));
   Notes notes;
   if (!options.trace.empty()) phantom.breathing.trace = read_motion_trace(options.trace, notes);
@@ -58,8 +63,10 @@ void add_phantom_command(CLI::App& app, Console& console, int&) {
       "  isoshift phantom -o breathing --anatomy thorax --breathing 30 --image-pixels 256 --voxel-mm 2 --translation "
       "0,0,0 --rotation 0,0,0");
   command->add_option("-o,--output", options->output, "Folder to make")->required()->type_name("FOLDER");
-  command->add_option("--anatomy", options->anatomy, "Part of the body")
-      ->check(CLI::IsMember({"head", "spine", "thorax"}))
+  command
+      ->add_option("--anatomy", options->anatomy,
+                   "Part of the body, or steel balls in a block for the geometry of imagers")
+      ->check(CLI::IsMember({"head", "spine", "thorax", "balls"}))
       ->capture_default_str();
   command->add_option("--translation", options->translation_mm, "Setup error, mm, IEC 61217 fixed")
       ->delimiter(',')
@@ -86,6 +93,18 @@ void add_phantom_command(CLI::App& app, Console& console, int&) {
                    "X-Ray Image Receptor Angle: the panel's turn about the central ray, IEC 61217")
       ->type_name("DEG")
       ->capture_default_str();
+  command
+      ->add_option("--panel-shift", options->panel_shift_mm,
+                   "How far the panel really lies off along the gantry's x and y, mm: the X-rays' files do not say so")
+      ->delimiter(',')
+      ->expected(2)
+      ->type_name("X,Y");
+  command
+      ->add_option("--panel-turn", options->panel_turn_deg,
+                   "The same about the gantry's x and y (tilts) and z (roll), degrees")
+      ->delimiter(',')
+      ->expected(3)
+      ->type_name("RX,RY,RZ");
   command->add_option("--ct-tilt", options->phantom.ct_tilt_deg, "Tilt of the CT's slices about the patient's x axis")
       ->type_name("DEG")
       ->capture_default_str();

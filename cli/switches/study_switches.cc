@@ -88,6 +88,12 @@ void add_study_switches(CLI::App& command, StudyOptions& options) {
                   "Machine profile: what a machine's files lack or say wrongly (docs/machine-profile.md)")
       ->type_name("FILE")
       ->group(lacking);
+  command
+      .add_option("--machine-key", options.machine_key,
+                  "Public key by which FILE.sig beside the machine profile must be signed (a profile that corrects an "
+                  "imager needs it)")
+      ->type_name("FILE")
+      ->group(lacking);
   add_allow_option(command, options.allow)->group(lacking);
 }
 

@@ -65,6 +65,11 @@ void write_drr_image(const Study& study, std::size_t index, const Image<float>& 
   const RtImage& image = study.rt_images[index];
   if (image.pixel_from_room)
     throw Error(fmt::format("{}: its geometry is a projection matrix, which an RT Image cannot hold", image.label));
+  if (image.imager && image.imager->is_corrected)
+    throw Error(
+        fmt::format("{}: the machine profile corrects where its receptor lies, which the header of an RT Image "
+                    "cannot say: leave correct_imager out of the profile",
+                    image.label));
   const bool is_as_planned = setup_error.isApprox(Eigen::Isometry3d::Identity(), 1e-12);
   DicomFile file;
   DicomItem dataset = file.dataset();

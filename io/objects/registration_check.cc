@@ -251,12 +251,14 @@ class Checker {
       uid_of(study, DCM_StudyInstanceUID, "a referenced study");
       list_series(study);
     }
+    result_.referenced_instance_uids = listed;
     const auto check_images_of = [&](const DicomItem& parent, const std::string& name) {
       int missing = 0;
       std::string first;
       for (const DicomItem& image : parent.items(DCM_ReferencedImageSequence)) {
         uid_of(image, DCM_ReferencedSOPClassUID, name);
         const std::string uid = uid_of(image, DCM_ReferencedSOPInstanceUID, name);
+        result_.referenced_instance_uids.insert(uid);
         if (uid.empty() || listed.contains(uid)) continue;
         if (missing++ == 0) first = uid;
       }

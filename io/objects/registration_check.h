@@ -5,6 +5,7 @@
 #include <Eigen/Geometry>
 #include <filesystem>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -20,10 +21,11 @@ struct RegistrationFinding {
 struct CheckedRegistration {
   std::filesystem::path path;
   Identity identity;
-  bool is_by_isoshift = false;            // its Manufacturer says so
-  std::string registered_frame_uid;       // dataset-level Frame of Reference UID: usually the planning CT's
-  std::string source_frame_uid;           // of the item that is not the identity
-  bool source_is_that_of_images = false;  // that item lists images: their frame's origin may lie anywhere
+  bool is_by_isoshift = false;                     // its Manufacturer says so
+  std::string registered_frame_uid;                // dataset-level Frame of Reference UID: usually the planning CT's
+  std::string source_frame_uid;                    // of the item that is not the identity
+  bool source_is_that_of_images = false;           // that item lists images: their frame's origin may lie anywhere
+  std::set<std::string> referenced_instance_uids;  // of all images and objects that it names anywhere
   // Takes a point of the source frame to the registered one (PS3.3 C.20.2.1.1), as it stands in the file, if there is
   // one such matrix of 16 numbers. It need not be rigid: the findings say.
   std::optional<Eigen::Affine3d> registered_from_source;

@@ -124,6 +124,15 @@ void draw_couch_shift(Canvas& canvas, const RoomDrawing& room, const SetupResult
 
 }  // namespace
 
+Rgb verdict_color(Verdict verdict) {
+  switch (verdict) {
+    case Verdict::kAccepted: return color::kBlue;
+    case Verdict::kReview: return color::kOrange;
+    case Verdict::kRejected: return color::kVermilion;
+  }
+  return color::kBlack;
+}
+
 std::string caption_of(ViewTile tile) {
   switch (tile) {
     case ViewTile::kXray: return "X-ray";

@@ -10,6 +10,9 @@
 
 namespace isoshift {
 
+// In which a verdict is marked.
+Rgb verdict_color(Verdict verdict);
+
 // One of the pictures of a view.
 enum class ViewTile { kXray, kDrrPlanned, kOverlayPlanned, kDrrFound, kOverlayFound };
 inline constexpr std::array kViewTiles = {ViewTile::kXray, ViewTile::kDrrPlanned, ViewTile::kOverlayPlanned,

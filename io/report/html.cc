@@ -18,6 +18,19 @@ std::string html_escaped(std::string_view text) {
   return result;
 }
 
+std::string percent_encoded(std::string_view path) {
+  constexpr std::string_view kAsIs = "-._~/";
+  std::string result;
+  for (const char c : path) {
+    const bool is_letter = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9');
+    if (is_letter || kAsIs.find(c) != std::string_view::npos)
+      result += c;
+    else
+      result += fmt::format("%{:02X}", static_cast<unsigned char>(c));
+  }
+  return result;
+}
+
 std::string data_uri(std::string_view type, std::string_view bytes) {
   std::string base64(4 * ((bytes.size() + 2) / 3) + 1, '\0');
   const int size =

@@ -8,6 +8,9 @@ namespace isoshift {
 
 std::string html_escaped(std::string_view text);
 
+// A relative path as the value of an href (RFC 3986): a name with "#", "?", "%", ":", spaces or umlauts stays a name.
+std::string percent_encoded(std::string_view path);
+
 // Replaces every occurrence of a placeholder by a text.
 void fill(std::string& html, std::string_view placeholder, const std::string& by);
 

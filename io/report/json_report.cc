@@ -94,12 +94,15 @@ Json sigma_json(bool is_known, const std::array<std::optional<double>, 3>& compo
   return array;
 }
 
-Json covariance_json(const SetupResult& report) {
-  if (!report.uncertainty) return nullptr;
+template <class Matrix>
+Json rows_of(const Matrix& matrix) {
   Json rows = Json::array();
-  for (const auto& row : report.uncertainty->covariance.rowwise())
-    rows.push_back(std::vector<double>(row.begin(), row.end()));
+  for (const auto& row : matrix.rowwise()) rows.push_back(std::vector<double>(row.begin(), row.end()));
   return rows;
+}
+
+Json by_imagers_json(const std::optional<Uncertainty>& by_imagers) {
+  return by_imagers ? Json{{"covariance", rows_of(by_imagers->covariance)}} : Json(nullptr);
 }
 
 Json stage_json(const StageReport& stage) {
@@ -257,6 +260,13 @@ Json irradiated_field_json(const IrradiatedField& field) {
           {"doubt", or_null(field.doubt)}};
 }
 
+Json wanted_json(const std::optional<WantedMotion>& wanted) {
+  if (!wanted) return nullptr;
+  return {{"translation_mm", array_of(Eigen::Vector3d(wanted->motion.head<3>()))},
+          {"rotation_deg", array_of(Eigen::Vector3d(wanted->motion.tail<3>().unaryExpr(&deg_from_rad)))},
+          {"covariance", rows_of(wanted->covariance)}};
+}
+
 Json view_json(const SetupResult::View& view) {
   const std::optional<LeftOutView>& left_out = view.match.left_out;
   const std::optional<Contradiction>& contradiction = view.match.contradiction;
@@ -269,6 +279,10 @@ Json view_json(const SetupResult::View& view) {
           {"reported_values_origin", view.origin},
           {"beam", view.is_megavoltage ? "MV" : "kV"},
           {"gantry_deg", or_null(view.gantry_deg)},
+          {"radiation_machine", view.machine},
+          {"pixel_from_room", view.pixel_from_room ? rows_of(*view.pixel_from_room) : Json(nullptr)},
+          {"sid_mm", or_null(view.sid_mm)},
+          {"receptor_corrected", view.is_receptor_corrected},
           {"source_room_mm", array_of(view.source_room_mm)},
           {"pixel_mm", view.pixel_mm},
           {"columns", view.columns},
@@ -279,6 +293,7 @@ Json view_json(const SetupResult::View& view) {
           {"left_out_deg", left_out ? Json(deg_from_rad(left_out->angle_rad)) : Json(nullptr)},
           {"contradiction_mm", contradiction ? Json(contradiction->mm) : Json(nullptr)},
           {"contradiction_sigma_mm", contradiction ? Json(contradiction->sigma_mm) : Json(nullptr)},
+          {"wanted", wanted_json(view.match.wanted)},
           {"irradiated_field", irradiated_field_json(view.match.field)},
           {"parts", parts_json(view)},
           {"picture", picture_json(view.picture)}};
@@ -323,7 +338,8 @@ std::string json_report(const SetupResult& report) {
                {"uncertainty",
                 {{"translation_mm", sigma_json(report.uncertainty.has_value(), shown.sigma_mm)},
                  {"rotation_deg", sigma_json(report.uncertainty.has_value(), shown.sigma_deg)},
-                 {"covariance", covariance_json(report)},
+                 {"covariance", report.uncertainty ? rows_of(report.uncertainty->covariance) : Json(nullptr)},
+                 {"by_imagers", by_imagers_json(report.by_imagers)},
                  {"unobservable", unobservable_json(report)}}},
                {"views", Json::array()},
                {"stages", Json::array()},

@@ -5,30 +5,24 @@
 #include "io/report/drawings.h"
 #include "io/report/formats.h"
 #include "io/report/moved_bodies.h"
+#include "io/report/pdf_pages.h"
 #include "setup/shown_shift.h"
 
 namespace isoshift {
 namespace {
 
-constexpr double kPageWidth = 595.28, kPageHeight = 841.89;  // A4, points
-constexpr double kMargin = 34.0, kWidth = kPageWidth - 2.0 * kMargin;
-constexpr double kBottom = kPageHeight - 40.0;  // below it the footer
+constexpr double kMargin = PdfPages::kMargin, kWidth = PdfPages::kWidth, kBottom = PdfPages::kBottom;
 constexpr double kGap = 7.0;
 constexpr std::size_t kReasonsOnFirstPage = 4;
 
-Rgb color_of(Verdict verdict) {
-  switch (verdict) {
-    case Verdict::kAccepted: return color::kBlue;
-    case Verdict::kReview: return color::kOrange;
-    case Verdict::kRejected: return color::kVermilion;
-  }
-  return color::kBlack;
-}
-
 class PdfReport {
  public:
-  PdfReport(const SetupResult& report, const ReportPage& page) : report_(report), page_(page) {
-    canvas_.describe(page.title, page.program);
+  PdfReport(const SetupResult& report, const ReportPage& page)
+      : report_(report),
+        page_(page),
+        pages_(page.title, page.program,
+               fmt::format("{}  ·  patient ID {}", page.program, printable(report.identity.patient_id))) {
+    y_ = kMargin - 6.0;
   }
 
   std::string write() {
@@ -40,47 +34,13 @@ class PdfReport {
     const std::size_t shown = pictures(0, kBottom - sign_off_height() - conventions_height() - 2.0 * kGap, false);
     sign_off();
     conventions();
-    footer();
-    canvas_.new_page();
-    y_ = kMargin;
+    pages_.next_page();
     if (shown < report_.views.size()) pictures(shown, kBottom, true);
     details();
-    footer();
-    return canvas_.finish();
+    return pages_.finish();
   }
 
  private:
-  // Text that is broken into lines at a width, from there on downward.
-  void paragraph(const std::string& text, const TextStyle& style, double indent = 0.0) {
-    TextStyle broken = style;
-    broken.width = kWidth - indent;
-    const double height = canvas_.text_height(text, broken);
-    if (y_ + height > kBottom) next_page();
-    y_ += canvas_.text(kMargin + indent, y_, text, broken);
-  }
-
-  void next_page() {
-    footer();
-    canvas_.new_page();
-    y_ = kMargin;
-  }
-
-  void footer() {
-    ++page_number_;
-    const double y = kPageHeight - 30.0;
-    canvas_.line({kMargin, y - 3.0}, {kMargin + kWidth, y - 3.0}, {.color = color::kLightGray});
-    canvas_.text(kMargin, y, page_.disclaimer, {.size = 7.5, .bold = true});
-    constexpr double kBegin = 235.0;
-    canvas_.text(kMargin + kBegin, y,
-                 fmt::format("page {}  ·  {}  ·  patient ID {}", page_number_, page_.program,
-                             printable(report_.identity.patient_id)),
-                 {.size = 7.0,
-                  .color = color::kGray,
-                  .align = TextStyle::Align::kRight,
-                  .width = kWidth - kBegin,
-                  .one_line = true});
-  }
-
   void header() {
     canvas_.text(kMargin, y_, page_.title, {.size = 17.0, .bold = true});
     canvas_.text(kMargin + kWidth, y_ + 2.0, page_.program,
@@ -124,7 +84,7 @@ class PdfReport {
     line(page_.action_words, 9.5, page_.action == Action::kExceeds);
     for (const std::string& reason : page_.action_reasons) line("· " + reason, 8.5, false);
     y_ += 3.0;
-    canvas_.fill(kMargin, begin, 6.0, y_ - begin, color_of(page_.verdict));
+    canvas_.fill(kMargin, begin, 6.0, y_ - begin, verdict_color(page_.verdict));
     canvas_.polygon(box(kMargin, begin, kWidth, y_ - begin), {.color = color::kLightGray});
     y_ += kGap;
   }
@@ -245,7 +205,7 @@ class PdfReport {
       const double height = view_height(report_.views[n], fitting);
       if (y_ + height > limit + 0.5) {
         if (!may_break_page) break;
-        next_page();
+        pages_.next_page();
       }
       draw_view(canvas_, kMargin + 0.5 * (kWidth - fitting), y_, fitting, report_.views[n]);
       y_ += height;
@@ -308,21 +268,21 @@ class PdfReport {
 
   void list(const std::string& title, const std::vector<std::string>& lines) {
     if (lines.empty()) return;
-    if (y_ + 30.0 > kBottom) next_page();
+    pages_.need(30.0);
     y_ += canvas_.text(kMargin, y_, title, {.size = 9.5, .bold = true}) + 1.0;
-    for (const std::string& line : lines) paragraph("· " + line, {.size = 7.5}, 4.0);
+    for (const std::string& line : lines) pages_.paragraph("· " + line, {.size = 7.5}, 4.0);
     y_ += kGap;
   }
 
   void section(const ReportPage::Section& section) {
-    if (y_ + 30.0 > kBottom) next_page();
+    pages_.need(30.0);
     y_ += canvas_.text(kMargin, y_, section.title, {.size = 9.5, .bold = true}) + 1.0;
     const double names = section.title == kMovedTitle ? 150.0 : 108.0;  // its names are long, and no row may break
     for (const ReportPage::Row& row : section.rows) {
       const TextStyle name{.size = 7.5, .color = color::kGray, .width = names};
       const TextStyle value{.size = 7.5, .width = kWidth - names - 8.0};
       const double height = std::max(canvas_.text_height(row.name, name), canvas_.text_height(row.value, value));
-      if (y_ + height > kBottom) next_page();
+      pages_.need(height);
       canvas_.text(kMargin + 4.0, y_, row.name, name);
       canvas_.text(kMargin + names + 8.0, y_, row.value, value);
       y_ += height + 0.5;
@@ -339,7 +299,7 @@ class PdfReport {
       section(each);
       if (each.title == "Search") {
         constexpr double kCurve = 95.0;
-        if (y_ + kCurve > kBottom) next_page();
+        pages_.need(kCurve);
         draw_convergence(canvas_, kMargin + 4.0, y_, kWidth - 8.0, kCurve, report_.stages);
         y_ += kCurve + kGap;
       }
@@ -349,9 +309,9 @@ class PdfReport {
 
   const SetupResult& report_;
   const ReportPage& page_;
-  Canvas canvas_{Canvas::Kind::kPdf, kPageWidth, kPageHeight};
-  double y_ = kMargin - 6.0;
-  int page_number_ = 0;
+  PdfPages pages_;
+  Canvas& canvas_ = pages_.canvas();
+  double& y_ = pages_.y();
 };
 
 }  // namespace

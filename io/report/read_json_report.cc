@@ -35,6 +35,15 @@ Eigen::Matrix3d rotation_from(const Json& rows) {
   return rotation;
 }
 
+template <int kRows, int kColumns>
+Eigen::Matrix<double, kRows, kColumns> matrix_from(const Json& rows) {
+  Eigen::Matrix<double, kRows, kColumns> matrix;
+  for (Eigen::Index row = 0; row < kRows; ++row)
+    for (Eigen::Index column = 0; column < kColumns; ++column)
+      matrix(row, column) = or_nan(rows.at(static_cast<std::size_t>(row)).at(static_cast<std::size_t>(column)));
+  return matrix;
+}
+
 Start start_from(const Json& json) {
   Start start{.file = json.at("file"), .sha256 = json.at("sha256"), .set_by = text_from(json.at("set_by"))};
   const Json& error = json.at("setup_error");
@@ -75,6 +84,13 @@ IrradiatedField irradiated_field_from(const Json& json) {
   return field;
 }
 
+WantedMotion wanted_from(const Json& json) {
+  WantedMotion wanted{.covariance = matrix_from<6, 6>(json.at("covariance"))};
+  wanted.motion << vector_from<3>(json.at("translation_mm")),
+      vector_from<3>(json.at("rotation_deg")).unaryExpr(&rad_from_deg);
+  return wanted;
+}
+
 ViewMatch match_from(const Json& json) {
   ViewMatch match{.label = json.at("label"),
                   .similarity_start = or_nan(json.at("similarity_start")),
@@ -84,6 +100,8 @@ ViewMatch match_from(const Json& json) {
   // Results of before 2026-11-23 do not say.
   if (json.contains("contradiction_mm") && !json.at("contradiction_mm").is_null())
     match.contradiction = {.mm = json.at("contradiction_mm"), .sigma_mm = json.at("contradiction_sigma_mm")};
+  // Results of before 2026-11-27 do not say.
+  if (const Json wanted = json.value("wanted", Json()); !wanted.is_null()) match.wanted = wanted_from(wanted);
   if (json.contains("irradiated_field")) match.field = irradiated_field_from(json.at("irradiated_field"));
   for (const Json& part : json.at("parts"))
     match.consistency.parts.push_back({.center_px = vector_from<2>(part.at("center_px")),
@@ -105,6 +123,7 @@ SetupResult::View view_from(const Json& json) {
                          .acquired = json.at("acquired"),
                          .origin = json.at("reported_values_origin"),
                          .gantry_deg = number_from(json.at("gantry_deg")),
+                         .machine = json.value("radiation_machine", ""),
                          .source_room_mm = vector_from<3>(json.at("source_room_mm")),
                          .pixel_mm = json.at("pixel_mm"),
                          .columns = json.at("columns"),
@@ -112,6 +131,11 @@ SetupResult::View view_from(const Json& json) {
                          .is_megavoltage = json.at("beam") == "MV",
                          .match = match_from(json),
                          .picture = picture_from(json.at("picture"))};
+  // Results of before 2026-11-27 do not say.
+  if (const Json matrix = json.value("pixel_from_room", Json()); !matrix.is_null())
+    view.pixel_from_room = matrix_from<3, 4>(matrix);
+  view.sid_mm = number_from(json.value("sid_mm", Json()));
+  view.is_receptor_corrected = json.value("receptor_corrected", false);
   return view;
 }
 
@@ -214,12 +238,7 @@ std::optional<Uncertainty> uncertainty_from(const Json& json) {
   if (!json.contains("covariance"))
     return uncertainty_of_independent_axes(known_from(json.at("translation_mm")),
                                            known_from(json.at("rotation_deg")).unaryExpr(&rad_from_deg));
-  Uncertainty uncertainty;
-  for (std::size_t row = 0; row < 6; ++row)
-    for (std::size_t column = 0; column < 6; ++column)
-      uncertainty.covariance(static_cast<Eigen::Index>(row), static_cast<Eigen::Index>(column)) =
-          or_nan(json.at("covariance").at(row).at(column));
-  return uncertainty;
+  return Uncertainty{.covariance = matrix_from<6, 6>(json.at("covariance"))};
 }
 
 Verdict verdict_from(const std::string& word) {
@@ -281,6 +300,9 @@ SetupResult report_from(const Json& json) {
   for (const Json& direction : uncertainty.at("unobservable"))
     report.unobservable_room.push_back(vector_from<3>(direction));
   report.uncertainty = uncertainty_from(uncertainty);
+  // Results of before 2026-11-27 do not say.
+  if (const Json by_imagers = uncertainty.value("by_imagers", Json()); !by_imagers.is_null())
+    report.by_imagers = Uncertainty{.covariance = matrix_from<6, 6>(by_imagers.at("covariance"))};
   report.translation_only = json.at("dof") == "translation";
   // Results of before 2026-11-25 do not say: they began at the planned pose, and were searched.
   if (const Json start = json.value("start", Json()); !start.is_null()) report.start = start_from(start);

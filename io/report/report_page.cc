@@ -331,7 +331,7 @@ ReportPage report_page(const SetupResult& report) {
   ReportPage page;
   page.title = "Patient setup shift";
   page.program = fmt::format("isoshift {} ({})", report.version, report.commit);
-  page.disclaimer = "Not for clinical use unless validated by the site.";
+  page.disclaimer = kDisclaimer;
   page.who = who(report, bent_words(shown, unit));
   page.verdict = report.verdict;
   page.verdict_words = fmt::format("{}: {}", upper_case(to_string(report.verdict)), meaning(report.verdict));

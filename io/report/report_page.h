@@ -24,6 +24,8 @@ struct Quantity {
   bool is_number = true;
 };
 
+inline constexpr const char* kDisclaimer = "Not for clinical use unless validated by the site.";
+
 struct ReportPage {
   struct Row {
     std::string name, value;

@@ -107,6 +107,24 @@ std::string field_words(const SetupResult::View& view) {
   return field.is_sure() ? words : words + "; not sure: " + printable(field.doubt);
 }
 
+// What errors of the imagers do to the result, or would do.
+std::string imager_words(const SetupResult& report) {
+  if (report.by_imagers) {
+    const Eigen::Vector3d mm = report.by_imagers->sigma_translation_mm(), rad = report.by_imagers->sigma_rotation_rad();
+    return fmt::format(
+        "what is left of their errors adds one sigma of ({:.2f}, {:.2f}, {:.2f}) mm, ({:.2f}, {:.2f}, "
+        "{:.2f}) deg along and about x, y, z, says the machine profile",
+        mm.x(), mm.y(), mm.z(), deg_from_rad(rad.x()), deg_from_rad(rad.y()), deg_from_rad(rad.z()));
+  }
+  double most = 0.0;
+  for (const SetupResult::View& view : report.views)
+    if (view.sid_mm) most = std::max(most, view.source_room_mm.norm() / *view.sid_mm);
+  constexpr const char* kUnknown = "as the files say; no machine profile tells of their errors";
+  if (most == 0.0) return kUnknown;
+  return fmt::format("{}. 1 mm by which a receptor is off would be {:.2f} mm of setup error, and is not in sigma",
+                     kUnknown, most);
+}
+
 ReportPage::Section checks_section(const SetupResult& report) {
   ReportPage::Section section{.title = "Checks"};
   for (const SetupResult::View& view : report.views) {
@@ -125,6 +143,7 @@ ReportPage::Section checks_section(const SetupResult& report) {
     if (!view.match.field.corners_px.empty())
       section.rows.push_back({"Field of " + printable(view.label), field_words(view)});
   }
+  section.rows.push_back({"Geometry of imagers", imager_words(report)});
   for (const Alternative& alternative : report.alternatives)
     section.rows.push_back({"If " + printable(alternative.description),
                             fmt::format("similarity {:.4f}, as it is {:.4f}{}", alternative.similarity,

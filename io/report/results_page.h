@@ -19,9 +19,20 @@ struct ResultsPage {
     std::vector<Cell> cells;
   };
 
+  // A part of the page above the table of results, with a heading of its own.
+  struct Section {
+    std::string title;
+    std::vector<std::string> lines;
+    std::vector<std::string> columns;
+    std::vector<std::vector<Cell>> rows;
+    std::vector<std::string> charts_svg;
+    std::vector<std::string> remarks;  // below the charts
+  };
+
   std::string title;
-  std::vector<std::string> summary;     // lines above the table
+  std::vector<std::string> summary;     // lines above everything else
   std::vector<std::string> charts_svg;  // below the summary
+  std::vector<Section> sections;
   std::vector<std::string> columns;
   std::vector<Row> rows;
   std::vector<Cell> pages;  // links to other pages like this one
@@ -29,5 +40,8 @@ struct ResultsPage {
 };
 
 std::string results_html(const ResultsPage& page);
+
+// A rounded number that is sorted by its value; without a number an empty cell.
+ResultsPage::Cell number_cell(const std::optional<double>& value, int decimals);
 
 }  // namespace isoshift

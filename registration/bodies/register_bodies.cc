@@ -6,6 +6,7 @@
 #include <chrono>
 
 #include "geometry/rotation.h"
+#include "geometry/seen_motions.h"
 #include "geometry/voxel_box.h"
 #include "registration/bodies/body_objective.h"
 #include "registration/bodies/carriers.h"
@@ -26,24 +27,13 @@ constexpr double kNearTargetMm = 30.0;
 constexpr double kConvergedMm = 0.1;
 constexpr double kVoxelMm = 1.4, kCoarseVoxelMm = 3.0;  // the CT is reduced to voxels up to these edges
 
-// How the target's center and points 30 mm from it move in a view with a motion of the target (in the room, about the
-// isocenter): two rows per point, mm at the isocenter.
-Eigen::MatrixXd seen_motions(const XrayView& view, const CarriedTarget& target, const Vector3d& center_room_mm) {
-  constexpr double kStep = 1e-3;
-  std::vector<Vector3d> points = {target.setup_error * center_room_mm};
+// The target's center, and points 30 mm from it.
+std::vector<Vector3d> points_near(const Vector3d& center_room_mm) {
+  std::vector<Vector3d> points = {center_room_mm};
   for (int axis = 0; axis < 3; ++axis)
     for (const double side : {-kNearTargetMm, kNearTargetMm})
       points.push_back(points.front() + side * Vector3d::Unit(axis));
-  Eigen::MatrixXd motions = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(2 * points.size()), 6);
-  for (std::size_t n = 0; n < points.size(); ++n)
-    for (int axis = 0; axis < 6; ++axis) {
-      const Vector3d way =
-          axis < 3 ? Vector3d(Vector3d::Unit(axis)) : Vector3d(Vector3d::Unit(axis - 3).cross(points[n]));
-      const auto here = view.project(points[n]), there = view.project(points[n] + kStep * way);
-      if (here && there)
-        motions.block<2, 1>(static_cast<Eigen::Index>(2 * n), axis) = (*there - *here) / (kStep * pixels_per_mm(view));
-    }
-  return motions;
+  return points;
 }
 
 // What the search found, as images and as certainty: of every view how well it matches, and what it alone would want.
@@ -63,6 +53,7 @@ void report_match(const BodyScene& scene, const Carriers& carriers, const Carrie
   const std::vector<double> at_base(PoseSlots::kParameters * slots.count(), 0.0);
   const BodyObjective::Parts parts = objective.parts(slots, at_base);
   const Eigen::MatrixXd target_motion = carriers.motion_per_motions() * slots.motions_of_bodies(at_base);
+  const std::vector<Vector3d> points = points_near(target.setup_error * center_room_mm);
   for (std::size_t view = 0; view < level.size(); ++view) {
     ViewMatch& match = result.views[view];
     match.left_out.reset();
@@ -73,11 +64,12 @@ void report_match(const BodyScene& scene, const Carriers& carriers, const Carrie
     const Eigen::MatrixXd held = alone.curvature + parts.springs.curvature +
                                  kSpring * Eigen::MatrixXd::Identity(alone.curvature.rows(), alone.curvature.cols());
     const auto solver = held.ldlt();
-    const Eigen::MatrixXd seen = seen_motions(level[view].view, target, center_room_mm) * target_motion;
-    const double points = 0.5 * static_cast<double>(seen.rows());
+    const Eigen::MatrixXd seen =
+        seen_motions(level[view].view, points) / pixels_per_mm(level[view].view) * target_motion;
+    const auto count = static_cast<double>(points.size());
     const Eigen::VectorXd wanted = solver.solve(alone.gradient + parts.springs.gradient);
-    match.contradiction = {.mm = (seen * wanted).norm() / std::sqrt(points),
-                           .sigma_mm = std::sqrt((seen * solver.solve(seen.transpose())).trace() / points)};
+    match.contradiction = {.mm = (seen * wanted).norm() / std::sqrt(count),
+                           .sigma_mm = std::sqrt((seen * solver.solve(seen.transpose())).trace() / count)};
   }
 }
 
@@ -245,6 +237,7 @@ void register_bodies(const BentPatient& patient, std::span<const FixedImage> ima
   const CarriedTarget target = carriers.target_at(found.poses, certainty);
   result.actual_room_from_patient = target.setup_error * planned_room_from_patient;
   result.uncertainty = Uncertainty{.covariance = target.covariance};
+  if (result.by_imagers) result.uncertainty->covariance += result.by_imagers->covariance;
   result.target_deformation_mm = target.deformation_mm;
   result.target_image_share = target.image_share;
   std::ranges::copy(found.stages, std::back_inserter(result.stages));

@@ -182,7 +182,9 @@ FixedImage prepare(const XrayImage& xray) {
   image.view = xray.view;
   image.label = xray.label;
   image.line_integral = line_integrals(xray);
-  image.irradiated = find_irradiated_field(xray, pixels_per_mm(xray.view));
+  // The collimator of a line scan bounds no field: it shapes the fan.
+  image.irradiated = xray.view.is_line_scan() ? IrradiatedField{.corners_px = receptor_corners(xray.view)}
+                                              : find_irradiated_field(xray, pixels_per_mm(xray.view));
   put_field(image);
   return image;
 }

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "geometry/rotation.h"
+#include "geometry/seen_motions.h"
 #include "geometry/target_error.h"
 #include "registration/objective.h"
 #include "registration/pose_objective.h"
@@ -15,6 +16,7 @@ namespace {
 
 // Of gradient correlation per mm^2 of a parameter: 0.001 at 10 mm. What a view sees holds it a hundred times as firmly.
 constexpr double kSpring = 1e-5;
+constexpr double kWeakSpring = 1e-7;  // 0.001 at 100 mm
 constexpr double kReachMm = 15.0, kFirstStepMm = 1.0;
 
 // Gradient correlation less the spring, on top of a pose.
@@ -62,24 +64,13 @@ std::vector<double> wanted_alone(Objective& objective, const Renderer& renderer,
   return maximize_poses(held, renderer, std::span(&options, 1)).front().best;
 }
 
-// How the standard targets move in a view with every parameter: two rows per target, mm at the isocenter.
-Eigen::MatrixXd seen_motions(const XrayView& view, const Eigen::Isometry3d& setup_error, std::size_t axes) {
-  constexpr double kStepMm = 0.1;
-  const std::vector<Eigen::Vector3d> targets = standard_targets_mm();
-  Eigen::MatrixXd motions =
-      Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(2 * targets.size()), static_cast<Eigen::Index>(axes));
-  for (std::size_t axis = 0; axis < axes; ++axis) {
-    std::vector<double> step(axes);
-    step[axis] = kStepMm;
-    const Eigen::Isometry3d moved = setup_error_from_parameters(step) * setup_error;
-    for (std::size_t n = 0; n < targets.size(); ++n) {
-      const auto here = view.project(setup_error * targets[n]), there = view.project(moved * targets[n]);
-      if (here && there)
-        motions.block<2, 1>(static_cast<Eigen::Index>(2 * n), static_cast<Eigen::Index>(axis)) =
-            (*there - *here) / (kStepMm * pixels_per_mm(view));
-    }
-  }
-  return motions;
+// How a view shows the standard targets with every parameter: two rows per target, mm at the isocenter.
+Eigen::MatrixXd seen_of_parameters(const XrayView& view, const Eigen::Isometry3d& setup_error, std::size_t axes) {
+  std::vector<Eigen::Vector3d> points = standard_targets_mm();
+  for (Eigen::Vector3d& point : points) point = setup_error * point;
+  SeenMotions motions = seen_motions(view, points) / pixels_per_mm(view);
+  motions.rightCols<3>() /= kLeverMm;
+  return motions.leftCols(static_cast<Eigen::Index>(axes));
 }
 
 // What one view alone wants, on top of the pose of all.
@@ -97,6 +88,16 @@ std::vector<double> without_translation_along(const Eigen::Vector3d& axis, const
   Eigen::Map<Eigen::Vector3d> translation(without.data());
   translation -= translation.dot(axis) * axis;
   return without;
+}
+
+// What the view would want if no spring held it. The search ended where curvature and spring balance.
+WantedMotion without_spring(const std::vector<double>& parameters, const PoseInformation& information) {
+  const Eigen::Map<const Eigen::VectorXd> held(parameters.data(), static_cast<Eigen::Index>(parameters.size()));
+  Eigen::Matrix<double, 6, 1> units = Eigen::Matrix<double, 6, 1>::Ones();
+  units.tail<3>() /= kLeverMm;
+  return {.motion = units.asDiagonal() * information.held_curvature(kWeakSpring).inverse() *
+                    information.held_curvature(kSpring) * held,
+          .covariance = units.asDiagonal() * information.covariance(kWeakSpring) * units.asDiagonal()};
 }
 
 TurnBetweenViews turn_between(const std::vector<WantedAlone>& views, const Eigen::Isometry3d& room_from_patient) {
@@ -146,12 +147,14 @@ Contradictions contradictions(const RendererPyramid& renderers, const FixedViews
     Objective objective(
         renderer, std::span(&image, 1), room_from_patient,
         {.similarity = SimilarityKind::kGradientCorrelation, .pixel_fraction = 0.5, .min_pixels = 6000});
+    const PoseInformation information = pose_information(objective, room_from_patient, dof == Dof::kTranslation);
     alone.push_back({.looks_along = image.view.central_direction_room(),
                      .parameters = wanted_alone(objective, renderer, room_from_patient, dof),
-                     .covariance = pose_covariance(objective, room_from_patient, dof == Dof::kTranslation, kSpring)});
+                     .covariance = information.covariance(kSpring)});
     const WantedAlone& wanted = alone.back();
+    if (dof == Dof::kRigid) result.wanted.push_back(without_spring(wanted.parameters, information));
     result.wanted_room_from_patient.push_back(setup_error_from_parameters(wanted.parameters) * room_from_patient);
-    const Eigen::MatrixXd motions = seen_motions(image.view, error, wanted.parameters.size());
+    const Eigen::MatrixXd motions = seen_of_parameters(image.view, error, wanted.parameters.size());
     const Eigen::Map<const Eigen::VectorXd> parameters(wanted.parameters.data(),
                                                        static_cast<Eigen::Index>(wanted.parameters.size()));
     result.of_views.push_back(

@@ -42,6 +42,7 @@ struct ViewsApart {
 struct Contradictions {
   std::vector<Contradiction> of_views;                      // empty for a single view
   std::vector<Eigen::Isometry3d> wanted_room_from_patient;  // the pose that each of them alone wants
+  std::vector<WantedMotion> wanted;                         // the same without the spring; empty for translations only
   TurnBetweenViews turn;                                    // none if only translations are searched
 };
 

@@ -159,15 +159,23 @@ double small_sample(const Sandwich& sandwich, int axes) {
 
 }  // namespace
 
-Eigen::MatrixXd pose_covariance(Objective& objective, const Eigen::Isometry3d& room_from_patient, bool translation_only,
-                                double spring) {
+Eigen::MatrixXd PoseInformation::held_curvature(double spring) const {
+  return curvature + spring * Eigen::MatrixXd::Identity(curvature.rows(), curvature.cols());
+}
+
+Eigen::MatrixXd PoseInformation::covariance(double spring) const {
+  const Eigen::MatrixXd bread = held_curvature(spring).inverse();
+  return bread * scatter * bread;
+}
+
+PoseInformation pose_information(Objective& objective, const Eigen::Isometry3d& room_from_patient,
+                                 bool translation_only) {
   const int axes = translation_only ? 3 : 6;
-  Sandwich sandwich = sandwich_at(objective, room_from_patient, axes);
+  const Sandwich sandwich = sandwich_at(objective, room_from_patient, axes);
   // Gradient correlation is the mean over the views and both directions, the curvature their sum.
   const double lists = 2.0 * static_cast<double>(objective.views().size());
-  sandwich.curvature += lists * spring * Eigen::MatrixXd::Identity(axes, axes);
-  const Eigen::MatrixXd bread = sandwich.curvature.inverse();
-  return small_sample(sandwich, axes) * bread * sandwich.scatter * bread;
+  return {.curvature = sandwich.curvature / lists,
+          .scatter = small_sample(sandwich, axes) / (lists * lists) * sandwich.scatter};
 }
 
 std::optional<Uncertainty> estimated_uncertainty(Objective& objective, const Eigen::Isometry3d& room_from_patient,

@@ -27,11 +27,19 @@ struct UncertaintyOptions {
 std::optional<Uncertainty> estimated_uncertainty(Objective& objective, const Eigen::Isometry3d& room_from_patient,
                                                  const UncertaintyOptions& options);
 
-// The covariance of the parameters of a pose (pose_parameters.h: three translations in mm, and of six the rotation
-// vector in mm) as the sandwich gives it, without the corrections of estimated_uncertainty(). `spring` holds every
-// parameter, in gradient correlation per mm^2: what the images do not see then has a finite variance.
-Eigen::MatrixXd pose_covariance(Objective& objective, const Eigen::Isometry3d& room_from_patient, bool translation_only,
-                                double spring);
+// What the images tell of the parameters of a pose (pose_parameters.h: three translations in mm, and of six the
+// rotation vector in mm), without the corrections of estimated_uncertainty(): in gradient correlation per mm^2, and
+// squared.
+struct PoseInformation {
+  Eigen::MatrixXd curvature, scatter;
+
+  // `spring` holds every parameter, in gradient correlation per mm^2: what the images do not see then has a finite
+  // variance.
+  Eigen::MatrixXd held_curvature(double spring) const;
+  Eigen::MatrixXd covariance(double spring) const;
+};
+PoseInformation pose_information(Objective& objective, const Eigen::Isometry3d& room_from_patient,
+                                 bool translation_only);
 
 // If restarts end farther apart than four sigma, sigma becomes a quarter of their spread: the curvature was misleading.
 // For example, a ball looks the same however it is turned, but the edges of its voxels in the DRR do not, so that the

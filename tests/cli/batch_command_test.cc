@@ -9,7 +9,9 @@
 #include <nlohmann/json.hpp>
 
 #include "base/error.h"
+#include "base/output_folder.h"
 #include "base/process.h"
+#include "geometry/imager_error.h"
 #include "tests/support/small_study.h"
 #include "tests/support/testdata.h"
 #include "workflow/batch/batch.h"
@@ -218,7 +220,7 @@ TEST_F(BatchCommandTest, AResultOfOtherFilesIsSupersededAndNotLost) {
   EXPECT_EQ(superseded(), 1);
 
   edit(plan, [](DicomItem d) { d.put(DCM_RTPlanLabel, "OTHER"); });
-  EXPECT_THAT(batch().err, HasSubstr("its files, its doubts or its anatomy have changed, so it is registered again"));
+  EXPECT_THAT(batch().err, HasSubstr("its files, its doubts, its anatomy or what the flags name have changed, so it"));
   EXPECT_EQ(superseded(), 3);
 
   // What is taken out of the folder keeps its result.
@@ -226,6 +228,27 @@ TEST_F(BatchCommandTest, AResultOfOtherFilesIsSupersededAndNotLost) {
   batch();
   EXPECT_EQ(superseded(), 3);
   EXPECT_EQ(cases().size(), 2U);
+}
+
+// The same name, but another content.
+TEST_F(BatchCommandTest, AChangedMachineProfileRegistersAgain) {
+  fs::remove_all(exported() / "2");
+  fs::remove_all(exported() / "1" / "RTIMAGE" / "F02");
+  const fs::path machine = folder_ / "machine.json";
+  const auto run_with = [&](const std::string& sigma) {
+    nlohmann::json errors;
+    for (const ImagerParameterInfo& info : imager_parameters())
+      errors[std::string(info.key)] = {{"value", nullptr}, {"sigma", std::stod(sigma)}};
+    replace_text(
+        machine,
+        nlohmann::json{{"machine_profile", 1}, {"name", "A"}, {"images", {{{"imager_errors", errors}}}}}.dump());
+    return run_command({"batch", exported().string(), "-o", results().string(), "--preset", "fast", "--machine",
+                        machine.string()})
+        .err;
+  };
+  run_with("0.1");
+  EXPECT_THAT(run_with("0.1"), HasSubstr("1 of 1 cases have been registered before"));
+  EXPECT_THAT(run_with("0.2"), HasSubstr("or what the flags name have changed, so it is registered again"));
 }
 
 TEST_F(BatchCommandTest, AManifestIsOfTheXraysThatWereScanned) {

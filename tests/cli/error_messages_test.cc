@@ -40,6 +40,13 @@ TEST_F(ErrorMessagesTest, NoCt) {
       fmt::format("no CT series found (searched {}).\n       Name its folder: --ct FOLDER", where(study_.path())));
 }
 
+TEST_F(ErrorMessagesTest, NamesCannotSteerATerminal) {
+  const CommandOutcome outcome = run_command({"register", "no\x1b[2Jstudy", "-o", "unused"});
+  EXPECT_EQ(outcome.exit_status, 1);
+  EXPECT_THAT(outcome.err, testing::Not(HasSubstr("\x1b")));
+  EXPECT_THAT(outcome.err, HasSubstr("no [2Jstudy"));
+}
+
 TEST_F(ErrorMessagesTest, TwoCtSeries) {
   for (const int k : {0, 1, 2}) edit(study_.ct_slice(k), [](DicomItem d) { d.put(DCM_SeriesInstanceUID, "1.2.3"); });
   const CommandOutcome outcome = register_study(study_);

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <fstream>
 #include <nlohmann/json.hpp>
 
 #include "tests/support/command.h"
@@ -100,14 +101,70 @@ TEST(Bench, PrintsEveryRowOfTheTableAsJson) {
   ASSERT_EQ(outcome.exit_status, 0) << outcome.err;
   const Json result = Json::parse(outcome.out);
   EXPECT_EQ(result["protocol"]["poses"], 1);
+  EXPECT_EQ(result["protocol"]["pixels"], 64);
   ASSERT_EQ(result["tables"].size(), 4U);  // two volumes, two thresholds
   for (const Json& table : result["tables"]) {
     EXPECT_GT(table["share_above"], 0.005);
     EXPECT_LT(table["share_above"], 0.6);
     ASSERT_EQ(table["rows"].size(), 4U);
-    for (const Json& row : table["rows"]) EXPECT_GT(row["wall_ms"]["mean"], 0.0);
+    for (const Json& row : table["rows"]) {
+      EXPECT_GT(row["wall_ms"]["mean"], 0.0);
+      EXPECT_EQ(row["poses"], 1);
+    }
+    // One pose along an axis of the volume: coarse pixels show the splatting's noise.
+    EXPECT_LT(table["rows"][1]["rms_error"], 0.02) << table["rows"][1];
+    EXPECT_LT(table["rows"][0]["rms_error"], 0.3) << table["rows"][0];
+    EXPECT_GT(table["rows"][0]["rms_error"], table["rows"][1]["rms_error"]);
   }
   EXPECT_GT(result["tables"][0]["share_above"], result["tables"][1]["share_above"]);
+}
+
+class BenchCommandTest : public testing::Test {
+ protected:
+  CommandOutcome measured(const std::string& every = "27000", const std::string& pixels = "64") {
+    return run_command(
+        {"bench", "drr", "--renderer", "cpu", "-o", rows().string(), "--json", "--every", every, "--pixels", pixels});
+  }
+  std::filesystem::path rows() const { return folder_ / "rows"; }
+
+  TemporaryFolder folder_;
+};
+
+TEST_F(BenchCommandTest, KeepsRowsAsTheyEndAndGoesOnWhereItWasStopped) {
+  const CommandOutcome whole = measured();
+  ASSERT_EQ(whole.exit_status, 0) << whole.err;
+  std::vector<std::filesystem::path> files;
+  for (const auto& entry : std::filesystem::directory_iterator(rows()))
+    if (entry.path().filename() != "protocol.json") files.push_back(entry.path());
+  EXPECT_EQ(files.size(), 12U);  // three methods in four cells
+  const std::filesystem::path lost = rows() / "spine-phantom-20-hu-ours-cpu.json";
+  ASSERT_TRUE(std::filesystem::remove(lost));
+  const CommandOutcome again = measured();
+  ASSERT_EQ(again.exit_status, 0) << again.err;
+  EXPECT_TRUE(std::filesystem::exists(lost));
+  // Times tell: what was there was not measured again.
+  const Json before = Json::parse(whole.out), after = Json::parse(again.out);
+  for (std::size_t cell = 0; cell < 4; ++cell)
+    for (std::size_t row = 0; row < 3; ++row) {
+      if (cell == 1 && row == 0) continue;
+      EXPECT_EQ(after["tables"][cell]["rows"][row], before["tables"][cell]["rows"][row]);
+    }
+}
+
+TEST_F(BenchCommandTest, RefusesRowsOfAnotherProtocol) {
+  ASSERT_EQ(measured().exit_status, 0);
+  const CommandOutcome fewer_pixels = measured("27000", "32");
+  EXPECT_EQ(fewer_pixels.exit_status, 1);
+  EXPECT_THAT(fewer_pixels.err, HasSubstr("holds rows of another protocol"));
+  const CommandOutcome more_poses = measured("13500");
+  EXPECT_EQ(more_poses.exit_status, 1);
+  EXPECT_THAT(more_poses.err, HasSubstr("has every 27000th of the poses"));
+
+  std::filesystem::create_directory(folder_ / "notes");
+  std::ofstream(folder_ / "notes" / "diary.txt") << "mine";
+  const CommandOutcome notes = run_command({"bench", "drr", "-o", (folder_ / "notes").string()});
+  EXPECT_EQ(notes.exit_status, 1);
+  EXPECT_THAT(notes.err, HasSubstr("exists and holds no rows of Table 1"));
 }
 
 TEST(Bench, FiguresAreMade) {

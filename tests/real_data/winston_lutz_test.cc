@@ -5,6 +5,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "base/output_folder.h"
 #include "cli/console.h"
 #include "io/dicom/rt_image.h"
 #include "registration/preprocess/preprocess.h"
@@ -47,6 +51,58 @@ TEST_F(WinstonLutz, TheBallIsFoundWhereThePanelGeometryHasIt) {
   EXPECT_THAT(lateral, VectorNear(Eigen::Vector3d(3.47, -0.72, -0.80), 0.15));
   // The couch's read-outs moved by this much between the sets.
   EXPECT_THAT(Eigen::Vector3d(lateral - cardinal), VectorNear(Eigen::Vector3d(3.01, 0.01, -0.04), 0.1));
+}
+
+// The first example of docs/commands/commission.md: read-outs of the couch, and positions found by other means.
+TEST_F(WinstonLutz, CommissionsItsLocalization) {
+  ISOSHIFT_NEED_REAL_DATA("winston-lutz");
+  for (const char* name : {"cardinal", "lat3mm", "ball-ct"})
+    unpack((real_data() / "winston-lutz" / fmt::format("{}.zip", name)).string());
+  write_text(folder_ / "cases.csv", "case,ct,images\ncardinal,ball,cardinal\nlat3mm,ball,lat3mm\n");
+  write_text(folder_ / "positions.csv", "session,x_mm,y_mm,z_mm\ncardinal,0.48,-0.72,-0.75\nlat3mm,3.47,-0.72,-0.80\n");
+  const std::string results = (folder_ / "results").string();
+  run_command({"batch", (folder_ / "cases.csv").string(), "-o", results, "--dof", "translation", "--isocenter", "0,0,0",
+               "--patient-position", "HFS", "--intensity", "LIN+"});
+
+  const auto moves = nlohmann::json::parse(run_command({"commission", results, "--json"}).out);
+  EXPECT_EQ(moves["outcome"], "untested");
+  EXPECT_EQ(moves["known_from"], "read-outs");
+  EXPECT_EQ(moves["axes"]["x_mm"]["polarity"], "passed");
+  EXPECT_NEAR(moves["axes"]["x_mm"]["known_to"], 3.01, 0.005);
+  for (const char* axis : {"y_mm", "z_mm"}) EXPECT_EQ(moves["axes"][axis]["polarity"], "untested");
+  for (const char* axis : {"rx_deg", "ry_deg", "rz_deg"}) EXPECT_EQ(moves["axes"][axis]["count"], 0);
+  EXPECT_EQ(moves["tested"]["gantry_angles_deg"], nlohmann::json({"0/90/180/270"}));
+
+  const auto positions = nlohmann::json::parse(
+      run_command({"commission", results, "--positions", (folder_ / "positions.csv").string(), "--json"}).out);
+  for (const char* axis : {"x_mm", "y_mm", "z_mm"}) {
+    EXPECT_LT(moves["axes"][axis]["largest"], 0.1) << axis;
+    EXPECT_LT(std::abs(positions["axes"][axis]["bias"].get<double>()), 0.1) << axis;
+  }
+}
+
+// The table's read-outs moved by (3.01, 0.01, -0.04) mm; nobody knows where the receptor really lies.
+TEST_F(WinstonLutz, TellsOfItsReceptorWhatASingleBallCan) {
+  ISOSHIFT_NEED_REAL_DATA("winston-lutz");
+  for (const char* name : {"cardinal", "lat3mm", "ball-ct"})
+    unpack((real_data() / "winston-lutz" / fmt::format("{}.zip", name)).string());
+  const CommandOutcome outcome = run_command(
+      {"geometry", (folder_ / "cardinal").string(), (folder_ / "lat3mm").string(), "--ct", (folder_ / "ball").string(),
+       "--isocenter", "0,0,0", "--patient-position", "HFS", "--intensity", "LIN+", "--json"});
+  ASSERT_EQ(outcome.exit_status, kExitAccepted) << outcome.err;
+  const auto json = nlohmann::json::parse(outcome.out);
+  EXPECT_EQ(json["places_used"], 8);
+  for (const char* axis : {"x_mm", "y_mm", "z_mm"})
+    EXPECT_TRUE(json["sessions"]["cardinal"]["setup_error"][axis].is_null()) << "sag or a shift looks alike: " << axis;
+  const auto& moved = json["sessions"]["lat3mm"]["moved"];
+  EXPECT_NEAR(moved["x_mm"].get<double>(), 3.01, 0.02);
+  EXPECT_NEAR(moved["y_mm"].get<double>(), 0.01, 0.02);
+  EXPECT_NEAR(moved["z_mm"].get<double>(), -0.04, 0.02);
+  const auto& receptor = json["imagers"]["MV"];
+  EXPECT_NEAR(receptor["shift_x_mm"]["value"].get<double>(), -0.09, 0.03);
+  for (const char* unknown :
+       {"shift_x_cos_mm", "shift_x_sin_mm", "shift_y_mm", "distance_mm", "roll_deg", "tilt_x_deg", "tilt_y_deg"})
+    EXPECT_FALSE(receptor[unknown]["is_determined"].get<bool>()) << unknown;
 }
 
 TEST_F(WinstonLutz, TheReceptorTranslationHasTheSignOfTheImageContent) {

@@ -223,7 +223,7 @@ def main(program, work):
         bring_study(3, minutes_between=65)
         choose_views_an_hour_apart(doe, address, results)
         doe.get(released)
-        wait_for(lambda: doe.find_element(By.ID, "pdf").get_attribute("href").startswith("blob:"), 10, "the report in the page")
+        wait_for(lambda: (doe.find_element(By.ID, "pdf").get_attribute("href") or "").startswith("blob:"), 10, "the report in the page")
         roe.get(address)
         wait_for(lambda: "4 with a result" in text(roe, "#count"), 10, "all sessions")
 

@@ -74,14 +74,15 @@ bool Batch::run() {
 
 bool Batch::register_all() {
   std::vector<BatchJob> jobs;
-  CaseInputs inputs(folder_.path() / "inputs");
+  const RegisterOptions& each = options_.each;
+  CaseInputs inputs(folder_.path() / "inputs", {each.study.machine, each.study.machine_key, each.site, each.start});
   std::size_t ended_before = 0, compared = 0;
   for (const BatchCase& one : cases_) {
     if (inputs.renew(one, folder_.has_ended(one.name))) {
-      observer_.say(
-          fmt::format("case {}: its files, its doubts or its anatomy have changed, so it is registered again. "
-                      "Its earlier result is in superseded",
-                      one.name));
+      observer_.say(fmt::format(
+          "case {}: its files, its doubts, its anatomy or what the flags name have changed, so it is registered again. "
+          "Its earlier result is in superseded",
+          one.name));
       folder_.set_aside(one.name);
     }
     ended_before += folder_.has_ended(one.name) ? 1 : 0;

@@ -1,13 +1,10 @@
 #include "workflow/batch/batch_manifest.h"
 
-#include <csv.h>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
 #include <algorithm>
 #include <array>
-#include <fstream>
-#include <iterator>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <set>
@@ -16,6 +13,7 @@
 #include "base/csv.h"
 #include "base/error.h"
 #include "base/sha256.h"
+#include "base/text_file.h"
 #include "io/study/session_files.h"
 
 namespace isoshift {
@@ -50,39 +48,18 @@ void check_column(const std::string& name, const std::string& where) {
     throw Error(fmt::format("{}: \"{}\" is not a column; expected {}", where, name, fmt::join(kColumns, ", ")));
 }
 
-// libcsv calls back for every cell and every end of a line.
-struct CsvTable {
-  std::vector<std::vector<std::string>> rows = {{}};
-};
-
 std::vector<NumberedRow> csv_rows(const std::string& text, const std::string& where) {
-  CsvTable table;
-  csv_parser parser{};
-  csv_init(&parser, CSV_STRICT | CSV_STRICT_FINI | CSV_APPEND_NULL | CSV_REPALL_NL);
-  const auto on_cell = [](void* cell, std::size_t size, void* to) {
-    static_cast<CsvTable*>(to)->rows.back().emplace_back(static_cast<const char*>(cell), size);
-  };
-  const auto on_line = [](int, void* to) { static_cast<CsvTable*>(to)->rows.emplace_back(); };
-  const bool whole = csv_parse(&parser, text.data(), text.size(), on_cell, on_line, &table) == text.size() &&
-                     csv_fini(&parser, on_cell, on_line, &table) == 0;
-  const int problem = csv_error(&parser);
-  csv_free(&parser);
-  if (!whole) throw Error(fmt::format("{}, line {}: {}", where, table.rows.size(), csv_strerror(problem)));
-  const std::vector<std::string>& names = table.rows.front();
-  for (const std::string& name : names) check_column(name, where);
+  const CsvTable table = csv_table(text, where);
+  for (const std::string& name : table.columns) check_column(name, where);
   std::vector<NumberedRow> rows;
-  for (std::size_t n = 1; n < table.rows.size(); ++n) {
-    const std::vector<std::string>& cells = table.rows[n];
-    if (cells.empty() || (cells.size() == 1 && cells.front().empty())) continue;
-    if (cells.size() != names.size())
-      throw Error(fmt::format("{}, line {}: {} cells, expected {} as in the first line", where, n + 1, cells.size(),
-                              names.size()));
-    NumberedRow row{.line = static_cast<int>(n + 1), .cells = {}};
-    for (std::size_t column = 0; column < names.size(); ++column)
-      row.cells[names[column]] =
-          std::ranges::find(kLists, names[column]) != kLists.end()
-              ? parts_of(cells[column])
-              : (cells[column].empty() ? std::vector<std::string>() : std::vector{cells[column]});
+  for (const CsvTable::Row& cells : table.rows) {
+    NumberedRow row{.line = cells.line, .cells = {}};
+    for (std::size_t column = 0; column < table.columns.size(); ++column) {
+      const std::string& cell = cells.cells[column];
+      row.cells[table.columns[column]] = std::ranges::find(kLists, table.columns[column]) != kLists.end()
+                                             ? parts_of(cell)
+                                             : (cell.empty() ? std::vector<std::string>() : std::vector{cell});
+    }
     rows.push_back(std::move(row));
   }
   return rows;
@@ -171,9 +148,7 @@ std::string BatchCase::ct_key() const { return parts.ct.empty() ? parts.study.st
 std::string xrays_sha256_of(const BatchCase& one) { return sha256_of_files(files_below(one.parts.images)); }
 
 std::vector<BatchCase> read_manifest(const fs::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  std::string text{std::istreambuf_iterator<char>(file), {}};
-  if (!file) throw Error(fmt::format("{}: cannot be read", path.string()));
+  std::string text = text_of_file(path);
   if (text.starts_with("\xEF\xBB\xBF")) text.erase(0, 3);
   const std::string where = path.string();
   const std::size_t first = text.find_first_not_of(" \t\r\n");

@@ -4,7 +4,6 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <cmath>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <utility>
@@ -58,12 +57,6 @@ std::string summary_csv(const BatchSummary& summary) {
                        end.report ? fmt::format("cases/{}/report.pdf", end.name) : "");
   }
   return csv;
-}
-
-ResultsPage::Cell number_cell(const std::optional<double>& value, int decimals) {
-  if (!value) return {.text = ""};
-  const double unit = std::pow(10.0, decimals), rounded = std::round(*value * unit) / unit;
-  return {.text = fmt::format("{:.{}f}", rounded == 0.0 ? 0.0 : rounded, decimals), .number = value};
 }
 
 std::vector<std::string> component_titles() {

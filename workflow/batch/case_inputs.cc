@@ -30,9 +30,14 @@ std::string orders_of(const BatchCase& one) { return fmt::format("{} {}\n", one.
 
 }  // namespace
 
+CaseInputs::CaseInputs(fs::path folder, std::vector<fs::path> shared)
+    : folder_(std::move(folder)), shared_(std::move(shared)) {
+  std::erase_if(shared_, [](const fs::path& file) { return file.empty(); });
+}
+
 std::string CaseInputs::quick_of(const BatchCase& one) const {
   std::string all = orders_of(one);
-  for (const auto& files : {files_beside_ct(one, folder_.parent_path()), files_below(one.parts.ct)})
+  for (const auto& files : {files_beside_ct(one, folder_.parent_path()), files_below(one.parts.ct), shared_})
     for (const fs::path& file : files)
       all += fmt::format("{} {} {}\n", file.string(), fs::file_size(file),
                          fs::last_write_time(file).time_since_epoch().count());
@@ -42,7 +47,9 @@ std::string CaseInputs::quick_of(const BatchCase& one) const {
 std::string CaseInputs::contents_of(const BatchCase& one) {
   std::string& ct = contents_of_ct_[one.ct_key()];
   if (ct.empty()) ct = sha256_of_files(files_below(one.parts.ct));
-  return sha256_of(orders_of(one) + sha256_of_files(files_beside_ct(one, folder_.parent_path())) + ct);
+  std::string all = orders_of(one) + sha256_of_files(files_beside_ct(one, folder_.parent_path())) + ct;
+  if (!shared_.empty()) all += sha256_of_files(shared_);
+  return sha256_of(all);
 }
 
 std::optional<CaseInputs::Note> CaseInputs::note_of(const BatchCase& one) const {

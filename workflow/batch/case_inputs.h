@@ -6,6 +6,7 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "workflow/batch/batch_manifest.h"
 
@@ -13,8 +14,9 @@ namespace isoshift {
 
 class CaseInputs {
  public:
-  // `folder`: where a note is kept for every case.
-  explicit CaseInputs(std::filesystem::path folder) : folder_(std::move(folder)) {}
+  // `folder`: where a note is kept for every case. `shared`: the files that the flags of the batch name, such as a
+  // machine profile; empty paths are left aside.
+  CaseInputs(std::filesystem::path folder, std::vector<std::filesystem::path> shared);
 
   // Notes what the case is registered from. Returns true if it has ended and was registered from something else: from
   // other contents of its files, with another number of doubts, or for another anatomy. If a file of a case that has
@@ -35,6 +37,7 @@ class CaseInputs {
   std::string contents_of(const BatchCase& one);
 
   std::filesystem::path folder_;
+  std::vector<std::filesystem::path> shared_;
   std::map<std::string, std::string> contents_of_ct_;  // by BatchCase::ct_key(): fractions share a CT
 };
 

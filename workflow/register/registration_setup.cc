@@ -1,5 +1,11 @@
 #include "workflow/register/registration_setup.h"
 
+#include <algorithm>
+#include <cstdint>
+
+#include "geometry/rotation.h"
+#include "registration/imager/imager_effect.h"
+
 namespace isoshift {
 
 void RegistrationRequest::settle() {
@@ -21,6 +27,26 @@ std::shared_ptr<const RendererPyramid> RendererStore::get(const RenderingOptions
   return last_;
 }
 
+namespace {
+
+// What machine profiles say of the imagers; nothing: they say nothing.
+std::optional<Uncertainty> uncertainty_by_imagers(const Study& study, Dof dof) {
+  if (std::ranges::none_of(study.rt_images, [](const RtImage& image) { return image.imager.has_value(); }))
+    return std::nullopt;
+  std::vector<ImagerInView> views;
+  for (std::size_t n = 0; n < study.xrays.size(); ++n) {
+    const RtImage& header = study.rt_images[n];
+    if (header.pixel_from_room) continue;  // where its gantry stands is not known
+    views.push_back({.model = ImagerModel(study.xrays[n].view, rad_from_deg(header.gantry_angle_deg.value()),
+                                          header.sid_mm.value()),
+                     .pixels_per_mm = pixels_per_mm(study.xrays[n].view),
+                     .imager = header.imager.value_or(KnownImager{.number = SIZE_MAX})});
+  }
+  return uncertainty_by_imagers(views, dof);
+}
+
+}  // namespace
+
 RegistrationSetup::RegistrationSetup(const RegistrationRequest& request, const Study& study,
                                      const std::vector<Beam>& beams, RendererStore& store)
     : ct_(study.ct), options_(request.search.registration()) {
@@ -37,6 +63,7 @@ RegistrationSetup::RegistrationSetup(const RegistrationRequest& request, const S
   if (region_.has_volume() && !request.search.is_paper())
     for (Stage& stage : options_.stages) stage.similarity = SimilarityKind::kGradientCorrelation;
   options_.region = &region_;
+  options_.by_imagers = uncertainty_by_imagers(study, options_.dof);
   options_.rectangles = request.region.rectangles_of(study);
 }
 

@@ -1,5 +1,7 @@
 #include "workflow/register/search_request.h"
 
+#include <fmt/format.h>
+
 #include "base/error.h"
 #include "registration/presets.h"
 
@@ -14,9 +16,16 @@ RegistrationOptions SearchRequest::registration() const {
         "--check-vertebrae needs a preset that ends with gradient correlation, and --preset paper does not");
   if (check_vertebrae && !is_searched)
     throw UsageError("--check-vertebrae compares poses that were searched, and --no-search leaves the search out");
-  if (similarity) options.stages.front().similarity = similarity_kind_from(*similarity).value();
-  if (optimizer) options.stages.front().optimizer = optimizer_kind_from(*optimizer).value();
-  if (pixel_fraction) options.stages.front().pixel_fraction = *pixel_fraction;
+  Stage& stage = options.stages.front();
+  if (similarity) stage.similarity = similarity_kind_from(*similarity).value();
+  if (optimizer) stage.optimizer = optimizer_kind_from(*optimizer).value();
+  if (optimizer && stage.optimizer == OptimizerKind::kLevenbergMarquardt && !has_curvature(stage.similarity))
+    throw UsageError(fmt::format("--optimizer {} needs a similarity with a curvature, and {} has none", *optimizer,
+                                 to_string(stage.similarity)));
+  if (pixel_fraction) stage.pixel_fraction = *pixel_fraction;
+  if (pixel_mm) stage.pixel_mm = *pixel_mm;
+  if (relative_tolerance) stage.relative_tolerance = *relative_tolerance;
+  if (searches > 1) options.stages.resize(static_cast<std::size_t>(searches), Stage(stage));
   options.dof = dof == "rigid" ? Dof::kRigid : Dof::kTranslation;
   options.check_vertebrae = check_vertebrae;
   options.is_searched = is_searched;

@@ -13,6 +13,9 @@ struct SearchRequest {
   // For the only stage of the preset `paper`.
   std::optional<std::string> similarity, optimizer;
   std::optional<double> pixel_fraction;
+  // The same, for Table 2 of the founding paper; they have no flags.
+  std::optional<double> pixel_mm, relative_tolerance;
+  int searches = 1;  // of that stage, one after the other: each begins anew where the one before ended
   std::string dof = "rigid";
   bool check_vertebrae = false;
   bool is_searched = true;  // false: the start is only judged

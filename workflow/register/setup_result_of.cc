@@ -50,6 +50,11 @@ std::vector<SetupResult::Point> centroids_of(const std::vector<MarkedStructure>&
   return points;
 }
 
+std::string radiation_machine(const RtImage& image) {
+  const auto name = image.equipment.find("RadiationMachineName");
+  return name == image.equipment.end() ? "" : name->second;
+}
+
 SetupResult::View view_of(const RtImage& image, const XrayView& view, ViewMatch match, ViewPicture picture) {
   return {.label = image.label,
           .sop_class_uid = image.sop_class_uid,
@@ -59,11 +64,15 @@ SetupResult::View view_of(const RtImage& image, const XrayView& view, ViewMatch 
           .acquired = acquired(image),
           .origin = image.reported_values_origin.value_or(""),
           .gantry_deg = image.pixel_from_room ? std::nullopt : image.gantry_angle_deg,
+          .machine = radiation_machine(image),
+          .pixel_from_room = view.pixel_from_room,
+          .sid_mm = image.sid_mm,
           .source_room_mm = view.source_room_mm,
           .pixel_mm = 1.0 / pixels_per_mm(view),
           .columns = view.columns,
           .rows = view.rows,
           .is_megavoltage = view.beam == Beam::kMegavoltage,
+          .is_receptor_corrected = image.imager && image.imager->is_corrected,
           .match = std::move(match),
           .picture = std::move(picture)};
 }

@@ -36,14 +36,15 @@ void require_same_isocenter(const Json& json, const Eigen::Vector3d& isocenter_p
 
 Start read_start(const std::filesystem::path& file, const Study& study) {
   const std::string name = file.string();
-  const auto [json, sha256] = read_json_file(file);
+  const JsonFile read = read_json_file(file);
+  const Json& json = read.json;
   const Eigen::Isometry3d setup_error = setup_error_in(json, name);
   try {
     require_same_patient(json, study.ct->identity, name);
     require_same_isocenter(json, study.isocenter_patient_mm, name);
     return {.setup_error = setup_error,
             .file = file.filename().string(),
-            .sha256 = sha256,
+            .sha256 = read.sha256,
             .set_by = json.value("set_by", "")};
   } catch (const Json::exception& error) {
     throw Error(fmt::format("{}: is no result.json, truth.json or pose set by hand: {}", name, error.what()));

@@ -57,6 +57,13 @@ void StudyOptions::check_numbers() const {
   check_finite("--sid", std::array{sid_mm.value_or(0.0)});
 }
 
+std::optional<MachineProfile> named_machine(const std::filesystem::path& profile, const std::filesystem::path& key) {
+  if (profile.empty() && !key.empty())
+    throw UsageError("--machine-key says who signed the profile: name that with --machine");
+  if (profile.empty()) return std::nullopt;
+  return read_machine_profile(profile, key.empty() ? std::nullopt : std::optional(VerifyingKey(key)));
+}
+
 Allowances allowances_from(std::span<const std::string> allow) {
   Allowances allowed;
   for (const std::string& text : allow) {
@@ -90,7 +97,7 @@ StudyRequest StudyOptions::request() const {
   if (!intensity.empty()) request.switches.intensity = pixel_intensity_from(intensity);
   if (!beam.empty()) request.switches.beam = beam == "kv" ? Beam::kKilovoltage : Beam::kMegavoltage;
   if (!patient_position.empty()) request.switches.patient_position = patient_position_from(patient_position);
-  if (!machine.empty()) request.machine = read_machine_profile(machine);
+  request.machine = named_machine(machine, machine_key);
   request.allowed = allowances_from(allow);
   return request;
 }

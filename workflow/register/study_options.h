@@ -17,12 +17,15 @@ void check_finite(const char* flag, std::span<const double> values);
 void check_couch_angles(const std::optional<double>& couch_angle_deg, const std::optional<double>& couch_pitch_deg,
                         const std::optional<double>& couch_roll_deg);
 
+// Empty: none. Throws UsageError for a key without a profile, and Error as read_machine_profile() does.
+std::optional<MachineProfile> named_machine(const std::filesystem::path& profile, const std::filesystem::path& key);
+
 // What --allow KEY=REASON says. Throws UsageError for a key that no check has.
 Allowances allowances_from(std::span<const std::string> allow);
 
 struct StudyOptions {
   StudyParts parts;
-  std::filesystem::path machine;
+  std::filesystem::path machine, machine_key;
   std::vector<double> isocenter, rt_image_position;
   std::vector<std::string> gantry_angles, allow;
   std::string patient_position, intensity, beam;

@@ -82,8 +82,11 @@ void TargetRegistration::doubt_contradicted_region(std::span<const FixedImage> i
 }
 
 RegistrationResult TargetRegistration::from(const Eigen::Isometry3d& start_room_from_patient,
-                                            std::span<const FixedImage> images, Observer& observer) const {
-  RegistrationResult found = register_views(setup_.renderers(), images, start_room_from_patient, options_,
+                                            std::span<const FixedImage> images, Observer& observer,
+                                            std::optional<std::uint64_t> seed) const {
+  RegistrationOptions options = options_;
+  options.seed = seed.value_or(options.seed);
+  RegistrationResult found = register_views(setup_.renderers(), images, start_room_from_patient, options,
                                             [&](double share) { observer.progress("Registering", share); });
   observer.progress("Registering", 1.0);
   if (setup_.renderers().finest().kind() == RendererKind::kRaycast) {
@@ -94,11 +97,11 @@ RegistrationResult TargetRegistration::from(const Eigen::Isometry3d& start_room_
     found.compared_with_cpu = spots.words();
     if (spots.failure) found.demote(Verdict::kReview, *spots.failure);
   }
-  if (may_have_bent(options_, images, found) || may_target_lie_elsewhere(setup_.renderers(), images, options_, found))
-    register_bodies(bent_patient(), images, study_.planned_room_from_patient, options_, found,
+  if (may_have_bent(options, images, found) || may_target_lie_elsewhere(setup_.renderers(), images, options, found))
+    register_bodies(bent_patient(), images, study_.planned_room_from_patient, options, found,
                     [&](double share) { observer.progress("Registering the target", share); });
-  if (found.verdict == Verdict::kAccepted && options_.region->has_volume()) doubt_contradicted_region(images, found);
-  doubt_at_edges_of_fields(images, target_found_room_mm(options_, found), found);
+  if (found.verdict == Verdict::kAccepted && options.region->has_volume()) doubt_contradicted_region(images, found);
+  doubt_at_edges_of_fields(images, target_found_room_mm(options, found), found);
   for (const std::string& doubt : study_.doubts) found.demote(Verdict::kReview, doubt);
   for (const std::string& doubt : choice_.doubts) found.demote(Verdict::kReview, doubt);
   if (surrogate_.doubt) found.demote(Verdict::kReview, *surrogate_.doubt);

@@ -2,6 +2,7 @@
 // Registers a study for its target: the patient as a whole, and where that needs a review, the bodies that carry the
 // target. For every command that answers for a setup or measures such answers.
 
+#include <cstdint>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -23,9 +24,9 @@ class TargetRegistration {
                      const TargetChoice& choice, const Surrogate& surrogate, BodyStore& bodies);
 
   // Searches from this pose of the whole patient; doubts about study, target and surrogate make the result a review.
-  // Several threads may call it at a time.
+  // `seed`: unset, the request's. Several threads may call it at a time.
   RegistrationResult from(const Eigen::Isometry3d& start_room_from_patient, std::span<const FixedImage> images,
-                          Observer& observer) const;
+                          Observer& observer, std::optional<std::uint64_t> seed = {}) const;
 
  private:
   const BentPatient& bent_patient() const;

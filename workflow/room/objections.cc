@@ -3,24 +3,14 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <ctime>
-#include <iomanip>
-#include <sstream>
 #include <tuple>
 
+#include "base/local_time.h"
 #include "io/study/session_files.h"
 #include "workflow/room/session_record.h"
 
 namespace isoshift {
 namespace {
-
-// Since the epoch of StudyFiles::Image::at_s. `acquired`: "2026-03-01 10:15:00"; nothing for an empty text.
-std::optional<double> seconds_of(const std::string& acquired) {
-  std::tm time{};
-  std::istringstream text(acquired);
-  text >> std::get_time(&time, "%Y-%m-%d %H:%M:%S");
-  return text ? std::optional(static_cast<double>(::timegm(&time))) : std::nullopt;
-}
 
 // Says one thing more; empty words say nothing.
 void add_words(const std::string& words, Objection& to) {
@@ -39,7 +29,7 @@ void Objections::add_result(const std::string& session, const SetupResult& resul
     patient_of_uid_[view.sop_instance_uid] = result.identity.patient_id;
     // If its file has been seen, that tells more.
     patient.xrays.try_emplace(Xray(view.sop_instance_uid, view.acquired),
-                              Seen{.label = view.label, .moment = {.local_s = seconds_of(view.acquired)}});
+                              Seen{.label = view.label, .moment = {.local_s = seconds_at(view.acquired)}});
   }
 }
 
@@ -81,7 +71,7 @@ void Objections::see(const std::string& patient_id, const StudyFiles& files) {
       }
       patient.xrays[Xray(image.sop_instance_uid, image.acquired)] = {
           .label = image.label,
-          .moment = {.at_s = image.at_s, .local_s = seconds_of(image.acquired), .has_utc_offset = image.has_utc_offset},
+          .moment = {.at_s = image.at_s, .local_s = seconds_at(image.acquired), .has_utc_offset = image.has_utc_offset},
           .image = image,
           .is_rt_image = images == &files.images};
     }
