@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "base/output_folder.h"
+#include "cli/console.h"
 #include "setup/shown_shift.h"
 #include "tests/support/command.h"
 #include "tests/support/temporary_folder.h"
@@ -36,6 +37,7 @@ constexpr double kDriftMmPerDay = 0.25;
 struct Fraction {
   std::string session;
   int patient = 0, day = 0;
+  bool is_accepted = true;       // otherwise the audit leaves it out
   std::array<double, 6> used{};  // lateral, longitudinal, vertical, yaw, pitch, roll
 };
 
@@ -44,16 +46,15 @@ class AuditedPhantomsCommandTest : public testing::Test {
   // Patients that lie off by a few mm, each in a way of its own, on the same ten days.
   void make_and_register() {
     for (int patient = 0; patient < kPatients; ++patient) {
-      const CommandOutcome made =
-          run_command({"phantom", "-o", study_of(patient).string(), "--anatomy", patient % 2 == 0 ? "head" : "spine",
-                       "--fractions", fmt::format("{}", kFractions), "--seed", fmt::format("{}", patient + 1),
-                       "--translation", fmt::format("{},{},{}", 2 * patient - 5, 4 - patient, patient % 3 - 1),
-                       "--rotation", "0.5,-0.5,0.5", "--voxel-mm", "1.5", "--image-pixels", "384"});
+      const CommandOutcome made = run_command(
+          {"phantom", "-o", study_of(patient).string(), "--fractions", fmt::format("{}", kFractions), "--seed",
+           fmt::format("{}", patient + 1), "--translation",
+           fmt::format("{},{},{}", 2 * patient - 5, 4 - patient, patient % 3 - 1), "--rotation", "0.5,-0.5,0.5"});
       ASSERT_EQ(made.exit_status, 0) << made.err;
     }
     const CommandOutcome batch =
         run_command({"batch", (folder_ / "studies").string(), "-o", (folder_ / "results").string()});
-    ASSERT_EQ(batch.exit_status, 0) << batch.err;
+    ASSERT_THAT(batch.exit_status, testing::AnyOf(kExitAccepted, kExitReview)) << batch.err;
   }
 
   std::filesystem::path study_of(int patient) const { return folder_ / "studies" / fmt::format("p{}", patient + 1); }
@@ -69,7 +70,8 @@ class AuditedPhantomsCommandTest : public testing::Test {
     for (auto& [name, result] : results_below(folder_ / "results").results) {
       Fraction one{.session = name,
                    .patient = numbers.at(result.identity.patient_id),
-                   .day = days_of_patient[result.identity.patient_id]++};
+                   .day = days_of_patient[result.identity.patient_id]++,
+                   .is_accepted = result.verdict == Verdict::kAccepted};
       const std::string truth = one.day == 0 ? "truth.json" : fmt::format("truth_F{:02}.json", one.day + 1);
       result.setup_error = read_setup_error(study_of(one.patient) / truth);
       const ShownShift needed = shown_shift(result);
@@ -84,8 +86,9 @@ class AuditedPhantomsCommandTest : public testing::Test {
   }
 
   static Fraction& largest_along(std::vector<Fraction>& fractions, std::size_t axis, int patient) {
-    return *std::ranges::max_element(
-        fractions, {}, [&](const Fraction& one) { return one.patient == patient ? std::abs(one.used[axis]) : -1.0; });
+    return *std::ranges::max_element(fractions, {}, [&](const Fraction& one) {
+      return one.patient == patient && one.is_accepted ? std::abs(one.used[axis]) : -1.0;
+    });
   }
 
   void write_table(const std::vector<Fraction>& fractions) {
@@ -103,11 +106,13 @@ TEST_F(AuditedPhantomsCommandTest, DriftSwapAndWrongSignsAreFoundAndNothingElse)
   ASSERT_EQ(fractions.size(), static_cast<std::size_t>(kPatients * kFractions));
   // Patient 1 got on one day what patient 6 needed; patients 2 and 3 were moved the wrong way once.
   Fraction& swapped = largest_along(fractions, 0, 0);
-  const Fraction& other = *std::ranges::find_if(
-      fractions, [&](const Fraction& one) { return one.patient == kPatients - 1 && one.day == swapped.day; });
-  swapped.used = other.used;
+  const auto other = std::ranges::find_if(fractions, [&](const Fraction& one) {
+    return one.patient == kPatients - 1 && one.day == swapped.day && one.is_accepted;
+  });
+  ASSERT_NE(other, fractions.end());
+  swapped.used = other->used;
   std::map<std::string, std::string> planted = {
-      {swapped.session, "swapped patient: the used shift is that of session " + other.session}};
+      {swapped.session, "swapped patient: the used shift is that of session " + other->session}};
   for (const int patient : {1, 2}) {
     const std::size_t axis = patient == 1 ? 0 : 1;
     Fraction& turned = largest_along(fractions, axis, patient);
@@ -121,7 +126,9 @@ TEST_F(AuditedPhantomsCommandTest, DriftSwapAndWrongSignsAreFoundAndNothingElse)
       run_command({"audit-setup", (folder_ / "results").string(), "--used", (folder_ / "used.csv").string(), "--json"});
   ASSERT_EQ(outcome.exit_status, 0) << outcome.err;
   const Json audit = Json::parse(outcome.out);
-  EXPECT_EQ(audit["counted"], kPatients * kFractions) << "all are accepted";
+  const auto accepted = std::ranges::count_if(fractions, &Fraction::is_accepted);
+  EXPECT_EQ(audit["counted"], accepted);
+  EXPECT_GE(accepted, 50);
   for (const Json& session : audit["sessions"]) {
     const std::string name = session["session"];
     const auto found = planted.find(name);

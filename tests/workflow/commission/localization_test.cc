@@ -224,7 +224,7 @@ TEST(Localization, UncertaintiesThatAreTooSmallFail) {
 // Moves share the first session, whose error is in all of them; the test of the sigmas must not take that for many.
 // Errors are drawn with the sigmas that are given.
 TEST(Localization, UncertaintiesThatAreRightSeldomFailWithMoves) {
-  constexpr int kSites = 200, kSessions = 20;
+  constexpr int kSites = 2000, kSessions = 20;
   std::mt19937 random(20261127);
   std::normal_distribution<double> normal;
   int failed = 0;
