@@ -65,11 +65,13 @@ void add_commission_command(CLI::App& app, Console& console, int& exit_status) {
                    "The same of where the phantom lay against its plan: tests positions, not only moves")
       ->type_name("FILE");
   command->add_option("--site", request.site, "Site file with localization_limits")->type_name("FILE");
-  command->add_option("-o,--output", request.output, "Folder for commission.pdf, commission.csv and commission.json")
-      ->type_name("FOLDER");
+  CLI::Option* output =
+      command
+          ->add_option("-o,--output", request.output, "Folder for commission.pdf, commission.csv and commission.json")
+          ->type_name("FOLDER");
   command->add_option("--by", request.by, "Who answers for it")->type_name("NAME");
   command->add_option("--key", request.key, "Private Ed25519 key (PEM) that signs commission.json")->type_name("FILE");
-  command->add_flag("--overwrite", request.overwrite, "Replace an earlier output in that folder");
+  command->add_flag("--overwrite", request.overwrite, "Replace an earlier output in that folder")->needs(output);
   command->add_flag("--json", flags->as_json, "Print JSON instead of text");
   command->callback([flags, &console, &exit_status] { exit_status = run_commission(*flags, console); });
 }

@@ -151,7 +151,7 @@ std::string json_of(const PatientGeometry& geometry) {
                      {"left_out", geometry.left_out},
                      {"misfit", geometry.found.misfit},
                      {"imagers", json_of(geometry.imagers, geometry.found.imagers)}};
-  return json.dump(2) + "\n";
+  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 
 std::string json_of(const BallGeometry& geometry) {
@@ -168,7 +168,7 @@ std::string json_of(const BallGeometry& geometry) {
   for (std::size_t n = 0; n < geometry.sessions.size(); ++n)
     json["sessions"][geometry.sessions[n]] = {{"setup_error", json_of(pose_of(adjustment, n))},
                                               {"moved", json_of(move_of(adjustment, n))}};
-  return json.dump(2) + "\n";
+  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 
 void run_geometry(GeometryFlags& flags, Console& console) {

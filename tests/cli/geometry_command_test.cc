@@ -134,7 +134,9 @@ TEST_F(GeometryCommandTest, PatientsTellRollAndTransverseShift) {
 
 // Moves with the wrong sign: the balls are not where they should be, and nothing is printed.
 TEST_F(GeometryCommandTest, WrongMovesAreAnError) {
-  write_text(path("wrong.csv"), "session,x_mm,y_mm,z_mm\nmonday,-1,-40,3\ntuesday,-2,1,-2\nfriday,-4,-38,5\n");
+  write_text(path("wrong.csv"),
+             "session,x_mm,y_mm,z_mm,rx_deg,ry_deg,rz_deg\nmonday,-1,-40,3,-1,0.5,0\ntuesday,-2,1,-2,0,0.5,-1\nfriday,-"
+             "4,-38,5,1,-1.5,2\n");
   const CommandOutcome outcome = run({"--moves", path("wrong.csv")});
   EXPECT_EQ(outcome.exit_status, kExitFailed);
   EXPECT_THAT(outcome.err, HasSubstr("session "));
@@ -142,7 +144,9 @@ TEST_F(GeometryCommandTest, WrongMovesAreAnError) {
 }
 
 TEST_F(GeometryCommandTest, MistakesAreNamed) {
-  write_text(path("others.csv"), "session,x_mm,y_mm,z_mm\nmonday,0,0,0\n");
+  write_text(path("no-angles.csv"), "session,x_mm,y_mm,z_mm\nmonday,-1,-40,3\ntuesday,2,-1,2\nfriday,4,38,-5\n");
+  EXPECT_THAT(run({"--moves", path("no-angles.csv")}).err, HasSubstr("has no columns rx_deg, ry_deg, rz_deg"));
+  write_text(path("others.csv"), "session,x_mm,y_mm,z_mm,rx_deg,ry_deg,rz_deg\nmonday,0,0,0,0,0,0\n");
   EXPECT_THAT(run({"--positions", path("others.csv")}).err, HasSubstr("has no line for session"));
   EXPECT_THAT(run({"--positions", path("others.csv"), "--moves", path("others.csv")}).err,
               HasSubstr("give one of them"));

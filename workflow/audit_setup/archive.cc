@@ -92,11 +92,13 @@ void leave_out_earlier_results(std::vector<ReadSession>& all) {
   }
 }
 
-void find_first_of_days(std::vector<AuditedSession>& sessions) {
-  std::set<std::pair<std::string, double>> seen;
-  for (AuditedSession& session : sessions)
-    if (session.counts())
-      session.is_first_of_day = seen.emplace(patient_key(session.identity), std::floor(session.day)).second;
+// A session that does not count can be the first of its day, too: the couch may have been shifted after it.
+void find_first_of_days(std::vector<AuditedSession>& sessions_by_time) {
+  std::map<std::pair<std::string, double>, double> first;
+  for (AuditedSession& session : sessions_by_time) {
+    const std::pair patient_and_day(patient_key(session.identity), std::floor(session.day));
+    session.is_first_of_day = first.try_emplace(patient_and_day, session.day).first->second == session.day;
+  }
 }
 
 }  // namespace

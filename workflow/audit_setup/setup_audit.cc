@@ -118,7 +118,7 @@ void audit_differences(SetupAudit& audit) {
       continue;
     }
     const CouchAxes off = compared[n]->difference();
-    if (off[0] && off[1] && off[2]) left.add(*compared[n], {*off[0], *off[1], *off[2]});
+    if (compared[n]->is_first_of_day && off[0] && off[1] && off[2]) left.add(*compared[n], {*off[0], *off[1], *off[2]});
   }
   audit.corrected = left.population();
 }

@@ -110,7 +110,8 @@ CommissionWords words_of(const Commission& commission) {
                                            fmt::join(unmoved, ", ")));
   if (localization.known != Known::kPositions)
     words.untested.emplace_back("errors that all sessions share, such as those of a displaced imager (--positions)");
-  words.untested.push_back(fmt::format("patient positions: {}", fmt::join(coverage.untested_positions(), ", ")));
+  if (const auto positions = coverage.untested_positions(); !positions.empty())
+    words.untested.push_back(fmt::format("patient positions: {}", fmt::join(positions, ", ")));
   if (coverage.beams.size() < 2)
     words.untested.push_back(fmt::format("beams: {}", coverage.beams.contains("kV") ? "MV" : "kV"));
   words.untested.emplace_back("every other gantry angle, couch angle and combination of them");

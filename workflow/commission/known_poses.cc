@@ -90,8 +90,10 @@ KnownPoses read_known_poses(const std::filesystem::path& csv) {
 Eigen::Isometry3d moved_by_table(const std::string& before_name, const SetupResult& before, const std::string& now_name,
                                  const SetupResult& now) {
   const double most_rad = rad_from_deg(kMaxTableTurnDeg);
-  for (const auto& [angle, difference_rad] : {std::pair("pitch", now.table.pitch_rad - before.table.pitch_rad),
-                                              std::pair("roll", now.table.roll_rad - before.table.roll_rad)})
+  for (const auto& [angle, difference_rad] :
+       {std::pair("pitch", now.table.pitch_rad - before.table.pitch_rad),
+        std::pair("roll", now.table.roll_rad - before.table.roll_rad),
+        std::pair("eccentric angle", now.table.eccentric_rad - before.table.eccentric_rad)})
     if (std::abs(difference_rad) > most_rad)
       throw Error(
           fmt::format("session {}: the table's {} differs by {:.2f} degrees from that of session {}. Read-outs "

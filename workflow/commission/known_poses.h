@@ -22,8 +22,8 @@ struct KnownPoses {
 KnownPoses read_known_poses(const std::filesystem::path& csv);
 
 // How the table had moved an object that lies on it from session `before` to `now`: motion of the room. Throws Error
-// naming the session whose X-rays lack the table's position, and for a table that pitched or rolled between the two,
-// since read-outs do not say about which point.
+// naming the session whose X-rays lack the table's position, and for a table that pitched, rolled or turned about its
+// eccentric axis between the two, since read-outs do not say about which point.
 Eigen::Isometry3d moved_by_table(const std::string& before_name, const SetupResult& before, const std::string& now_name,
                                  const SetupResult& now);
 

@@ -155,7 +155,8 @@ std::vector<Placed> placed(const std::vector<NamedResult>& sessions, Known known
 
 // Between all sessions of one patient position and beam: a bias that they share says nothing about a sign.
 std::map<std::string, Polarities> polarities_of(const std::vector<Placed>& sessions) {
-  constexpr double kLeastMove = 1.0;     // mm or degrees
+  constexpr double kLeastMove = 1.0;  // mm or degrees
+  constexpr double kTurnDeg = 360.0;
   constexpr double kLeastSigmas = 10.0;  // half a move that is as long is five sigma off
   std::map<std::string, Polarities> polarities;
   for (const Placed& session : sessions) polarities[session.condition].fill(Outcome::kUntested);
@@ -168,7 +169,10 @@ std::map<std::string, Polarities> polarities_of(const std::vector<Placed>& sessi
       for (std::size_t axis = 0; axis < 6; ++axis) {
         const double least = std::max(kLeastMove, kLeastSigmas * one.sigma[axis].value_or(0.0));
         if (!one.error[axis] || std::abs(one.known[axis]) < least || polarity[axis] == Outcome::kFailed) continue;
-        const double found_by_known = one.found[axis] / one.known[axis];
+        // Half a turn is known as 180 or -180 degrees, and found beyond either.
+        double off = one.found[axis] - one.known[axis];
+        if (is_rotation(axis)) off = std::remainder(off, kTurnDeg);
+        const double found_by_known = 1.0 + off / one.known[axis];
         polarity[axis] = found_by_known < 0.5 || found_by_known > 1.5 ? Outcome::kFailed : Outcome::kPassed;
       }
     }

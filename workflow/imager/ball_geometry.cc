@@ -74,7 +74,12 @@ void require_one_plan(const std::vector<BallSession>& sessions) {
 
 // Every session has a known pose, and every known pose a session.
 void set_known_poses(const std::filesystem::path& csv, std::vector<BallSession>& sessions) {
-  auto poses = read_known_poses(csv).by_session;
+  auto [poses, have_angles] = read_known_poses(csv);
+  if (!have_angles)
+    throw Error(
+        fmt::format("{}: has no columns rx_deg, ry_deg, rz_deg. How the phantom is turned must be known: what it "
+                    "is turned looks like an error of the imager",
+                    csv.string()));
   for (BallSession& session : sessions) {
     const auto pose = poses.find(session.name);
     if (pose == poses.end()) throw Error(fmt::format("{}: has no line for session {}", csv.string(), session.name));

@@ -80,6 +80,20 @@ TEST_F(AuditArchive, NamesFoldersOfOneNameWithThoseAboveThem) {
   EXPECT_THAT(names, ElementsAre("p1/f1", "p2/f1", "f2"));
 }
 
+// What follows a session that does not count may show what its couch shift has left.
+TEST_F(AuditArchive, TheFirstOfADayIsTheFirstThatWasImaged) {
+  SetupResult review = example("1.1", "2026-03-01 09:00:00");
+  review.verdict = Verdict::kReview;
+  review.reasons = {"the target's surroundings match poorly"};
+  write("reviewed", review);
+  write("after", example("1.2", "2026-03-01 09:06:00"));
+  write("next-day", example("1.3", "2026-03-02 09:00:00"));
+  std::map<std::string, bool> is_first;
+  for (const AuditedSession& session : read()) is_first[session.name] = session.is_first_of_day;
+  EXPECT_FALSE(is_first["after"]);
+  EXPECT_TRUE(is_first["next-day"]);
+}
+
 TEST_F(AuditArchive, CountsTheLastResultOfTheSameXraysAndWhatWasAccepted) {
   SetupResult first = example("1.1", "2026-03-01 10:00:00"), again = first;
   first.made_on = "2026-03-01T10:05:00+0100";

@@ -100,6 +100,16 @@ TEST(Localization, ABiasIsNoWrongSign) {
   EXPECT_EQ(found.axes[0].limit, Outcome::kFailed);
 }
 
+// Half a turn is 180 or -180 degrees.
+TEST(Localization, HalfATurnHasNoWrongSign) {
+  for (const double found_deg : {179.9, 180.1}) {
+    const Localization found = localization_of(
+        {session("a", motion({0, 0, 0})), session("b", motion({0, 0, 0}, {0, 0, found_deg}))}, Known::kPositions,
+        {{{"a", motion({0, 0, 0})}, {"b", motion({0, 0, 0}, {0, 0, 180})}}}, kLimits);
+    EXPECT_EQ(found.polarity(5), Outcome::kPassed) << found_deg;
+  }
+}
+
 TEST(Localization, ASinglePositionShowsNoSign) {
   const Localization found = localization_of({session("a", motion({5, 5, 5}, {3, 3, 3}))}, Known::kPositions,
                                              {{{"a", motion({5, 5, 5}, {3, 3, 3})}}}, kLimits);
@@ -178,6 +188,9 @@ TEST(Localization, WhatReadOutsDoNotSayIsRefused) {
   NamedResult pitched = on_table(session("b", motion({0, 0, 0})), {0, 0, 0});
   pitched.result.table.pitch_rad = rad_from_deg(1.0);
   EXPECT_THAT(refusal(pitched), HasSubstr("the table's pitch differs by 1.00 degrees"));
+  NamedResult eccentric = on_table(session("b", motion({0, 0, 0})), {0, 0, 0});
+  eccentric.result.table.eccentric_rad = rad_from_deg(5.0);
+  EXPECT_THAT(refusal(eccentric), HasSubstr("the table's eccentric angle differs by 5.00 degrees"));
 }
 
 TEST(Localization, SessionsAndKnownPosesNameEachOther) {
