@@ -43,6 +43,26 @@ Json json_of(const std::optional<Share>& share) {
   return {{"of", share->of}, {"total", share->total}, {"low", share->low}, {"high", share->high}};
 }
 
+Json json_of(const NamedResult& session) {
+  const SetupResult& result = session.result;
+  Json views = Json::array();
+  std::set<std::string> machines;
+  for (const SetupResult::View& view : result.views) {
+    views.push_back(view.sha256);
+    machines.insert(view.machine);
+  }
+  return {{"name", session.name},
+          {"acquired", session.acquired()},
+          {"verdict", to_string(result.verdict)},
+          {"reasons", result.reasons},
+          {"program", {{"version", result.version}, {"commit", result.commit}}},
+          {"preset", result.preset},
+          {"machine_profile_sha256", result.machine ? Json(result.machine->sha256) : Json(nullptr)},
+          {"radiation_machines", machines},
+          {"ct_sha256", result.ct_sha256},
+          {"xrays_sha256", views}};
+}
+
 std::string in_words(const Share& share) {
   return fmt::format("{} of {} ({:.0f} %, 95 % interval {:.0f} to {:.0f} %)", share.of, share.total,
                      100.0 * share.value(), 100.0 * share.low, 100.0 * share.high);
@@ -207,25 +227,7 @@ std::string commission_json(const Commission& commission, const std::string& pdf
     into["sd"] = or_null(one.errors->sd);
     into["largest"] = one.largest;
   }
-  for (const NamedResult& session : commission.sessions) {
-    Json views = Json::array();
-    std::set<std::string> machines;
-    for (const SetupResult::View& view : session.result.views) {
-      views.push_back(view.sha256);
-      machines.insert(view.machine);
-    }
-    json["sessions"].push_back(
-        {{"name", session.name},
-         {"acquired", session.acquired()},
-         {"verdict", to_string(session.result.verdict)},
-         {"reasons", session.result.reasons},
-         {"program", {{"version", session.result.version}, {"commit", session.result.commit}}},
-         {"preset", session.result.preset},
-         {"machine_profile_sha256", session.result.machine ? Json(session.result.machine->sha256) : Json(nullptr)},
-         {"radiation_machines", machines},
-         {"ct_sha256", session.result.ct_sha256},
-         {"xrays_sha256", views}});
-  }
+  for (const NamedResult& session : commission.sessions) json["sessions"].push_back(json_of(session));
   for (const Commission::LeftOut& left : commission.left_out)
     json["left_out"].push_back({{"name", left.session}, {"why", left.why}});
   if (!pdf_sha256.empty()) json["files_sha256"] = {{"commission.pdf", pdf_sha256}, {"commission.csv", csv_sha256}};
