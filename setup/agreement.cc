@@ -4,6 +4,8 @@
 #include <boost/math/distributions/students_t.hpp>
 #include <cmath>
 
+#include "base/mean_and_sd.h"
+
 namespace isoshift {
 namespace {
 
@@ -14,11 +16,9 @@ constexpr double kTail = 0.025;  // on each side of a 95 % interval
 Agreement agreement_of(std::span<const double> differences) {
   Agreement agreement{.count = differences.size()};
   const auto count = static_cast<double>(differences.size());
-  for (const double difference : differences) agreement.bias += difference / count;
+  const auto [bias, sd] = mean_and_sd_of(differences);
+  agreement.bias = bias;
   if (differences.size() < 2) return agreement;
-  double squares = 0.0;
-  for (const double difference : differences) squares += (difference - agreement.bias) * (difference - agreement.bias);
-  const double sd = std::sqrt(squares / (count - 1.0));
   const boost::math::students_t t(count - 1.0);
   agreement.sd = sd;
   agreement.bias_within = quantile(complement(t, kTail)) * sd / std::sqrt(count);

@@ -3,24 +3,9 @@
 #include <cmath>
 #include <utility>
 
+#include "base/mean_and_sd.h"
+
 namespace isoshift {
-namespace {
-
-double mean_of(const std::vector<double>& values) {
-  double sum = 0.0;
-  for (const double value : values) sum += value;
-  return sum / static_cast<double>(values.size());
-}
-
-// Of a sample: divided by one less than its size.
-double sd_of(const std::vector<double>& values) {
-  const double mean = mean_of(values);
-  double sum = 0.0;
-  for (const double value : values) sum += (value - mean) * (value - mean);
-  return std::sqrt(sum / static_cast<double>(values.size() - 1));
-}
-
-}  // namespace
 
 PatientErrors errors_of_patient(std::string patient, std::vector<ErrorComponents> fractions) {
   PatientErrors errors{.patient = std::move(patient), .fractions = std::move(fractions)};
@@ -29,8 +14,9 @@ PatientErrors errors_of_patient(std::string patient, std::vector<ErrorComponents
     std::vector<double> values;
     values.reserve(errors.fractions.size());
     for (const ErrorComponents& fraction : errors.fractions) values.push_back(fraction[component]);
-    errors.mean[component] = mean_of(values);
-    if (errors.sd) (*errors.sd)[component] = sd_of(values);
+    const auto [mean, sd] = mean_and_sd_of(values);
+    errors.mean[component] = mean;
+    if (errors.sd) (*errors.sd)[component] = sd;
   }
   return errors;
 }
@@ -46,9 +32,10 @@ std::optional<PopulationErrors> errors_of_population(const std::vector<PatientEr
     }
     if (means.size() < 2) return std::nullopt;
     population.patients = means.size();
-    population.mean[component] = mean_of(means);
-    population.systematic[component] = sd_of(means);
-    population.random[component] = std::sqrt(mean_of(variances));
+    const auto [mean, sd] = mean_and_sd_of(means);
+    population.mean[component] = mean;
+    population.systematic[component] = sd;
+    population.random[component] = std::sqrt(mean_and_sd_of(variances).mean);
   }
   return population;
 }

@@ -11,6 +11,7 @@
 #include "base/error.h"
 #include "cli/commands/commands.h"
 #include "cli/switches/study_switches.h"
+#include "geometry/motion_axes.h"
 #include "geometry/rotation.h"
 #include "io/report/report_page.h"
 #include "setup/setup_errors.h"
@@ -44,12 +45,10 @@ using Components = std::array<std::optional<double>, 6>;
 
 Components determined(const Eigen::Isometry3d& motion, const std::array<double, 6>& sigmas) {
   constexpr double kKnownMm = 0.3, kKnownRad = rad_from_deg(0.15);
-  const ZxyAngles angles = zxy_from_rotation(motion.linear());
-  const std::array values = {motion.translation().x(),   motion.translation().y(),   motion.translation().z(),
-                             deg_from_rad(angles.x_rad), deg_from_rad(angles.y_rad), deg_from_rad(angles.z_rad)};
+  const auto values = components_of(motion);
   Components components;
   for (std::size_t n = 0; n < components.size(); ++n)
-    if (sigmas[n] <= (n < 3 ? kKnownMm : kKnownRad)) components[n] = values[n];
+    if (sigmas[n] <= (is_rotation(n) ? kKnownRad : kKnownMm)) components[n] = values[n];
   return components;
 }
 

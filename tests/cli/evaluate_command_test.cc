@@ -9,6 +9,8 @@
 
 #include "cli/commands/commands.h"
 #include "tests/support/small_study.h"
+#include "tests/support/temporary_folder.h"
+#include "tests/support/tiny_study.h"
 
 namespace isoshift::evaluate_command_test {
 namespace {
@@ -57,22 +59,13 @@ class EvaluateCommandTest : public testing::Test {
  protected:
   // The program on four starts, quickly.
   CommandOutcome evaluate(const std::filesystem::path& output, const std::vector<std::string>& more = {}) {
-    std::vector<std::string> arguments = {"evaluate", study().path().string(), "--truth",  study().truth().string(),
-                                          "-o",       output.string(),         "--preset", "fast"};
+    std::vector<std::string> arguments = {"evaluate", tiny_study().path().string(),
+                                          "--truth",  tiny_study().truth().string(),
+                                          "-o",       output.string(),
+                                          "--preset", "fast"};
     if (std::ranges::find(more, "--starts") == more.end()) arguments.insert(arguments.end(), {"--starts", "4"});
     arguments.insert(arguments.end(), more.begin(), more.end());
     return run_command(arguments);
-  }
-
-  // One for all tests, which do not change it.
-  static const SmallStudy& study() {
-    static const SmallStudy made([] {
-      PhantomOptions options = small_phantom();
-      options.voxel_mm = 5.0;
-      options.image_pixels = 72;
-      return options;
-    }());
-    return made;
   }
 
   TemporaryFolder folder_;
@@ -155,7 +148,7 @@ TEST_F(EvaluateCommandTest, AnotherEvaluationIsNotContinued) {
                                                {"--starts", "1", "--start-seed", "7"},
                                                {"--starts", "1", "--dof", "translation"},
                                                {"--starts", "1", "--threshold-hu", "-500"},
-                                               {"--starts", "1", "--image", study().image(0).string()}}) {
+                                               {"--starts", "1", "--image", tiny_study().image(0).string()}}) {
     const CommandOutcome outcome = evaluate(folder_ / "evaluation", more);
     EXPECT_EQ(outcome.exit_status, 1) << testing::PrintToString(more);
     EXPECT_THAT(outcome.err, HasSubstr("holds another evaluation (evaluation.json says which)"));
@@ -206,10 +199,10 @@ TEST_F(EvaluateCommandTest, TheTableHasARowPerFolder) {
 }
 
 TEST_F(EvaluateCommandTest, NeedsATruthAndAFolder) {
-  const std::string study_folder = study().path().string();
+  const std::string study_folder = tiny_study().path().string();
   for (const std::vector<std::string>& arguments :
        {std::vector<std::string>{"evaluate", study_folder, "-o", (folder_ / "a").string()},
-        {"evaluate", study_folder, "--truth", study().truth().string()}}) {
+        {"evaluate", study_folder, "--truth", tiny_study().truth().string()}}) {
     const CommandOutcome outcome = run_command(arguments);
     EXPECT_EQ(outcome.exit_status, 2);
     EXPECT_THAT(outcome.err, HasSubstr("needs --truth and -o"));

@@ -11,7 +11,7 @@
 #include <sstream>
 
 #include "cli/commands/commands.h"
-#include "tests/support/small_study.h"
+#include "tests/support/tiny_study.h"
 #include "workflow/evaluate/table2_configurations.h"
 
 namespace isoshift::table2_test {
@@ -80,24 +80,15 @@ TEST(Table2Configurations, TheDeviceIsThatOfOpenGlAlone) {
 class Table2CommandTest : public testing::Test {
  protected:
   CommandOutcome table2(const std::vector<std::string>& more) {
-    std::vector<std::string> arguments = {"evaluate", study().path().string(), "--truth",  study().truth().string(),
-                                          "-o",       output().string(),       "--table2", "--starts",
+    std::vector<std::string> arguments = {"evaluate", tiny_study().path().string(),
+                                          "--truth",  tiny_study().truth().string(),
+                                          "-o",       output().string(),
+                                          "--table2", "--starts",
                                           "2"};
     arguments.insert(arguments.end(), more.begin(), more.end());
     return run_command(arguments);
   }
   std::filesystem::path output() const { return folder_ / "table2"; }
-
-  // One for all tests, which do not change it.
-  static const SmallStudy& study() {
-    static const SmallStudy made([] {
-      PhantomOptions options = small_phantom();
-      options.voxel_mm = 5.0;
-      options.image_pixels = 72;
-      return options;
-    }());
-    return made;
-  }
 
   TemporaryFolder folder_;
 };
@@ -155,7 +146,7 @@ TEST_F(Table2CommandTest, RefusesWhatAConfigurationSaysItself) {
   EXPECT_EQ(table2({"--preset", "setup"}).exit_status, 2);
   EXPECT_EQ(table2({"--renderer", "cpu"}).exit_status, 2);
   EXPECT_EQ(table2({"--only", "nothing"}).exit_status, 2);
-  EXPECT_EQ(run_command({"evaluate", study().path().string(), "--truth", study().truth().string(), "-o",
+  EXPECT_EQ(run_command({"evaluate", tiny_study().path().string(), "--truth", tiny_study().truth().string(), "-o",
                          output().string(), "--only", "cpu-mi"})
                 .exit_status,
             2);

@@ -6,6 +6,7 @@
 #include <array>
 #include <utility>
 
+#include "geometry/motion_axes.h"
 #include "io/report/scatter_chart.h"
 #include "workflow/audit_setup/audit_words.h"
 

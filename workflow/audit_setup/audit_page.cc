@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include "geometry/motion_axes.h"
 #include "io/report/results_page.h"
 #include "workflow/audit_setup/audit_charts.h"
 #include "workflow/audit_setup/audit_files.h"
@@ -155,7 +156,7 @@ std::string audit_html(const SetupAudit& audit, const std::filesystem::path& pla
                                    {.text = std::string(to_string(session.verdict))}}};
     const CouchAxes difference = session.difference();
     for (std::size_t axis = 0; axis < difference.size(); ++axis)
-      row.cells.push_back(number_cell(difference[axis], is_turn(axis) ? 2 : 1));
+      row.cells.push_back(number_cell(difference[axis], is_rotation(axis) ? 2 : 1));
     row.cells.push_back({.text = remark_on(n, audit)});
     page.rows.push_back(std::move(row));
   }

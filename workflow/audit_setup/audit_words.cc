@@ -8,6 +8,8 @@
 #include <cmath>
 #include <optional>
 
+#include "geometry/motion_axes.h"
+
 namespace isoshift {
 namespace {
 
@@ -73,8 +75,6 @@ std::string date_of(double day) {
   return fmt::format("{:04}-{:02}-{:02}", static_cast<int>(date.year()), static_cast<unsigned>(date.month()),
                      static_cast<unsigned>(date.day()));
 }
-
-const char* unit_of(std::size_t axis) { return is_turn(axis) ? "deg" : "mm"; }
 
 std::string in_words(const Drift& drift, std::size_t axis) {
   if (drift.shape == DriftShape::kLine)

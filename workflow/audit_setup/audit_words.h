@@ -13,9 +13,6 @@ namespace isoshift {
 // "2026-03-01", of days since 1970.
 std::string date_of(double day);
 
-// "mm" or "deg", of kCouchAxes and of kErrorComponents.
-const char* unit_of(std::size_t axis);
-
 // What changed: "+0.21 +/- 0.05 mm per 30 days", "a step of +1.90 +/- 0.30 mm on or shortly before 2026-05-04".
 std::string in_words(const Drift& drift, std::size_t axis);
 

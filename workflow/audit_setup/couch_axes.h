@@ -2,7 +2,6 @@
 // The six numbers of a couch shift, along and about the table top's axes at imaging (IEC 61217, docs/conventions.md).
 
 #include <array>
-#include <cstddef>
 #include <optional>
 
 namespace isoshift {
@@ -11,7 +10,5 @@ inline constexpr std::array kCouchAxes = {"lateral", "longitudinal", "vertical",
 inline constexpr std::array kCouchColumns = {"lateral_mm", "longitudinal_mm", "vertical_mm",
                                              "yaw_deg",    "pitch_deg",       "roll_deg"};
 using CouchAxes = std::array<std::optional<double>, 6>;  // mm and degrees; empty: not known
-
-constexpr bool is_turn(std::size_t axis) { return axis >= 3; }
 
 }  // namespace isoshift

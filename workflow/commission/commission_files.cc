@@ -9,6 +9,7 @@
 
 #include "base/csv.h"
 #include "base/version.h"
+#include "geometry/motion_axes.h"
 #include "io/report/canvas.h"
 #include "io/report/report_page.h"
 
@@ -24,8 +25,6 @@ std::vector<std::string> axes_with(const Polarities& polarities, Outcome outcome
     if (polarities[axis] == outcome) names.push_back(words.axes[axis]);
   return names;
 }
-
-constexpr const char* unit_of(std::size_t axis) { return axis < 3 ? "mm" : "deg"; }
 
 std::string_view key_of(Known known) {
   switch (known) {
@@ -170,7 +169,7 @@ std::string commission_csv(const Commission& commission) {
   for (const Localized& one : commission.localization.all)
     for (std::size_t axis = 0; axis < one.error.size(); ++axis)
       csv += fmt::format("{},{},{},{:.4f},{},{},{}\n", csv_cell(one.session),
-                         std::string_view(kErrorComponents[axis]).substr(0, axis < 3 ? 1 : 2), unit_of(axis),
+                         std::string_view(kErrorComponents[axis]).substr(0, is_rotation(axis) ? 2 : 1), unit_of(axis),
                          one.known[axis], one.error[axis] ? fmt::format("{:.4f}", one.found[axis]) : "",
                          number(one.error[axis]), number(one.sigma[axis]));
   return csv;

@@ -25,10 +25,7 @@ Rgb color_of(Outcome outcome) {
 class CommissionPdf {
  public:
   CommissionPdf(const Commission& commission, bool is_signed_by_key)
-      : commission_(commission),
-        words_(words_of(commission)),
-        is_signed_by_key_(is_signed_by_key),
-        pages_(words_.title, program(), program()) {}
+      : commission_(commission), words_(words_of(commission)), is_signed_by_key_(is_signed_by_key) {}
 
   std::string write() {
     header();
@@ -163,6 +160,7 @@ class CommissionPdf {
 
   void sessions() {
     std::vector<std::string> lines;
+    lines.reserve(commission_.sessions.size() + commission_.left_out.size());
     for (const NamedResult& session : commission_.sessions)
       lines.push_back(fmt::format("{}  ·  {}  ·  {}{}{}", session.name, session.acquired(),
                                   to_string(session.result.verdict), session.result.reasons.empty() ? "" : "; ",
@@ -175,7 +173,7 @@ class CommissionPdf {
   const Commission& commission_;
   CommissionWords words_;
   bool is_signed_by_key_;
-  PdfPages pages_;
+  PdfPages pages_{words_.title, program(), program()};
   Canvas& canvas_ = pages_.canvas();
   double& y_ = pages_.y();
 };

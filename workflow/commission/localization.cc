@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "base/error.h"
+#include "geometry/motion_axes.h"
 #include "geometry/rotation.h"
 #include "setup/shown_shift.h"
 
@@ -17,15 +18,6 @@ namespace {
 
 using Matrix6d = Eigen::Matrix<double, 6, 6>;
 using Vector6d = Eigen::Matrix<double, 6, 1>;
-
-constexpr bool is_rotation(std::size_t axis) { return axis >= 3; }
-
-// Translation of the isocenter's anatomy and angles of R = Rz Rx Ry, mm and degrees.
-ErrorComponents components_of(const Eigen::Isometry3d& motion) {
-  const ZxyAngles angles = zxy_from_rotation(motion.linear());
-  return {motion.translation().x(),   motion.translation().y(),   motion.translation().z(),
-          deg_from_rad(angles.x_rad), deg_from_rad(angles.y_rad), deg_from_rad(angles.z_rad)};
-}
 
 Eigen::Isometry3d found_pose(const SetupResult& session) {
   const auto position = patient_position_from(session.patient_position);

@@ -10,6 +10,7 @@
 
 #include "base/sha256.h"
 #include "base/version.h"
+#include "geometry/motion_axes.h"
 #include "geometry/rotation.h"
 #include "io/report/canvas.h"
 #include "io/report/report_page.h"
@@ -21,8 +22,6 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr std::array kAxisKeys = {"left", "posterior", "superior", "about_left", "about_posterior", "about_superior"};
-constexpr bool is_rotation(std::size_t axis) { return axis >= 3; }
-constexpr const char* unit_of_axis(std::size_t axis) { return is_rotation(axis) ? "deg" : "mm"; }
 
 // mm, or degrees of radians.
 double shown(std::size_t axis, double value) { return is_rotation(axis) ? deg_from_rad(value) : value; }
@@ -32,7 +31,7 @@ Json axes_json(const ScoutRegistration& found) {
   Json axes;
   for (std::size_t n = 0; n < found.axes.size(); ++n) {
     const ScoutAxis& axis = found.axes[n];
-    const std::string unit = unit_of_axis(n);
+    const std::string unit = unit_of(n);
     axes[kAxisKeys[n]] = {{"is_seen", axis.is_seen},
                           {"offset_" + unit, shown(n, axis.offset)},
                           {"sigma_" + unit, std::isfinite(axis.sigma) ? Json(shown(n, axis.sigma)) : Json(nullptr)},
@@ -52,9 +51,9 @@ std::string list_of(const char* title, const std::vector<std::string>& lines) {
 
 ScoutAxisWords words_of(const ScoutAxis& axis, std::size_t n) {
   if (!axis.is_seen) return {};
-  return {.offset =
-              fmt::format("{:+6.2f} +/- {:.2f} {}", shown(n, axis.offset), 2.0 * shown(n, axis.sigma), unit_of_axis(n)),
-          .repeatability = fmt::format("{:6.3f} {}", shown(n, axis.repeatability), unit_of_axis(n))};
+  return {
+      .offset = fmt::format("{:+6.2f} +/- {:.2f} {}", shown(n, axis.offset), 2.0 * shown(n, axis.sigma), unit_of(n)),
+      .repeatability = fmt::format("{:6.3f} {}", shown(n, axis.repeatability), unit_of(n))};
 }
 
 std::string width_in_words(const ScoutRegistration& found) {
