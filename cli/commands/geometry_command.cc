@@ -44,11 +44,15 @@ std::string words_of(BallPoses poses) {
 using Components = std::array<std::optional<double>, 6>;
 
 Components determined(const Eigen::Isometry3d& motion, const std::array<double, 6>& sigmas) {
-  constexpr double kKnownMm = 0.3, kKnownRad = rad_from_deg(0.15);
+  // What is enough for a shift and for a roll of an imager is enough for a pose.
+  const auto largest_sigma = [](ImagerParameter of) {
+    return imager_parameters()[static_cast<std::size_t>(of)].largest_sigma;
+  };
+  const double of_shift = largest_sigma(ImagerParameter::kShiftX), of_turn = largest_sigma(ImagerParameter::kRoll);
   const auto values = components_of(motion);
   Components components;
   for (std::size_t n = 0; n < components.size(); ++n)
-    if (sigmas[n] <= (is_rotation(n) ? kKnownRad : kKnownMm)) components[n] = values[n];
+    if (sigmas[n] <= (is_rotation(n) ? of_turn : of_shift)) components[n] = values[n];
   return components;
 }
 
@@ -103,8 +107,10 @@ std::string text_of(const PatientGeometry& geometry) {
       "GEOMETRY OF IMAGERS\n{}\n\nPatients     CTs {}, sessions {}, X-rays {}\n"
       "Misfit       {:.2f} (what single views want, in their own sigmas)\n",
       kDisclaimer, geometry.cts, geometry.sessions, geometry.views, geometry.found.misfit);
-  if (geometry.cts < kLeastCts)
-    text += fmt::format("             nothing is determined by fewer than {} CTs\n", kLeastCts);
+  for (std::size_t imager = 0; imager < geometry.imagers.size(); ++imager)
+    if (const std::size_t cts = geometry.found.cts[imager]; cts < kLeastCts)
+      text += fmt::format("             {} saw {} {}: nothing is determined by fewer than {}\n",
+                          geometry.imagers[imager], cts, cts == 1 ? "CT" : "CTs", kLeastCts);
   for (const auto& [why, count] : geometry.left_out) text += fmt::format("Left out     {} {}\n", count, why);
   return text + text_of(geometry.imagers, geometry.found.imagers);
 }
@@ -143,13 +149,15 @@ Json json_of(const std::vector<std::string>& imagers, const std::vector<ImagerEs
 }
 
 std::string json_of(const PatientGeometry& geometry) {
-  const Json json = {{"schema", 1},
-                     {"cts", geometry.cts},
-                     {"sessions", geometry.sessions},
-                     {"xrays", geometry.views},
-                     {"left_out", geometry.left_out},
-                     {"misfit", geometry.found.misfit},
-                     {"imagers", json_of(geometry.imagers, geometry.found.imagers)}};
+  Json json = {{"schema", 1},
+               {"cts", geometry.cts},
+               {"sessions", geometry.sessions},
+               {"xrays", geometry.views},
+               {"left_out", geometry.left_out},
+               {"misfit", geometry.found.misfit},
+               {"imagers", json_of(geometry.imagers, geometry.found.imagers)}};
+  for (std::size_t imager = 0; imager < geometry.imagers.size(); ++imager)
+    json["cts_by_imager"][geometry.imagers[imager]] = geometry.found.cts[imager];
   return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 
@@ -175,8 +183,6 @@ void run_geometry(GeometryFlags& flags, Console& console) {
   if (flags.patients.empty() == request.sessions.empty())
     throw UsageError("name the sessions of a phantom with balls, or with --patients the results of patients");
   if (!flags.patients.empty()) {
-    if (!flags.moves.empty() || !flags.positions.empty())
-      throw UsageError("--moves and --positions are of a phantom: nobody knows how patients lay");
     const PatientGeometry geometry = patient_geometry(flags.patients);
     console.out << (flags.as_json ? json_of(geometry) : text_of(geometry));
     return;
@@ -207,10 +213,6 @@ void add_geometry_command(CLI::App& app, Console& console, int&) {
       "determined.");
   command->add_option("sessions", request.sessions, "A folder of X-rays of the phantom per session")
       ->type_name("FOLDER...");
-  command
-      ->add_option("--patients", flags->patients,
-                   "Results of patients' sessions (register, batch, watch), instead of X-rays of a phantom")
-      ->type_name("RESULTS");
   command->add_option("--ct", request.study.parts.ct, "CT of the phantom [in the sessions' folders]")
       ->type_name("PATH");
   command->add_option("--plan", request.study.parts.plan, "RT Plan [in the sessions' folders]")->type_name("FILE");
@@ -223,6 +225,16 @@ void add_geometry_command(CLI::App& app, Console& console, int&) {
       ->type_name("FILE");
   command->add_flag("--json", flags->as_json, "Print JSON instead of text");
   add_study_switches(*command, request.study);
+  // Results say themselves what was registered, and nobody knows how patients lay.
+  const std::vector<CLI::Option*> of_phantoms = command->get_options([](const CLI::Option* option) {
+    return !option->get_positional() && !option->check_name("--help") && !option->check_name("--json");
+  });
+  CLI::Option* patients =
+      command
+          ->add_option("--patients", flags->patients,
+                       "Results of patients' sessions (register, batch, watch), instead of X-rays of a phantom")
+          ->type_name("RESULTS");
+  for (CLI::Option* option : of_phantoms) patients->excludes(option);
   command->callback([flags, &console] { run_geometry(*flags, console); });
 }
 

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <numbers>
 #include <optional>
+#include <utility>
 
 #include "base/error.h"
 #include "base/median.h"
@@ -197,11 +198,11 @@ std::vector<Ball> balls_in(const Volume<float>& hu) {
   return balls;
 }
 
-std::vector<Eigen::Vector2d> dark_spots(const XrayImage& xray, double radius_px) {
+DarkSpots dark_spots(const XrayImage& xray, double radius_px) {
   // Radii: sigma of what counts as around. A small field's rim, which is darker than any ball, must not.
   constexpr double kSurroundings = 1.0;
   constexpr double kNoises = 6.0, kNormal = 1.4826, kNoisePx = 1.0, kShareOfDarkest = 0.3;
-  const FixedImage image = prepare(xray);
+  FixedImage image = prepare(xray);
   const Image<float> fine = high_pass(image.line_integral, kSurroundings * radius_px);
   const Image<float> noise = high_pass(image.line_integral, kNoisePx);
   std::vector<double> noises;
@@ -211,10 +212,10 @@ std::vector<Eigen::Vector2d> dark_spots(const XrayImage& xray, double radius_px)
     noises.push_back(std::abs(noise.pixels[n]));
     darkest = std::max(darkest, static_cast<double>(fine.pixels[n]));
   }
-  if (noises.empty()) return {};
+  DarkSpots spots;
+  if (noises.empty()) return spots;
   const double least = std::max(kNoises * kNormal * median(noises), kShareOfDarkest * darkest);
   const int reach = std::max(1, static_cast<int>(std::lround(radius_px)));
-  std::vector<Eigen::Vector2d> spots;
   for (int row = reach; row < fine.rows - reach; ++row)
     for (int column = reach; column < fine.columns - reach; ++column) {
       const float top = fine.at(column, row);
@@ -224,8 +225,9 @@ std::vector<Eigen::Vector2d> dark_spots(const XrayImage& xray, double radius_px)
         for (int c = column - reach; c <= column + reach && is_top; ++c)
           is_top = fine.at(c, r) < top || (c == column && r == row) ||
                    (fine.at(c, r) == top && std::pair(r, c) > std::pair(row, column));
-      if (is_top) spots.push_back(center_of_mass(image.line_integral, Eigen::Vector2d(column, row), radius_px));
+      if (is_top) spots.places.push_back(center_of_mass(image.line_integral, Eigen::Vector2d(column, row), radius_px));
     }
+  spots.field = std::move(image.field);
   return spots;
 }
 

@@ -2,8 +2,10 @@
 // Metal balls in a CT and in its X-rays: points that both know to a fraction of a pixel.
 
 #include <Eigen/Core>
+#include <cstdint>
 #include <vector>
 
+#include "geometry/image.h"
 #include "geometry/volume.h"
 #include "geometry/xray_image.h"
 
@@ -18,8 +20,13 @@ struct Ball {
 // Throws Error if there is no such part, or if other parts are as dense.
 std::vector<Ball> balls_in(const Volume<float>& hu);
 
-// Places, (column, row) in the irradiated field, where an X-ray is darker than around, in a round spot of that radius:
-// centers of mass of the line integrals above those around the spot. Throws Error for a blank X-ray.
-std::vector<Eigen::Vector2d> dark_spots(const XrayImage& xray, double radius_px);
+struct DarkSpots {
+  std::vector<Eigen::Vector2d> places;  // (column, row)
+  Image<std::uint8_t> field;            // of the X-ray's size; not 0: irradiated
+};
+
+// Places in the irradiated field where an X-ray is darker than around, in a round spot of that radius: centers of mass
+// of the line integrals above those around the spot. Throws Error for a blank X-ray.
+DarkSpots dark_spots(const XrayImage& xray, double radius_px);
 
 }  // namespace isoshift

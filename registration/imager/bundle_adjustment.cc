@@ -113,11 +113,25 @@ class Adjustment {
     return false;
   }
 
+  // Whether a ball, and what lies around it, is in the irradiated field.
+  static bool is_shown(const Eigen::Vector2d& place, const BallView& view) {
+    constexpr double kAround = 2.5;  // radii: with the ring from which dark_spots() has the background
+    const Image<std::uint8_t>& field = view.spots.field;
+    for (const double u : {-1.0, 0.0, 1.0})
+      for (const double v : {-1.0, 0.0, 1.0}) {
+        const Eigen::Vector2d at = place + kAround * view.radius_px * Eigen::Vector2d(u, v);
+        if (!(at.x() >= 0.0 && at.y() >= 0.0 && at.x() <= field.columns - 1 && at.y() <= field.rows - 1)) return false;
+        if (field.at(static_cast<int>(std::lround(at.x())), static_cast<int>(std::lround(at.y()))) == 0) return false;
+      }
+    return true;
+  }
+
   // Takes for every ball the nearest spot of every view, if it lies near enough and is no other ball's nearest.
   void look(double within_mm) {
     sights_.clear();
     expected_.clear();
-    for (std::size_t session = 0; session < sessions_.size(); ++session)
+    for (std::size_t session = 0; session < sessions_.size(); ++session) {
+      std::size_t& places = expected_[&sessions_[session]];
       for (const BallView& view : sessions_[session].views) {
         std::vector<Sight> sights;
         std::vector<Eigen::Vector2d> expected;
@@ -129,16 +143,17 @@ class Adjustment {
                             .place_px = Eigen::Vector2d::Zero()});
           expected.push_back(expected_px(sights.back()));
         }
-        std::vector<Sight> nearest(view.spots.size());
-        std::vector<double> distance(view.spots.size(), std::numeric_limits<double>::infinity());
+        const std::vector<Eigen::Vector2d>& spots = view.spots.places;
+        std::vector<Sight> nearest(spots.size());
+        std::vector<double> distance(spots.size(), std::numeric_limits<double>::infinity());
         for (std::size_t ball = 0; ball < balls_.size(); ++ball) {
-          if (is_crowded(ball, expected, view.radius_px)) continue;
-          ++expected_[&sessions_[session]];
+          if (!is_shown(expected[ball], view) || is_crowded(ball, expected, view.radius_px)) continue;
+          ++places;
           const auto spot = std::ranges::min_element(
-              view.spots, {}, [&](const Eigen::Vector2d& place) { return (place - expected[ball]).squaredNorm(); });
-          if (spot == view.spots.end()) continue;
+              spots, {}, [&](const Eigen::Vector2d& place) { return (place - expected[ball]).squaredNorm(); });
+          if (spot == spots.end()) continue;
           const double mm = view.model.pixel_mm() * (*spot - expected[ball]).norm();
-          const auto n = static_cast<std::size_t>(spot - view.spots.begin());
+          const auto n = static_cast<std::size_t>(spot - spots.begin());
           if (mm > within_mm || mm >= distance[n]) continue;
           distance[n] = mm;
           nearest[n] = sights[ball];
@@ -147,6 +162,7 @@ class Adjustment {
         for (std::size_t n = 0; n < nearest.size(); ++n)
           if (std::isfinite(distance[n])) sights_.push_back(nearest[n]);
       }
+    }
   }
 
   // Every session must show the most of its balls: one that does not was given a pose that is not its own, or another
@@ -156,6 +172,11 @@ class Adjustment {
       const auto is_of = [&](const Sight& sight) { return sight.session == &session; };
       const auto seen = static_cast<std::size_t>(std::ranges::count_if(sights_, is_of));
       const std::size_t expected = expected_.at(&session);
+      if (expected == 0)
+        throw Error(
+            fmt::format("session {}: its X-rays should show no ball alone: all lie outside the irradiated "
+                        "fields, or hide each other. {}",
+                        session.name, advice));
       constexpr std::size_t kLeast = 3;  // a shift of the phantom needs two places; what is told beyond that, more
       if (seen < kLeast || static_cast<double>(seen) < share * static_cast<double>(expected))
         throw Error(fmt::format("session {}: of {} places at which the X-rays should show balls, {} do. {}",

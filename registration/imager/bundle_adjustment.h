@@ -18,9 +18,9 @@ namespace isoshift {
 struct BallView {
   std::string label;
   ImagerModel model;
-  std::size_t imager = 0;              // of those that are estimated
-  std::vector<Eigen::Vector2d> spots;  // dark_spots()
-  double radius_px = 0.0;              // of the balls
+  std::size_t imager = 0;  // of those that are estimated
+  DarkSpots spots;
+  double radius_px = 0.0;  // of the balls
 };
 
 struct BallSession {
@@ -47,7 +47,8 @@ struct BundleAdjustment {
   double rms_mm = 0.0;                 // of what remains, on the receptor, per axis
 };
 
-// `imagers`: their number. Throws Error if too few balls are found where the views should show them.
+// `imagers`: their number. Balls outside the irradiated field, and balls that hide each other, are not used. Throws
+// Error if too few balls are found where the views should show them.
 BundleAdjustment adjusted(const std::vector<Ball>& balls, const std::vector<BallSession>& sessions, BallPoses poses,
                           std::size_t imagers);
 

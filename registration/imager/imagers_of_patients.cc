@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <set>
 
 #include "base/error.h"
 #include "registration/imager/imager_effect.h"
@@ -127,6 +128,17 @@ Eigen::VectorXd jackknifed(const std::map<std::string, std::vector<std::size_t>>
   return (count - 1.0) / count * without.rowwise().squaredNorm();
 }
 
+// Per imager: of how many CTs it saw the patients.
+std::vector<std::size_t> cts_of(std::span<const PatientSession> sessions, std::size_t imagers) {
+  std::vector<std::set<std::string>> cts(imagers);
+  for (const PatientSession& session : sessions)
+    for (const PatientView& view : session.views) cts[view.imager].insert(session.ct);
+  std::vector<std::size_t> counts;
+  counts.reserve(imagers);
+  for (const std::set<std::string>& some : cts) counts.push_back(some.size());
+  return counts;
+}
+
 }  // namespace
 
 ImagersOfPatients imagers_of_patients(std::span<const PatientSession> sessions, std::size_t imagers) {
@@ -138,14 +150,16 @@ ImagersOfPatients imagers_of_patients(std::span<const PatientSession> sessions, 
   const Fit fit = fitted(told, imagers);
   std::map<std::string, std::vector<std::size_t>> by_ct;
   for (std::size_t n = 0; n < sessions.size(); ++n) by_ct[sessions[n].ct].push_back(n);
-  const bool are_enough = by_ct.size() >= kLeastCts;
+  ImagersOfPatients found{
+      .imagers = std::vector<ImagerEstimate>(imagers), .cts = cts_of(sessions, imagers), .misfit = fit.misfit};
+  const bool are_enough_of_any = std::ranges::max(found.cts) >= kLeastCts;
   const Eigen::VectorXd variances = fit.covariance.diagonal().cwiseMax(
-      are_enough ? jackknifed(by_ct, told, imagers) : Eigen::VectorXd::Zero(fit.errors.size()));
-  ImagersOfPatients found{.imagers = std::vector<ImagerEstimate>(imagers), .misfit = fit.misfit};
+      are_enough_of_any ? jackknifed(by_ct, told, imagers) : Eigen::VectorXd::Zero(fit.errors.size()));
   for (Eigen::Index n = 0; n < variances.size(); ++n) {
     const std::size_t parameter = static_cast<std::size_t>(n) % kImagerParameters;
-    ImagerEstimate& imager = found.imagers[static_cast<std::size_t>(n) / kImagerParameters];
-    if (!are_enough || only_balls_tell(static_cast<ImagerParameter>(parameter)))
+    const std::size_t number = static_cast<std::size_t>(n) / kImagerParameters;
+    ImagerEstimate& imager = found.imagers[number];
+    if (found.cts[number] < kLeastCts || only_balls_tell(static_cast<ImagerParameter>(parameter)))
       imager.set(parameter, 0.0, imager_parameters()[parameter].expected);
     else
       imager.set(parameter, fit.errors[n], std::sqrt(variances[n]));

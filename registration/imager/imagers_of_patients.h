@@ -26,6 +26,7 @@ struct PatientSession {
 
 struct ImagersOfPatients {
   std::vector<ImagerEstimate> imagers;
+  std::vector<std::size_t> cts;  // of each imager: those of the patients whom it saw
   // Root mean square of what the views want beyond what they are expected to, in their own sigmas: 1 if they are right.
   double misfit = 0.0;
 };
@@ -33,9 +34,10 @@ struct ImagersOfPatients {
 // Least squares over sessions, whose poses are free; misfits of sessions are taken to have a multivariate
 // t-distribution (Lange, Little, Taylor, "Robust statistical modeling using the t distribution", J Am Stat Assoc 84
 // (1989) 881-896), so that sessions of bent patients count less. Sigmas are those of the least squares, with the misfit
-// if it is above 1, or those of a jackknife over CTs, whichever is larger. Fewer CTs than kLeastCts determine nothing:
-// what is wrong with one of them is in all of its sessions. The longitudinal shift, the distance and the tilts are
-// never determined: only balls tell them. `imagers`: their number. Throws Error if no session has two views.
+// if it is above 1, or those of a jackknife over CTs, whichever is larger. Of an imager fewer CTs than kLeastCts
+// determine nothing: what is wrong with one of them is in all of its sessions. The longitudinal shift, the distance and
+// the tilts are never determined: only balls tell them. `imagers`: their number. Throws Error if no session has two
+// views.
 inline constexpr std::size_t kLeastCts = 4;
 ImagersOfPatients imagers_of_patients(std::span<const PatientSession> sessions, std::size_t imagers);
 

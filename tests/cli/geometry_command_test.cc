@@ -123,13 +123,19 @@ TEST_F(GeometryCommandTest, PatientsTellRollAndTransverseShift) {
     EXPECT_FALSE(imager[unknown]["is_determined"].get<bool>()) << unknown;
   // One of them says too little by itself, and twice as much by its copy is an error.
   const CommandOutcome one = run_command({"geometry", "--patients", path("results/11")});
-  EXPECT_THAT(one.out, HasSubstr("nothing is determined by fewer than 4 CTs"));
+  EXPECT_THAT(one.out, HasSubstr("kV saw 1 CT: nothing is determined by fewer than 4"));
   std::filesystem::copy(path("results/11"), path("results/copy"), std::filesystem::copy_options::recursive);
   EXPECT_THAT(run_command({"geometry", "--patients", path("results")}).err, HasSubstr("are of the same X-ray"));
   EXPECT_THAT(run_command({"geometry", "--patients", path("results"), path("monday")}).err,
               HasSubstr("or with --patients"));
-  EXPECT_THAT(run_command({"geometry", "--patients", path("results"), "--moves", path("positions.csv")}).err,
-              HasSubstr("nobody knows how patients lay"));
+  for (const std::vector<std::string>& of_phantoms : std::vector<std::vector<std::string>>{
+           {"--moves", path("positions.csv")}, {"--ct", path("monday/CT")}, {"--couch-angle", "0"}}) {
+    std::vector<std::string> words = {"geometry", "--patients", path("results")};
+    words.insert(words.end(), of_phantoms.begin(), of_phantoms.end());
+    const CommandOutcome refused = run_command(words);
+    EXPECT_EQ(refused.exit_status, kExitUsage) << of_phantoms.front();
+    EXPECT_THAT(refused.err, HasSubstr(of_phantoms.front()));
+  }
 }
 
 // Moves with the wrong sign: the balls are not where they should be, and nothing is printed.

@@ -9,21 +9,14 @@
 #include "geometry/rotation.h"
 #include "registration/preprocess/preprocess.h"
 #include "workflow/commission/known_poses.h"
+#include "workflow/imager/imager_names.h"
+#include "workflow/register/setup_result_of.h"
 
 namespace isoshift {
 namespace {
 
 std::string name_of_session(const std::filesystem::path& folder) {
   return std::filesystem::absolute(folder / "").lexically_normal().parent_path().filename().string();
-}
-
-// The number of the imager of a beam, which is added if it is new.
-std::size_t imager_of(Beam beam, std::vector<std::string>& imagers) {
-  const std::string name = beam == Beam::kMegavoltage ? "MV" : "kV";
-  const auto found = std::ranges::find(imagers, name);
-  if (found != imagers.end()) return static_cast<std::size_t>(found - imagers.begin());
-  imagers.push_back(name);
-  return imagers.size() - 1;
 }
 
 double median_radius_mm(const std::vector<Ball>& balls) {
@@ -33,7 +26,7 @@ double median_radius_mm(const std::vector<Ball>& balls) {
   return median(radii);
 }
 
-BallSession session_of(const std::string& name, const Study& study, double radius_mm, BallGeometry& geometry) {
+BallSession session_of(const std::string& name, const Study& study, double radius_mm, ImagerNames& imagers) {
   BallSession session{.name = name,
                       .planned_room_from_patient = study.planned_room_from_patient,
                       .known_setup_error = Eigen::Isometry3d::Identity(),
@@ -52,11 +45,10 @@ BallSession session_of(const std::string& name, const Study& study, double radiu
     session.views.push_back(
         {.label = xray.label,
          .model = ImagerModel(xray.view, rad_from_deg(*header.gantry_angle_deg), header.sid_mm.value()),
-         .imager = imager_of(xray.view.beam, geometry.imagers),
+         .imager = imagers.number_of(xray.view.beam == Beam::kMegavoltage, radiation_machine(header)),
          .spots = dark_spots(xray, radius_mm * pixels_per_mm(xray.view)),
          .radius_px = radius_mm * pixels_per_mm(xray.view)});
   }
-  geometry.views += session.views.size();
   return session;
 }
 
@@ -74,26 +66,29 @@ void require_one_plan(const std::vector<BallSession>& sessions) {
 
 // Every session has a known pose, and every known pose a session.
 void set_known_poses(const std::filesystem::path& csv, std::vector<BallSession>& sessions) {
-  auto [poses, have_angles] = read_known_poses(csv);
-  if (!have_angles)
+  KnownPoses known = read_known_poses(csv);
+  if (!known.have_angles)
     throw Error(
         fmt::format("{}: has no columns rx_deg, ry_deg, rz_deg. How the phantom is turned must be known: what it "
                     "is turned looks like an error of the imager",
                     csv.string()));
   for (BallSession& session : sessions) {
-    const auto pose = poses.find(session.name);
-    if (pose == poses.end()) throw Error(fmt::format("{}: has no line for session {}", csv.string(), session.name));
+    const auto pose = known.by_session.find(session.name);
+    if (pose == known.by_session.end())
+      throw Error(fmt::format("{}: has no line for session {}", csv.string(), session.name));
     session.known_setup_error = pose->second;
-    poses.erase(pose);
+    known.by_session.erase(pose);
   }
-  if (!poses.empty())
-    throw Error(fmt::format("{}: names session {}, of which no folder was given", csv.string(), poses.begin()->first));
+  if (!known.by_session.empty())
+    throw Error(fmt::format("{}: names session {}, of which no folder was given", csv.string(),
+                            known.by_session.begin()->first));
 }
 
 }  // namespace
 
 BallGeometry ball_geometry(const BallGeometryRequest& request, Observer& observer) {
   BallGeometry geometry;
+  ImagerNames imagers;
   std::vector<BallSession> sessions;
   std::vector<Ball> balls;
   CtStore cts;
@@ -113,8 +108,10 @@ BallGeometry ball_geometry(const BallGeometryRequest& request, Observer& observe
     if (std::ranges::find(geometry.sessions, name) != geometry.sessions.end())
       throw Error(fmt::format("two folders of sessions have the name {}: rename one", name));
     geometry.sessions.push_back(name);
-    sessions.push_back(session_of(name, study, median_radius_mm(balls), geometry));
+    sessions.push_back(session_of(name, study, median_radius_mm(balls), imagers));
+    geometry.views += sessions.back().views.size();
   }
+  geometry.imagers = imagers.names();
   geometry.balls = balls.size();
   if (request.poses == BallPoses::kMoves) require_one_plan(sessions);
   if (request.poses != BallPoses::kFree) set_known_poses(request.known_poses, sessions);

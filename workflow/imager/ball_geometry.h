@@ -19,7 +19,7 @@ struct BallGeometryRequest {
 };
 
 struct BallGeometry {
-  std::vector<std::string> imagers;  // "kV", "MV": as the adjustment has them
+  std::vector<std::string> imagers;  // ImagerNames::names(), as the adjustment has them
   std::vector<std::string> sessions;
   std::size_t balls = 0, views = 0;
   BundleAdjustment adjustment;

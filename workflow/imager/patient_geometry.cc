@@ -7,6 +7,7 @@
 
 #include "base/error.h"
 #include "geometry/rotation.h"
+#include "workflow/imager/imager_names.h"
 #include "workflow/results_below.h"
 
 namespace isoshift {
@@ -23,23 +24,12 @@ std::string why_left_out(const SetupResult& result) {
     return "with X-rays that have no gantry angle";
   if (any_lacks([](const SetupResult::View& view) { return !view.is_receptor_corrected; }))
     return "corrected by a machine profile: they tell what is left, and not what the files lack";
-  if (any_lacks([](const SetupResult::View& view) {
-        return view.match.wanted && view.pixel_from_room && view.sid_mm && view.match.wanted->covariance.allFinite();
-      }))
-    return "without the motions that single views want (made before 2026-11-27)";
+  if (any_lacks([](const SetupResult::View& view) { return view.pixel_from_room && view.sid_mm; }))
+    return "without the geometry of their X-rays (made by an earlier isoshift)";
+  if (any_lacks(
+          [](const SetupResult::View& view) { return view.match.wanted && view.match.wanted->covariance.allFinite(); }))
+    return "without the motions that single views want (made by an earlier isoshift, or of views that determine none)";
   return "";
-}
-
-std::string imager_of(const SetupResult::View& view, bool has_several_machines) {
-  const char* beam = view.is_megavoltage ? "MV" : "kV";
-  return has_several_machines && !view.machine.empty() ? fmt::format("{} of {}", beam, view.machine) : beam;
-}
-
-std::size_t place_of(const std::string& name, std::vector<std::string>& names) {
-  const auto found = std::ranges::find(names, name);
-  const auto place = static_cast<std::size_t>(found - names.begin());
-  if (found == names.end()) names.push_back(name);
-  return place;
 }
 
 XrayView camera_of(const SetupResult::View& view) {
@@ -55,15 +45,15 @@ XrayView camera_of(const SetupResult::View& view) {
 PatientGeometry patient_geometry(const std::filesystem::path& results) {
   PatientGeometry geometry;
   std::vector<SetupResult> telling;
-  std::set<std::string> machines, cts;
+  std::set<std::string> cts;
   ResultsBelow below = results_below(results);
   require_distinct(below.results);
+  if (!below.failed.empty()) geometry.left_out["that failed"] = below.failed.size();
   for (NamedResult& one : below.results) {
     if (const std::string why = why_left_out(one.result); !why.empty()) {
       ++geometry.left_out[why];
       continue;
     }
-    for (const SetupResult::View& view : one.result.views) machines.insert(view.machine);
     cts.insert(one.result.ct_series_uid);
     telling.push_back(std::move(one.result));
   }
@@ -73,6 +63,7 @@ PatientGeometry patient_geometry(const std::filesystem::path& results) {
     message.back() = '.';
     throw Error(message);
   }
+  ImagerNames imagers;
   std::vector<PatientSession> sessions;
   sessions.reserve(telling.size());
   for (const SetupResult& result : telling) {
@@ -81,10 +72,11 @@ PatientGeometry patient_geometry(const std::filesystem::path& results) {
     for (const SetupResult::View& view : result.views)
       session.views.push_back(
           {.model = ImagerModel(camera_of(view), rad_from_deg(*view.gantry_deg), view.sid_mm.value()),
-           .imager = place_of(imager_of(view, machines.size() > 1), geometry.imagers),
+           .imager = imagers.number_of(view.is_megavoltage, view.machine),
            .wanted = *view.match.wanted});
     geometry.views += session.views.size();
   }
+  geometry.imagers = imagers.names();
   geometry.sessions = sessions.size();
   geometry.cts = cts.size();
   geometry.found = imagers_of_patients(sessions, geometry.imagers.size());

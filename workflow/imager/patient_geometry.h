@@ -11,7 +11,7 @@
 namespace isoshift {
 
 struct PatientGeometry {
-  std::vector<std::string> imagers;  // "kV", or of several machines "kV of LINAC1": as `found` has them
+  std::vector<std::string> imagers;  // ImagerNames::names(), as `found` has them
   std::size_t sessions = 0, cts = 0, views = 0;
   std::map<std::string, std::size_t> left_out;  // results that tell nothing: why, and how many
   ImagersOfPatients found;

@@ -50,11 +50,6 @@ std::vector<SetupResult::Point> centroids_of(const std::vector<MarkedStructure>&
   return points;
 }
 
-std::string radiation_machine(const RtImage& image) {
-  const auto name = image.equipment.find("RadiationMachineName");
-  return name == image.equipment.end() ? "" : name->second;
-}
-
 SetupResult::View view_of(const RtImage& image, const XrayView& view, ViewMatch match, ViewPicture picture) {
   return {.label = image.label,
           .sop_class_uid = image.sop_class_uid,
@@ -78,6 +73,11 @@ SetupResult::View view_of(const RtImage& image, const XrayView& view, ViewMatch 
 }
 
 }  // namespace
+
+std::string radiation_machine(const RtImage& image) {
+  const auto name = image.equipment.find("RadiationMachineName");
+  return name == image.equipment.end() ? "" : name->second;
+}
 
 std::optional<SiteFile> named_site(const std::filesystem::path& file) {
   return file.empty() ? std::nullopt : std::optional(read_site_file(file));

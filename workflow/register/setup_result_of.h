@@ -23,6 +23,9 @@ std::optional<SiteFile> named_site(const std::filesystem::path& file);
 std::optional<SiteRules> chosen_site(const std::optional<SiteFile>& file, const std::string& anatomy,
                                      std::optional<SiteRules> before = std::nullopt);
 
+// Radiation Machine Name; empty: unknown.
+std::string radiation_machine(const RtImage& image);
+
 // The result without notes, loading times and written files. `images`: the prepared X-rays that were registered. The
 // DRRs in the pictures of the views are rendered anew.
 SetupResult setup_result_of(const Study& study, std::span<const FixedImage> images, const RegistrationRequest& request,

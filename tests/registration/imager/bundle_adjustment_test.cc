@@ -44,14 +44,15 @@ BallSession session_of(const std::vector<Ball>& balls, const Eigen::Isometry3d& 
     const double gantry_deg = 45.0 * n;
     BallView view{.label = "",
                   .model = ImagerModel(view_from_gantry(gantry_deg), rad_from_deg(gantry_deg), kGantryViewSidMm),
-                  .spots = {}};
+                  .spots = {.places = {}, .field = Image<std::uint8_t>(kGantryViewPixels, kGantryViewPixels, 1)}};
     for (const Ball& ball : balls) {
       const double du = noise(random), dv = noise(random);
-      view.spots.push_back(view.model.pixel_of(setup_error * ball.center_patient_mm, errors) + Eigen::Vector2d(du, dv));
+      view.spots.places.push_back(view.model.pixel_of(setup_error * ball.center_patient_mm, errors) +
+                                  Eigen::Vector2d(du, dv));
     }
     for (int false_one = 0; false_one < 5; ++false_one) {
       const double u = anywhere(random), v = anywhere(random);
-      view.spots.emplace_back(u, v);
+      view.spots.places.emplace_back(u, v);
     }
     session.views.push_back(std::move(view));
   }
@@ -123,12 +124,44 @@ TEST(BundleAdjustment, AnotherPhantomIsRefused) {
   std::mt19937_64 random(8);
   const std::vector<Ball> balls = cube_of_balls();
   BallSession session = session_of(balls, motion({0, 0, 0}, {0, 0, 0}), {}, 0.05, random);
-  for (BallView& view : session.views) view.spots.clear();
+  for (BallView& view : session.views) view.spots.places.clear();
   try {
     adjusted(balls, {session}, BallPoses::kFree, 1);
     FAIL() << "not refused";
   } catch (const Error& error) {
     EXPECT_THAT(error.what(), HasSubstr("places at which the X-rays should show balls, 0 do"));
+  }
+}
+
+// A field that shows half of the balls: the others are not missed.
+TEST(BundleAdjustment, BallsOutsideTheFieldAreNotExpected) {
+  std::mt19937_64 random(9);
+  const std::vector<Ball> balls = cube_of_balls();
+  const Eigen::Isometry3d pose = motion({2, -1, 1}, {0.5, 0, -0.5});
+  BallSession session = session_of(balls, pose, {}, 0.05, random);
+  const std::size_t all = adjusted(balls, {session}, BallPoses::kFree, 1).expected;
+  for (BallView& view : session.views) {
+    Image<std::uint8_t>& field = view.spots.field;
+    std::fill_n(field.pixels.begin(), field.pixels.size() / 2, std::uint8_t{0});
+    std::erase_if(view.spots.places, [&](const Eigen::Vector2d& place) { return place.y() < field.rows / 2; });
+  }
+  const BundleAdjustment found = adjusted(balls, {session}, BallPoses::kFree, 1);
+  EXPECT_LT(found.expected, 3 * all / 4);
+  EXPECT_GT(found.seen, found.expected * 9 / 10);
+  EXPECT_THAT(found.setup_errors.front().translation(), VectorNear(pose.translation(), 1.5));
+}
+
+TEST(BundleAdjustment, BallsThatHideEachOtherAreAnError) {
+  std::mt19937_64 random(10);
+  const std::vector<Ball> balls = {{.center_patient_mm = {0, 0, 0}, .radius_mm = 3.0},
+                                   {.center_patient_mm = {0, 4, 0}, .radius_mm = 3.0}};
+  BallSession session = session_of(balls, motion({0, 0, 0}, {0, 0, 0}), {}, 0.05, random);
+  for (BallView& view : session.views) view.radius_px = 20.0;
+  try {
+    adjusted(balls, {session}, BallPoses::kFree, 1);
+    FAIL() << "not refused";
+  } catch (const Error& error) {
+    EXPECT_THAT(error.what(), HasSubstr("session a: its X-rays should show no ball alone"));
   }
 }
 

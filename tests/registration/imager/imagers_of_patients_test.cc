@@ -8,6 +8,7 @@
 #include "base/error.h"
 #include "geometry/rotation.h"
 #include "geometry/target_error.h"
+#include "registration/preprocess/preprocess.h"
 #include "tests/support/gantry_view.h"
 
 namespace isoshift::imagers_of_patients_test {
@@ -118,6 +119,19 @@ TEST(ImagersOfPatients, ABentPatientCountsLess) {
   auto sessions = sessions_with(planted(), {{0.0, 90.0}}, 40, 3);
   for (std::size_t n = 0; n < 4; ++n) sessions[n].views[0].wanted.motion[5] += rad_from_deg(4.0);
   EXPECT_NEAR(deg_from_rad(parameter_of(imagers_of_patients(sessions, 1), ImagerParameter::kRoll).value), 0.3, 0.06);
+}
+
+// Six CTs were seen by the first imager, three by the second.
+TEST(ImagersOfPatients, EveryImagerNeedsCtsOfItsOwn) {
+  auto sessions = sessions_with(planted(), {{0.0, 90.0, 180.0, 270.0}}, 40, 5);
+  for (std::size_t n = 0; n < sessions.size(); ++n)
+    if (n % 6 < 3)
+      for (std::size_t view = 0; view < 2; ++view) sessions[n].views[view].imager = 1;
+  const ImagersOfPatients found = imagers_of_patients(sessions, 2);
+  EXPECT_THAT(found.cts, testing::ElementsAre(6U, 3U));
+  const auto roll = static_cast<std::size_t>(ImagerParameter::kRoll);
+  EXPECT_TRUE(found.imagers[0].parameters[roll].is_determined);
+  for (const ImagerEstimate::Parameter& parameter : found.imagers[1].parameters) EXPECT_FALSE(parameter.is_determined);
 }
 
 TEST(ImagersOfPatients, SingleViewsTellNothing) {
