@@ -3,11 +3,40 @@
 #include <csv.h>
 #include <fmt/format.h>
 
+#include <charconv>
+#include <cmath>
 #include <utility>
 
 #include "base/error.h"
 
 namespace isoshift {
+namespace {
+
+// The lines of a table as they come in. A line ends with LF, CR or both; so does a line within a cell.
+class Lines {
+ public:
+  void add_cell(std::string_view cell) {
+    rows_.back().cells.emplace_back(cell);
+    for (std::size_t n = 0; n < cell.size(); ++n)
+      if (cell[n] == '\n' || (cell[n] == '\r' && !(n + 1 < cell.size() && cell[n + 1] == '\n'))) ++line_;
+    ended_with_cr_ = false;
+  }
+  void end_line(int character) {
+    const bool is_of_crlf = ended_with_cr_ && character == '\n';
+    ended_with_cr_ = character == '\r';
+    if (is_of_crlf) return;
+    rows_.push_back({.line = ++line_, .cells = {}});
+  }
+  int line() const { return line_; }
+  const std::vector<CsvTable::Row>& rows() const { return rows_; }
+
+ private:
+  int line_ = 1;
+  std::vector<CsvTable::Row> rows_ = {{.line = 1, .cells = {}}};
+  bool ended_with_cr_ = false;
+};
+
+}  // namespace
 
 std::string csv_quoted(std::string_view text) {
   if (text.find_first_of(",\"\r\n") == std::string_view::npos) return std::string(text);
@@ -22,31 +51,43 @@ std::string csv_cell(std::string text) {
   return csv_quoted(text);
 }
 
+std::optional<double> number_in_cell(std::string_view cell) {
+  constexpr const char* kBlanks = " \t";
+  const std::size_t first = cell.find_first_not_of(kBlanks);
+  if (first == std::string_view::npos) return std::nullopt;
+  cell = cell.substr(first, cell.find_last_not_of(kBlanks) + 1 - first);
+  if (cell.starts_with('+') && !cell.starts_with("+-")) cell.remove_prefix(1);
+  double value = 0.0;
+  const auto [end, error] = std::from_chars(cell.data(), cell.data() + cell.size(), value);
+  const bool is_whole = error == std::errc() && end == cell.data() + cell.size();
+  return is_whole && std::isfinite(value) ? std::optional(value) : std::nullopt;
+}
+
 CsvTable csv_table(std::string_view text, const std::string& where) {
   if (text.starts_with("\xFF\xFE") || text.starts_with("\xFE\xFF"))
     throw Error(fmt::format("{}: is in UTF-16, expected UTF-8 (in a spreadsheet: \"CSV UTF-8\")", where));
   if (text.starts_with("\xEF\xBB\xBF")) text.remove_prefix(3);
-  using Lines = std::vector<std::vector<std::string>>;
-  Lines lines(1);
+  Lines lines;
   csv_parser parser{};
   csv_init(&parser, CSV_STRICT | CSV_STRICT_FINI | CSV_APPEND_NULL | CSV_REPALL_NL);
   // libcsv calls back for every cell and every end of a line.
   const auto on_cell = [](void* cell, std::size_t size, void* to) {
-    static_cast<Lines*>(to)->back().emplace_back(static_cast<const char*>(cell), size);
+    static_cast<Lines*>(to)->add_cell({static_cast<const char*>(cell), size});
   };
-  const auto on_line = [](int, void* to) { static_cast<Lines*>(to)->emplace_back(); };
-  const bool whole = csv_parse(&parser, text.data(), text.size(), on_cell, on_line, &lines) == text.size() &&
-                     csv_fini(&parser, on_cell, on_line, &lines) == 0;
+  const auto on_end = [](int character, void* to) { static_cast<Lines*>(to)->end_line(character); };
+  const bool is_whole = csv_parse(&parser, text.data(), text.size(), on_cell, on_end, &lines) == text.size() &&
+                        csv_fini(&parser, on_cell, on_end, &lines) == 0;
   const int problem = csv_error(&parser);
   csv_free(&parser);
-  if (!whole) throw Error(fmt::format("{}, line {}: {}", where, lines.size(), csv_strerror(problem)));
-  CsvTable table{.columns = std::move(lines.front()), .rows = {}};
-  for (std::size_t n = 1; n < lines.size(); ++n) {
-    if (lines[n].empty() || (lines[n].size() == 1 && lines[n].front().empty())) continue;
-    if (lines[n].size() != table.columns.size())
-      throw Error(fmt::format("{}, line {}: {} cells, expected {} as in the first line", where, n + 1, lines[n].size(),
-                              table.columns.size()));
-    table.rows.push_back({.line = static_cast<int>(n + 1), .cells = std::move(lines[n])});
+  if (!is_whole) throw Error(fmt::format("{}, line {}: {}", where, lines.line(), csv_strerror(problem)));
+  std::vector<CsvTable::Row> rows = lines.rows();
+  CsvTable table{.columns = std::move(rows.front().cells), .rows = {}};
+  for (auto row = rows.begin() + 1; row != rows.end(); ++row) {
+    if (row->cells.empty() || (row->cells.size() == 1 && row->cells.front().empty())) continue;
+    if (row->cells.size() != table.columns.size())
+      throw Error(fmt::format("{}, line {}: {} cells, expected {} as in the first line", where, row->line,
+                              row->cells.size(), table.columns.size()));
+    table.rows.push_back(std::move(*row));
   }
   return table;
 }
