@@ -17,8 +17,13 @@ struct Agreement {
   std::optional<double> limit;        // 95 % limits of agreement lie at bias -/+ this: 1.96 sd
 };
 
-// Precondition: there is a difference.
+// Of independent differences. Precondition: there is a difference.
 Agreement agreement_of(std::span<const double> differences);
+
+// Of differences that are alike in one patient: `patients` has a number for each. The bias's interval is that of the
+// patients' means, each weighted by its differences (the ultimate cluster estimate: Hansen, Hurwitz, Madow, "Sample
+// survey methods and theory" I, 1953), and is unset for a single patient.
+Agreement agreement_of(std::span<const double> differences, std::span<const std::size_t> patients);
 
 struct Share {
   std::size_t of = 0, total = 0;
@@ -26,6 +31,9 @@ struct Share {
 
   double value() const { return static_cast<double>(of) / static_cast<double>(total); }
 };
+
+// The number of sigmas that one of so many independent normal errors exceeds in one case of a hundred.
+double sigmas_hardly_exceeded(std::size_t errors);
 
 // Precondition: of <= total, and total is positive.
 Share share_of(std::size_t of, std::size_t total);

@@ -37,23 +37,30 @@ std::vector<fs::path> folders_with(const char* file, const fs::path& top) {
   return folders;
 }
 
+// Folders that hold this file, below `top`; a name that several folders of results or of errors have stands with the
+// folders above it.
+std::vector<NamedFolder> named_folders_with(const char* file, const fs::path& top) {
+  std::map<std::string, int> counts;
+  for (const char* each : {kResultFile, kErrorFile})
+    for (const fs::path& folder : folders_with(each, top)) ++counts[folder.filename().string()];
+  std::vector<NamedFolder> named;
+  for (const fs::path& folder : folders_with(file, top)) {
+    const std::string name = folder.filename().string();
+    named.push_back({.name = counts[name] > 1 ? folder.lexically_relative(top).string() : name, .path = folder});
+  }
+  return named;
+}
+
 }  // namespace
 
 std::vector<NamedFolder> result_folders_below(const fs::path& top) {
-  const std::vector<fs::path> folders = folders_with(kResultFile, top);
+  std::vector<NamedFolder> folders = named_folders_with(kResultFile, top);
   if (folders.empty())
     throw Error(
         fmt::format("{}: holds no result of isoshift (no folder with {}). To register sessions: isoshift batch "
                     "SESSIONS -o RESULTS",
                     top.string(), kResultFile));
-  std::map<std::string, int> counts;
-  for (const fs::path& folder : folders) ++counts[folder.filename().string()];
-  std::vector<NamedFolder> named;
-  for (const fs::path& folder : folders) {
-    const std::string name = folder.filename().string();
-    named.push_back({.name = counts[name] > 1 ? folder.lexically_relative(top).string() : name, .path = folder});
-  }
-  return named;
+  return folders;
 }
 
 std::string NamedResult::acquired() const {
@@ -67,11 +74,11 @@ ResultsBelow results_below(const fs::path& top) {
   ResultsBelow found;
   for (const NamedFolder& folder : result_folders_below(top))
     found.results.push_back({.name = folder.name, .result = read_report(folder.path)});
-  for (const fs::path& folder : folders_with(kErrorFile, top)) {
-    const JsonFile file = read_json_file(folder / kErrorFile);
-    JsonSection section(file.json, (folder / kErrorFile).string());
+  for (const NamedFolder& folder : named_folders_with(kErrorFile, top)) {
+    const JsonFile file = read_json_file(folder.path / kErrorFile);
+    JsonSection section(file.json, (folder.path / kErrorFile).string());
     found.failed.push_back(
-        {.name = folder.filename().string(), .message = section.required<std::string>("error", "why the case failed")});
+        {.name = folder.name, .message = section.required<std::string>("error", "why the case failed")});
   }
   std::ranges::sort(found.results, {}, [](const NamedResult& one) { return std::tuple(one.acquired(), one.name); });
   return found;

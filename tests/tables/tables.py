@@ -10,6 +10,7 @@ import collections
 import pathlib
 import sys
 
+import commission
 import evaluation
 import founding_paper
 import markdown
@@ -19,7 +20,8 @@ import scout
 
 # Of each page all tables in their order: the heading above a table, and the function that makes its lines. A table of
 # words is declared by its header.
-PAGES = {"docs/commands/scout.md": scout.TABLES,
+PAGES = {"docs/commands/commission.md": commission.TABLES,
+         "docs/commands/scout.md": scout.TABLES,
          "docs/evaluation.md": evaluation.TABLES,
          "docs/founding-paper.md": founding_paper.TABLES,
          "docs/motion.md": motion.TABLES,

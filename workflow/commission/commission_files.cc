@@ -72,8 +72,9 @@ std::string row_of(const AxisOfLocalization& axis, Outcome polarity, const std::
   const Agreement& errors = *axis.errors;
   const auto number = [](const std::optional<double>& value) { return value ? fmt::format("{:.3f}", *value) : "-"; };
   return fmt::format("  {:<22} {:>3} {:+8.2f} {:+8.2f} {:+8.3f} {:>7} {:>7} {:>8.3f} {:>3}  {:<9} {}\n", name,
-                     errors.count, axis.least_known, axis.most_known, errors.bias, number(errors.bias_within),
-                     number(errors.sd), axis.largest, unit, to_string(polarity), to_string(axis.limit));
+                     errors.count, axis.least_known.value(), axis.most_known.value(), errors.bias,
+                     number(errors.bias_within), number(errors.sd), axis.largest, unit, to_string(polarity),
+                     to_string(axis.limit));
 }
 
 }  // namespace
@@ -105,13 +106,17 @@ CommissionWords words_of(const Commission& commission) {
       break;
     case Known::kPositions: words.known_from = "positions that the site names"; break;
   }
-  if (localization.within_one_sigma)
-    words.sigma =
-        fmt::format("One sigma holds {} of the errors, two sigma {}. Expected: 68 and 95 %. {}",
-                    in_words(*localization.within_one_sigma), in_words(*localization.within_two_sigma),
-                    localization.sigma == Outcome::kPassed ? "Passed: not clearly fewer." : "FAILED: clearly fewer.");
-  else
+  if (localization.within_one_sigma) {
+    words.sigma = fmt::format("One sigma holds {} of the errors, two sigma {}. Expected: 68 and 95 %. ",
+                              in_words(*localization.within_one_sigma), in_words(*localization.within_two_sigma));
+    if (localization.shared_sigmas)
+      words.sigma +=
+          fmt::format("What the imagers put off in all of them is {:.1f} of its sigma at most, and may be {:.1f}. ",
+                      *localization.shared_sigmas, localization.shared_sigmas_limit);
+    words.sigma += localization.sigma == Outcome::kPassed ? "Passed." : "FAILED: clearly fewer, or more.";
+  } else {
     words.sigma = "Untested: no error of an axis with an uncertainty.";
+  }
   const Coverage& coverage = commission.coverage;
   for (const auto& [condition, polarities] : localization.polarities)
     if (const auto moved = axes_with(polarities, Outcome::kPassed, words); !moved.empty())
@@ -168,9 +173,9 @@ std::string commission_csv(const Commission& commission) {
   const auto number = [](const std::optional<double>& value) { return value ? fmt::format("{:.4f}", *value) : ""; };
   for (const Localized& one : commission.localization.all)
     for (std::size_t axis = 0; axis < one.error.size(); ++axis)
-      csv += fmt::format("{},{},{},{:.4f},{},{},{}\n", csv_cell(one.session),
+      csv += fmt::format("{},{},{},{},{},{},{}\n", csv_cell(one.session),
                          std::string_view(kErrorComponents[axis]).substr(0, is_rotation(axis) ? 2 : 1), unit_of(axis),
-                         one.known[axis], one.error[axis] ? fmt::format("{:.4f}", one.found[axis]) : "",
+                         number(one.known[axis]), one.error[axis] ? fmt::format("{:.4f}", one.found[axis]) : "",
                          number(one.error[axis]), number(one.sigma[axis]));
   return csv;
 }
@@ -191,6 +196,7 @@ std::string commission_json(const Commission& commission, const std::string& pdf
                {"axes", Json::object()},
                {"uncertainty",
                 {{"outcome", to_string(localization.sigma)},
+                 {"shared_sigmas", or_null(localization.shared_sigmas)},
                  {"within_one_sigma", json_of(localization.within_one_sigma)},
                  {"within_two_sigma", json_of(localization.within_two_sigma)}}},
                {"polarity", Json::object()},
@@ -216,8 +222,8 @@ std::string commission_json(const Commission& commission, const std::string& pdf
     Json& into = json["axes"][kErrorComponents[axis]];
     into = {{"polarity", to_string(localization.polarity(axis))},
             {"limit", to_string(one.limit)},
-            {"known_from", one.least_known},
-            {"known_to", one.most_known},
+            {"known_from", or_null(one.least_known)},
+            {"known_to", or_null(one.most_known)},
             {"count", 0}};
     if (!one.errors) continue;
     into["count"] = one.errors->count;

@@ -80,7 +80,7 @@ class CommissionPdf {
       if (axis.errors) {
         const Agreement& errors = *axis.errors;
         cell(1, fmt::format("{}", errors.count));
-        cell(2, fmt::format("{:+.2f}, {:+.2f}", axis.least_known, axis.most_known));
+        cell(2, fmt::format("{:+.2f}, {:+.2f}", axis.least_known.value(), axis.most_known.value()));
         cell(3, errors.bias_within ? fmt::format("{:+.3f} ± {:.3f}", errors.bias, *errors.bias_within)
                                    : fmt::format("{:+.3f}", errors.bias));
         cell(4, errors.sd ? fmt::format("{:.3f}", *errors.sd) : "-");

@@ -5,11 +5,11 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <cmath>
 
 #include "base/csv.h"
 #include "base/error.h"
+#include "base/sha256.h"
 #include "base/text_file.h"
 #include "geometry/rotation.h"
 #include "io/dicom/table_read_outs.h"
@@ -22,13 +22,12 @@ constexpr const char* kSession = "session";
 constexpr double kMaxMm = 1000.0, kMaxDeg = 180.0;
 
 double number_from(const std::string& text, const char* column, const std::string& where) {
-  double value = 0.0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  const auto value = number_in_cell(text);
   const double most = std::string_view(column).ends_with("_deg") ? kMaxDeg : kMaxMm;
-  if (error != std::errc() || end != text.data() + text.size() || !(std::abs(value) <= most))
+  if (!value || std::abs(*value) > most)
     throw Error(
         fmt::format("{}, column {}: \"{}\", expected a number from {:g} to {:g}", where, column, text, -most, most));
-  return value;
+  return *value;
 }
 
 Eigen::Isometry3d pose_of(const ErrorComponents& components) {
@@ -54,7 +53,8 @@ Eigen::Isometry3d room_from_table(const std::string& name, const SetupResult& se
 }  // namespace
 
 KnownPoses read_known_poses(const std::filesystem::path& csv) {
-  const CsvTable table = csv_table(text_of_file(csv), csv.string());
+  const std::string text = text_of_file(csv);
+  const CsvTable table = csv_table(text, csv.string());
   const std::string all_columns = fmt::format("{}, {}", kSession, fmt::join(kErrorComponents, ", "));
   const auto is_known = [](const std::string& name) {
     return name == kSession || std::ranges::find(kErrorComponents, name) != kErrorComponents.end();
@@ -68,7 +68,7 @@ KnownPoses read_known_poses(const std::filesystem::path& csv) {
     if (!has(name))
       throw Error(fmt::format("{}: has no column {}; its first line must name the columns {}", csv.string(), name,
                               all_columns));
-  KnownPoses poses{.by_session = {}, .have_angles = has("rx_deg")};
+  KnownPoses poses{.by_session = {}, .have_angles = has("rx_deg"), .sha256 = sha256_of(text)};
   for (const char* name : {"rx_deg", "ry_deg", "rz_deg"})
     if (has(name) != poses.have_angles)
       throw Error(

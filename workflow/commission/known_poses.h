@@ -10,11 +10,19 @@
 
 namespace isoshift {
 
+// What is known of the phantom.
+enum class Known {
+  kReadOuts,   // how the table moved it, by the table's own read-outs
+  kMoves,      // how it was moved between the sessions, by a table of people
+  kPositions,  // where it lay in every session
+};
+
 struct KnownPoses {
   // The pose as a setup error (IEC 61217 fixed): what was planned at x lies at the pose times x. Of moves only the
   // differences between sessions are known.
   std::map<std::string, Eigen::Isometry3d> by_session;
   bool have_angles = true;  // otherwise rotations are unknown, and nothing is turned in the poses
+  std::string sha256;       // of the table
 };
 
 // CSV with the columns session, x_mm, y_mm, z_mm, rx_deg, ry_deg, rz_deg, in any order: R x + t, R = Rz Rx Ry. The

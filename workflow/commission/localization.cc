@@ -1,102 +1,24 @@
 #include "workflow/commission/localization.h"
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
-#include <set>
 #include <utility>
 
 #include "base/error.h"
 #include "geometry/motion_axes.h"
 #include "geometry/rotation.h"
-#include "setup/shown_shift.h"
+#include "workflow/commission/placed_sessions.h"
 
 namespace isoshift {
 namespace {
 
-using Matrix6d = Eigen::Matrix<double, 6, 6>;
-using Vector6d = Eigen::Matrix<double, 6, 1>;
-
-Eigen::Isometry3d found_pose(const SetupResult& session) {
-  const auto position = patient_position_from(session.patient_position);
-  if (!position) throw Error(fmt::format("patient position \"{}\" is none of DICOM's", session.patient_position));
-  return session.setup_error * planned_room_from_patient(*position, session.table, session.isocenter_patient_mm);
-}
-
-std::array<bool, 6> determined_axes(const SetupResult& session) {
-  std::array<bool, 6> are_determined{};
-  const ShownShift shown = shown_shift(session);
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    are_determined[axis] = shown.setup_error_mm[axis].has_value();
-    are_determined[axis + 3] = !session.translation_only && session.unobservable_room.empty();
-  }
-  return are_determined;
-}
-
-Matrix6d covariance_of(const SetupResult& session) {
-  return session.uncertainty ? session.uncertainty->covariance : Matrix6d::Zero();
-}
-
-// Of a move: what the imagers put off at both of its ends is not in it.
-Matrix6d covariance_in_moves(const SetupResult& session) {
-  return covariance_of(session) - (session.by_imagers ? session.by_imagers->covariance : Matrix6d::Zero());
-}
-
-// What a small motion before `motion` is after it: motion * small = small' * motion.
-Matrix6d carried_by(const Eigen::Isometry3d& motion) {
-  Matrix6d carried = Matrix6d::Zero();
-  carried.topLeftCorner<3, 3>() = carried.bottomRightCorner<3, 3>() = motion.linear();
-  carried.topRightCorner<3, 3>() = cross_matrix(motion.translation()) * motion.linear();
-  return carried;
-}
-
-// Where a session's phantom was found, and where it is known to have lain.
-struct Placed {
-  std::string name, condition;  // "HFS, kV"
-  Eigen::Isometry3d found, known;
-  std::array<bool, 6> are_determined{};
-  Matrix6d covariance;  // of `found`
-};
-
-// A position or a move as it was found, and as it is known.
-struct Compared {
-  Eigen::Isometry3d found, known;
-  std::array<bool, 6> are_determined{};
-  Matrix6d covariance;  // of `found`
-
-  // What `found` puts beside `known`: translation at the isocenter in mm, rotation vector in rad.
-  Vector6d error() const {
-    const Eigen::Isometry3d error = found * known.inverse();
-    return (Vector6d() << error.translation(), rotation_vector(error.linear())).finished();
-  }
-};
-
-Compared compared(const Placed& session) {
-  return {session.found, session.known, session.are_determined, session.covariance};
-}
-
-Compared compared(const Placed& before, const Placed& now) {
-  constexpr double kNothing = 0.01;  // of an undetermined axis that a turn brings into another
-  Compared move{now.found * before.found.inverse(), now.known * before.known.inverse(), now.are_determined, {}};
-  const Matrix6d carried = carried_by(move.found);
-  move.covariance = now.covariance + carried * before.covariance * carried.transpose();
-  for (std::size_t axis = 0; axis < 6; ++axis)
-    for (std::size_t from = is_rotation(axis) ? 3 : 0; from < (is_rotation(axis) ? 6 : 3); ++from)
-      if (!before.are_determined[from] &&
-          std::abs(carried(static_cast<Eigen::Index>(axis), static_cast<Eigen::Index>(from))) > kNothing)
-        move.are_determined[axis] = false;
-  return move;
-}
-
 Localized localized(const std::string& session, const Compared& compared, const Vector6d& error) {
-  Localized one{.session = session,
-                .known = components_of(compared.known),
-                .found = components_of(compared.found),
-                .error = {},
-                .sigma = {}};
+  Localized one{.session = session, .known = {}, .found = components_of(compared.found), .error = {}, .sigma = {}};
+  const ErrorComponents known = components_of(compared.known);
   for (std::size_t axis = 0; axis < 6; ++axis) {
+    if (compared.are_angles_known || !is_rotation(axis)) one.known[axis] = known[axis];
     if (!compared.are_determined[axis]) continue;
     const auto n = static_cast<Eigen::Index>(axis);
     const double unit = is_rotation(axis) ? deg_from_rad(1.0) : 1.0;
@@ -116,35 +38,6 @@ void check_names(const std::vector<NamedResult>& sessions, const KnownPoses& pos
       throw Error(fmt::format("the table of known poses names session {}, of which there is no result to use", name));
 }
 
-std::string condition_of(const SetupResult& session) {
-  std::set<std::string> beams;
-  for (const SetupResult::View& view : session.views) beams.insert(view.is_megavoltage ? "MV" : "kV");
-  return fmt::format("{}, {}", session.patient_position, fmt::join(beams, " and "));
-}
-
-// `poses`: unused with read-outs.
-std::vector<Placed> placed(const std::vector<NamedResult>& sessions, Known known, const KnownPoses& poses) {
-  std::vector<Placed> all;
-  all.reserve(sessions.size());
-  const auto& [first_name, first] = sessions.front();
-  for (const auto& [name, result] : sessions) {
-    Placed one{.name = name,
-               .condition = condition_of(result),
-               .found = result.setup_error,
-               .known = known == Known::kReadOuts ? moved_by_table(first_name, first, name, result)
-                                                  : poses.by_session.at(name),
-               .are_determined = determined_axes(result),
-               .covariance = covariance_of(result)};
-    if (known != Known::kReadOuts && !poses.have_angles) std::fill_n(one.are_determined.begin() + 3, 3, false);
-    if (known != Known::kPositions) {
-      one.found = found_pose(result);
-      one.covariance = covariance_in_moves(result);
-    }
-    all.push_back(std::move(one));
-  }
-  return all;
-}
-
 // Between all sessions of one patient position and beam: a bias that they share says nothing about a sign.
 std::map<std::string, Polarities> polarities_of(const std::vector<Placed>& sessions) {
   constexpr double kLeastMove = 1.0;  // mm or degrees
@@ -160,48 +53,106 @@ std::map<std::string, Polarities> polarities_of(const std::vector<Placed>& sessi
       Polarities& polarity = polarities[sessions[after].condition];
       for (std::size_t axis = 0; axis < 6; ++axis) {
         const double least = std::max(kLeastMove, kLeastSigmas * one.sigma[axis].value_or(0.0));
-        if (!one.error[axis] || std::abs(one.known[axis]) < least || polarity[axis] == Outcome::kFailed) continue;
+        const double known = one.known[axis].value_or(0.0);
+        if (!one.error[axis] || std::abs(known) < least || polarity[axis] == Outcome::kFailed) continue;
         // Half a turn is known as 180 or -180 degrees, and found beyond either.
-        double off = one.found[axis] - one.known[axis];
+        double off = one.found[axis] - known;
         if (is_rotation(axis)) off = std::remainder(off, kTurnDeg);
-        const double found_by_known = 1.0 + off / one.known[axis];
+        const double found_by_known = 1.0 + off / known;
         polarity[axis] = found_by_known < 0.5 || found_by_known > 1.5 ? Outcome::kFailed : Outcome::kPassed;
       }
     }
   return polarities;
 }
 
-// Every session against the mean of all before it. These differences are independent where the sessions' uncertainties
-// are equal (Helmert's contrasts); moves that share the first session are not.
-std::vector<Localized> independent_errors(const std::vector<Placed>& sessions) {
-  std::vector<Localized> independent;
+// Errors that are independent of each other, to count, and what sessions share.
+struct IndependentErrors {
+  std::vector<Localized> counted;
+  std::vector<double> shared;  // in its sigmas, once per axis
+};
+
+// Moves: every session against the mean of all before it. These differences are independent where the sessions'
+// uncertainties are equal (Helmert's contrasts); moves that share the first session are not.
+void add_contrasts(const std::vector<const Placed*>& sessions, IndependentErrors& errors) {
   for (std::size_t now = 1; now < sessions.size(); ++now) {
     const auto before = static_cast<double>(now);
-    Compared mean = compared(sessions[now]);
+    Compared mean = compared(*sessions[now]);
     Vector6d error = Vector6d::Zero();
+    CarriedErrors carried;
+    carried.add(*sessions[now], Matrix6d::Identity());
     for (std::size_t n = 0; n < now; ++n) {
-      const Compared move = compared(sessions[n], sessions[now]);
+      const Compared move = compared(*sessions[n], *sessions[now]);
       error += move.error() / before;
-      mean.covariance += (move.covariance - sessions[now].covariance) / (before * before);
+      carried.add(*sessions[n], -carried_by(move.found) / before);
       for (std::size_t axis = 0; axis < 6; ++axis)
         mean.are_determined[axis] = mean.are_determined[axis] && move.are_determined[axis];
     }
-    independent.push_back(localized(sessions[now].name, mean, error));
+    mean.covariance = carried.covariance();
+    errors.counted.push_back(localized(sessions[now]->name, mean, error));
   }
-  return independent;
+}
+
+// Positions seen by the same views hold the same error of the imagers. Its most probable value, from the sessions' mean
+// and what is expected of the imagers, is taken out of every session, and is tested once.
+void add_positions(const std::vector<const Placed*>& sessions, IndependentErrors& errors) {
+  const auto count = static_cast<double>(sessions.size());
+  std::vector<Localized> all;
+  all.reserve(sessions.size());
+  for (const Placed* session : sessions)
+    all.push_back(localized(session->name, compared(*session), compared(*session).error()));
+  for (std::size_t axis = 0; axis < 6; ++axis) {
+    if (!std::ranges::all_of(all, [axis](const Localized& one) { return one.error[axis] && one.sigma[axis]; }))
+      continue;
+    const double unit = is_rotation(axis) ? deg_from_rad(1.0) : 1.0;
+    const auto n = static_cast<Eigen::Index>(axis);
+    const double by_imagers = unit * unit * sessions.front()->by_imagers(n, n);  // variances
+    if (!(by_imagers > 0.0)) continue;
+    double mean = 0.0, by_session = 0.0;
+    for (const Localized& one : all) {
+      mean += *one.error[axis] / count;
+      by_session += std::max(0.0, *one.sigma[axis] * *one.sigma[axis] - by_imagers) / count;
+    }
+    const double of_mean = by_imagers + by_session / count, share = by_imagers / of_mean;
+    errors.shared.push_back(mean / std::sqrt(of_mean));
+    for (Localized& one : all) {
+      const double own = std::max(0.0, *one.sigma[axis] * *one.sigma[axis] - by_imagers);
+      one.error[axis] = *one.error[axis] - share * mean;
+      one.sigma[axis] = std::sqrt(own - (2.0 * share * own - share * share * by_session) / count +
+                                  (1.0 - share) * (1.0 - share) * by_imagers);
+    }
+  }
+  errors.counted.insert(errors.counted.end(), all.begin(), all.end());
+}
+
+IndependentErrors independent_errors(const std::vector<Placed>& sessions, Known known) {
+  std::vector<std::vector<const Placed*>> groups;  // that determine the same axes; positions also of the same views
+  for (const Placed& session : sessions) {
+    const auto group = std::ranges::find_if(groups, [&](const std::vector<const Placed*>& alike) {
+      return alike.front()->are_determined == session.are_determined &&
+             (known != Known::kPositions || have_same_views(*alike.front(), session));
+    });
+    if (group == groups.end())
+      groups.push_back({&session});
+    else
+      group->push_back(&session);
+  }
+  IndependentErrors errors;
+  for (const std::vector<const Placed*>& alike : groups)
+    (known == Known::kPositions ? add_positions : add_contrasts)(alike, errors);
+  return errors;
 }
 
 AxisOfLocalization axis_of(const Localization& localization, std::size_t axis,
                            const std::optional<LocalizationLimits>& limits) {
   AxisOfLocalization result;
   std::vector<double> errors;
-  // Moves begin at 0.
-  if (localization.known == Known::kPositions)
-    result.least_known = result.most_known = localization.all.front().known[axis];
   for (const Localized& one : localization.all) {
-    result.least_known = std::min(result.least_known, one.known[axis]);
-    result.most_known = std::max(result.most_known, one.known[axis]);
     if (one.error[axis]) errors.push_back(*one.error[axis]);
+    if (!one.known[axis]) continue;
+    // Moves begin at 0.
+    const double first = localization.known == Known::kPositions ? *one.known[axis] : 0.0;
+    result.least_known = std::min(result.least_known.value_or(first), *one.known[axis]);
+    result.most_known = std::max(result.most_known.value_or(first), *one.known[axis]);
   }
   if (errors.empty()) return result;
   for (const double error : errors) result.largest = std::max(result.largest, std::abs(error));
@@ -216,10 +167,10 @@ AxisOfLocalization axis_of(const Localization& localization, std::size_t axis,
   return result;
 }
 
-void calibrate(Localization& localization, const std::vector<Localized>& errors) {
+void calibrate(Localization& localization, const IndependentErrors& errors) {
   constexpr double kOneSigma = 0.6827, kTwoSigma = 0.9545;
   std::size_t total = 0, within_one = 0, within_two = 0;
-  for (const Localized& one : errors)
+  for (const Localized& one : errors.counted)
     for (std::size_t axis = 0; axis < 6; ++axis) {
       if (!one.error[axis] || !one.sigma[axis]) continue;
       ++total;
@@ -229,8 +180,13 @@ void calibrate(Localization& localization, const std::vector<Localized>& errors)
   if (total == 0) return;
   localization.within_one_sigma = share_of(within_one, total);
   localization.within_two_sigma = share_of(within_two, total);
-  const bool holds =
-      localization.within_one_sigma->high >= kOneSigma && localization.within_two_sigma->high >= kTwoSigma;
+  bool holds = localization.within_one_sigma->high >= kOneSigma && localization.within_two_sigma->high >= kTwoSigma;
+  if (!errors.shared.empty()) {
+    localization.shared_sigmas =
+        std::abs(*std::ranges::max_element(errors.shared, {}, [](double z) { return std::abs(z); }));
+    localization.shared_sigmas_limit = sigmas_hardly_exceeded(errors.shared.size());
+    holds = holds && *localization.shared_sigmas <= localization.shared_sigmas_limit;
+  }
   localization.sigma = holds ? Outcome::kPassed : Outcome::kFailed;
 }
 
@@ -274,7 +230,7 @@ Localization localization_of(const std::vector<NamedResult>& sessions, Known kno
   for (std::size_t axis = 0; axis < localization.axes.size(); ++axis)
     localization.axes[axis] = axis_of(localization, axis, limits);
   localization.polarities = polarities_of(all);
-  calibrate(localization, known == Known::kPositions ? localization.all : independent_errors(all));
+  calibrate(localization, independent_errors(all, known));
   return localization;
 }
 

@@ -17,18 +17,12 @@
 
 namespace isoshift {
 
-// What is known of the phantom.
-enum class Known {
-  kReadOuts,   // how the table moved it, by the table's own read-outs
-  kMoves,      // how it was moved between the sessions, by a table of people
-  kPositions,  // where it lay in every session
-};
-
 // One position, or one move against the first session. Components are along and about the axes of IEC 61217 fixed, of
 // the motion from the planned pose (positions) or from the first session's (moves).
 struct Localized {
   std::string session;
-  ErrorComponents known{}, found{};
+  std::array<std::optional<double>, 6> known;  // unset: an angle that the table of known poses does not name
+  ErrorComponents found{};
   // What the registration put beside the known pose: translation at the isocenter and rotation vector. Unset: the
   // X-rays do not determine this axis.
   std::array<std::optional<double>, 6> error, sigma;
@@ -40,7 +34,7 @@ std::string_view to_string(Outcome outcome);
 struct AxisOfLocalization {
   std::optional<Agreement> errors;  // of moves, the bias's interval holds the first session's own error, too
   double largest = 0.0;             // of the errors' sizes
-  double least_known = 0.0, most_known = 0.0;
+  std::optional<double> least_known, most_known;
   Outcome limit = Outcome::kUntested;  // no error beyond the site's limit
 };
 
@@ -53,10 +47,16 @@ struct Localization {
   std::vector<Localized> all;
   std::array<AxisOfLocalization, 6> axes;
   std::map<std::string, Polarities> polarities;  // by patient position and beam: "HFS, kV"
-  // Of all errors with a sigma: how many lie within one and two of it. Unset: none has. With moves they are those of
-  // every session against the mean of all before it.
+  // Of independent errors with a sigma: how many lie within one and two of it. Unset: none has. They are those of moves
+  // of every session against the mean of all before it, or those of positions without what the imagers put off in all
+  // sessions of the same views.
   std::optional<Share> within_one_sigma, within_two_sigma;
-  Outcome sigma = Outcome::kUntested;  // fails if one sigma holds clearly fewer than 68.27 %, or two than 95.45 %
+  // What the imagers put off in all positions of the same views, on the worst axis, in its sigmas, and what this seldom
+  // exceeds. Unset: nothing is known of the imagers, or of the positions.
+  std::optional<double> shared_sigmas;
+  double shared_sigmas_limit = 0.0;
+  // Fails if one sigma holds clearly fewer than 68.27 %, or two than 95.45 %, or if shared_sigmas exceeds its limit.
+  Outcome sigma = Outcome::kUntested;
 
   // Of all patient positions and beams together: failed if it failed in one, passed if it passed in one.
   Outcome polarity(std::size_t axis) const;
