@@ -5,6 +5,7 @@
 #include <memory>
 
 #include "base/error.h"
+#include "base/local_time.h"
 #include "cli/commands/commands.h"
 #include "workflow/audit_setup/archive.h"
 #include "workflow/audit_setup/audit_files.h"
@@ -29,14 +30,17 @@ SetupAudit audit_archive(const AuditSetupOptions& options) {
   std::vector<AuditedSession> sessions =
       read_archive(options.archive, are_objects ? ComparedShift::kFull : ComparedShift::kOfSitesCouch);
   std::vector<std::string> of_no_use;
+  std::string used_sha256;
   if (are_objects) {
     std::optional<Eigen::Vector3d> source_isocenter_mm;
     if (!options.source_isocenter.empty()) source_isocenter_mm = Eigen::Vector3d(options.source_isocenter.data());
     of_no_use = read_used_objects(options.used, source_isocenter_mm, sessions);
   } else if (!options.used.empty()) {
-    read_used_table(options.used, sessions);
+    used_sha256 = read_used_table(options.used, sessions);
   }
   SetupAudit audit = audit_of(std::move(sessions));
+  audit.made_on = local_time();
+  audit.used_sha256 = std::move(used_sha256);
   audit.of_no_use = std::move(of_no_use);
   return audit;
 }

@@ -4,12 +4,14 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
 #include <nlohmann/json.hpp>
 
 #include "base/output_folder.h"
+#include "base/sha256.h"
 #include "io/dicom/decode.h"
 #include "tests/support/audited_archive.h"
 #include "tests/support/small_study.h"
@@ -126,6 +128,41 @@ TEST_F(AuditSetupCommandTest, DescribesWhatIsoshiftFoundWithoutUsedShifts) {
   EXPECT_THAT(outcome.out, HasSubstr("0 compared with used shifts"));
   EXPECT_THAT(outcome.out, Not(HasSubstr("AGREEMENT")));
   EXPECT_THAT(outcome.out, HasSubstr("MARGINS"));
+}
+
+// Of two results of an X-ray the later counts, whatever the clocks of the programs showed and whatever else they hold.
+TEST_F(AuditSetupCommandTest, OfResultsOfOneXrayTheLatestCounts) {
+  MadeArchive archive = made_archive(1, 0.0, false);
+  archive.sessions[0].result.made_on = "2026-03-01T10:16:02+0100";
+  SetupResult& later = archive.sessions[1].result;
+  later.views.push_back(archive.sessions[0].result.views.front());
+  later.made_on = "2026-03-01T09:30:00+0000";
+  write_archive(archive, results(), table());
+  const Json audit = Json::parse(run({"--json"}).out);
+  EXPECT_EQ(audit["counted"], 59);
+  const Json earlier = *std::ranges::find(audit["sessions"], MadeArchive::name_of(0),
+                                          [](const Json& session) { return session["session"].get<std::string>(); });
+  EXPECT_EQ(earlier["left_out"], "its X-ray has a later result: " + MadeArchive::name_of(1));
+}
+
+TEST_F(AuditSetupCommandTest, AResultThatCannotBeReadHasNoVerdict) {
+  write_archive(made_archive(1, 0.0, false), results(), table());
+  replace_text(results() / MadeArchive::name_of(0) / "result.json", "{}");
+  const CommandOutcome outcome = run({"--json", "-o", output().string()});
+  ASSERT_EQ(outcome.exit_status, 0) << outcome.err;
+  const Json audit = Json::parse(outcome.out);
+  EXPECT_EQ(audit["counted"], 59);
+  EXPECT_EQ(audit["sessions"][0]["verdict"], "unreadable");
+  EXPECT_THAT(text_of(output() / "audit.csv"), HasSubstr(MadeArchive::name_of(0) + ",,,,unreadable,no,no,"));
+}
+
+TEST_F(AuditSetupCommandTest, TheJsonSaysWhatItWasMadeFrom) {
+  write_archive(made_archive(1, 0.0, false), results(), table());
+  const Json audit = Json::parse(run({"--used", table().string(), "--json"}).out);
+  EXPECT_EQ(audit["program"]["name"], "isoshift");
+  EXPECT_EQ(audit["used_sha256"], sha256_of_file(table()));
+  EXPECT_THAT(audit["made_on"], testing::StartsWith("20"));
+  EXPECT_TRUE(audit["sessions"][0].contains("patient_id_issuer"));
 }
 
 // What register wrote is its own used shift; the object of another patient, or of no session, is of no use.

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
 #include <map>
 #include <set>
 #include <utility>
@@ -43,20 +44,22 @@ void set_found(const SetupResult& result, ComparedShift compared, AuditedSession
 
 struct ReadSession {
   AuditedSession session;
-  std::string made_on;
+  std::set<std::pair<std::string, int>> xrays;  // by instance and frame
+  std::optional<double> made_on;                // seconds of UTC; nothing: unknown
 };
 
 ReadSession read_session(const fs::path& folder, std::string name, ComparedShift compared) {
-  ReadSession read{.session = {.name = std::move(name), .folder = folder}, .made_on = ""};
+  ReadSession read{.session = {.name = std::move(name), .folder = folder}, .xrays = {}, .made_on = {}};
   AuditedSession& session = read.session;
   try {
     const SetupResult result = read_report(folder);
-    read.made_on = result.made_on;
+    read.made_on = utc_seconds_at(result.made_on);
     session.verdict = result.verdict;
     session.reasons = result.reasons;
     session.identity = result.identity;
     for (const SetupResult::View& view : result.views) {
       session.xrays.insert(view.sop_instance_uid);
+      read.xrays.emplace(view.sop_instance_uid, view.frame);
       if (!view.acquired.empty() && (session.acquired.empty() || view.acquired < session.acquired))
         session.acquired = view.acquired;
     }
@@ -79,16 +82,22 @@ ReadSession read_session(const fs::path& folder, std::string name, ComparedShift
   return read;
 }
 
-// Of several results of the same X-rays only the one made last counts.
+// Of several results of an X-ray only the one made last counts.
 void leave_out_earlier_results(std::vector<ReadSession>& all) {
-  std::map<std::set<std::string>, ReadSession*> newest;
-  for (ReadSession& one : all) {
-    if (one.session.xrays.empty()) continue;
-    const auto [place, is_first] = newest.try_emplace(one.session.xrays, &one);
-    if (is_first) continue;
-    ReadSession* earlier = std::exchange(place->second, &one);
-    if (one.made_on < earlier->made_on) std::swap(earlier, place->second);
-    earlier->session.left_out = "its X-rays have a later result: " + place->second->session.name;
+  std::vector<ReadSession*> latest_first;
+  latest_first.reserve(all.size());
+  for (ReadSession& one : all) latest_first.push_back(&one);
+  std::ranges::stable_sort(latest_first, std::greater(), &ReadSession::made_on);
+  std::map<std::pair<std::string, int>, const ReadSession*> owners;
+  for (ReadSession* one : latest_first) {
+    const auto owned = std::ranges::find_if(one->xrays, [&](const auto& xray) { return owners.contains(xray); });
+    if (owned != one->xrays.end()) {
+      one->session.left_out =
+          fmt::format("{} a later result: {}", one->xrays.size() == 1 ? "its X-ray has" : "X-rays of it have",
+                      owners.at(*owned)->session.name);
+      continue;
+    }
+    for (const auto& xray : one->xrays) owners[xray] = one;
   }
 }
 

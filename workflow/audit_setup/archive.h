@@ -15,9 +15,9 @@ enum class ComparedShift {
 };
 
 // In the order of their times. A result counts if it was accepted, if the time of its X-rays is known, and if no other
-// result of the same X-rays was made later. Results that do not count, and those that cannot be read, say why. Folders
-// of results that watch or batch have put aside (superseded, by_hand, handed_over), and hidden folders, are passed
-// over. Throws Error for a folder without results.
+// result of any of its X-rays was made later. Results that do not count, and those that cannot be read, say why.
+// Folders of results that watch or batch have put aside (superseded, by_hand, handed_over), and hidden folders, are
+// passed over. Throws Error for a folder without results.
 std::vector<AuditedSession> read_archive(const std::filesystem::path& folder, ComparedShift compared);
 
 }  // namespace isoshift

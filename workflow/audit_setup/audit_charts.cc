@@ -61,9 +61,9 @@ std::string run_chart(const std::string& title, const std::string& y_label, Scat
     line.points.emplace_back(day, drifts ? drift->at(day) : mean);
   }
   chart.lines.push_back(std::move(line));
-  constexpr int kDates = 3;
-  for (int part = 0; part <= kDates && last > first; ++part) {
-    const double day = first + (last - first) * part / kDates;
+  const int dates = last > first ? 4 : 1;
+  for (int n = 0; n < dates; ++n) {
+    const double day = first + (last - first) * n / std::max(1, dates - 1);
     chart.x_names.emplace_back(day, date_of(day));
   }
   return scatter_chart_svg(chart);

@@ -8,6 +8,7 @@
 
 #include "base/csv.h"
 #include "base/output_folder.h"
+#include "base/version.h"
 #include "workflow/audit_setup/audit_words.h"
 
 namespace isoshift {
@@ -59,8 +60,9 @@ Json session_json(const SetupAudit& audit, std::size_t n) {
   const AuditedSession& session = audit.sessions[n];
   Json json = {{"session", session.name},
                {"patient_id", session.identity.patient_id},
+               {"patient_id_issuer", session.identity.patient_id_issuer},
                {"acquired", session.acquired},
-               {"verdict", to_string(session.verdict)},
+               {"verdict", session.verdict_in_words()},
                {"reasons", session.reasons},
                {"counts", session.counts()},
                {"left_out", session.left_out},
@@ -84,6 +86,9 @@ Json session_json(const SetupAudit& audit, std::size_t n) {
 
 std::string audit_json(const SetupAudit& audit) {
   Json json = {{"schema", 1},
+               {"program", {{"name", "isoshift"}, {"version", kVersion}, {"commit", kCommit}}},
+               {"made_on", audit.made_on},
+               {"used_sha256", audit.used_sha256.empty() ? Json(nullptr) : Json(audit.used_sha256)},
                {"counted", audit.counted},
                {"compared", audit.compared},
                {"patients", audit.patients},
@@ -109,15 +114,16 @@ std::string audit_json(const SetupAudit& audit) {
 }
 
 std::string audit_csv(const SetupAudit& audit, const std::filesystem::path& place) {
-  std::string csv = "session,patient_id,acquired,verdict,counted,outlier,remark";
+  std::string csv = "session,patient_id,patient_id_issuer,acquired,verdict,counted,outlier,remark";
   for (const char* kind : {"found", "used", "difference", "sigma"})
     for (const char* column : kCouchColumns) csv += fmt::format(",{}_{}", kind, column);
   csv += ",report\n";
   for (std::size_t n = 0; n < audit.sessions.size(); ++n) {
     const AuditedSession& session = audit.sessions[n];
-    csv += fmt::format("{},{},{},{},{},{},{}", csv_cell(session.name), csv_cell(session.identity.patient_id),
-                       session.acquired, to_string(session.verdict), session.counts() ? "yes" : "no",
-                       audit.outlier_of(n) != nullptr ? "yes" : "no", csv_cell(remark_on(n, audit)));
+    csv += fmt::format("{},{},{},{},{},{},{},{}", csv_cell(session.name), csv_cell(session.identity.patient_id),
+                       csv_cell(session.identity.patient_id_issuer), session.acquired, session.verdict_in_words(),
+                       session.counts() ? "yes" : "no", audit.outlier_of(n) != nullptr ? "yes" : "no",
+                       csv_cell(remark_on(n, audit)));
     for (const CouchAxes& axes : {session.found, session.used, session.difference(), session.sigma})
       for (const std::optional<double>& value : axes) csv += value ? fmt::format(",{:.4f}", *value) : ",";
     csv += "," + csv_cell(std::filesystem::proximate(session.folder, place).string()) + "\n";

@@ -149,11 +149,11 @@ std::string audit_html(const SetupAudit& audit, const std::filesystem::path& pla
   page.columns.emplace_back("Remark");
   for (std::size_t n = 0; n < audit.sessions.size(); ++n) {
     const AuditedSession& session = audit.sessions[n];
-    ResultsPage::Row row{.verdict = std::string(to_string(session.verdict)),
+    ResultsPage::Row row{.verdict = session.verdict_in_words(),
                          .cells = {session_cell(session, place),
                                    {.text = patient_in_words(session.identity)},
                                    {.text = session.acquired},
-                                   {.text = std::string(to_string(session.verdict))}}};
+                                   {.text = session.verdict_in_words()}}};
     const CouchAxes difference = session.difference();
     for (std::size_t axis = 0; axis < difference.size(); ++axis)
       row.cells.push_back(number_cell(difference[axis], is_rotation(axis) ? 2 : 1));

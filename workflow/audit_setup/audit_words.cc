@@ -49,7 +49,8 @@ std::string agreement_text(const SetupAudit& audit) {
     text += fmt::format("  {:<14}{:>8}{:>+10.2f}", kCouchAxes[n], agreement.count, agreement.bias);
     if (agreement.sd)
       text += fmt::format(
-          "{:>10.2f}{:>10.2f}{:>22}", *agreement.bias_within, *agreement.sd,
+          "{:>10}{:>10.2f}{:>22}", agreement.bias_within ? fmt::format("{:.2f}", *agreement.bias_within) : "-",
+          *agreement.sd,
           fmt::format("{:+.2f} to {:+.2f}", agreement.bias - *agreement.limit, agreement.bias + *agreement.limit));
     if (axis.drift)
       text += fmt::format("{:>26}", fmt::format("{:+.3f} +/- {:.3f}", axis.drift->slope, axis.drift->slope_within));

@@ -16,11 +16,11 @@
 namespace isoshift {
 
 struct AuditedSession {
-  std::string name;              // of its folder; with the folders above where two folders have one name
-  std::filesystem::path folder;  // of the result
-  std::string acquired;          // when the first X-ray was taken, "2026-03-01 10:15:00"; empty: unknown
-  double day = 0.0;              // the same, in days since 1970
-  Verdict verdict = Verdict::kRejected;
+  std::string name;                  // of its folder; with the folders above where two folders have one name
+  std::filesystem::path folder;      // of the result
+  std::string acquired;              // when the first X-ray was taken, "2026-03-01 10:15:00"; empty: unknown
+  double day = 0.0;                  // the same, in days since 1970
+  std::optional<Verdict> verdict;    // nothing: the result cannot be read
   std::vector<std::string> reasons;  // why it was not accepted
   std::string left_out;              // why it does not count; empty: it does
 
@@ -38,6 +38,7 @@ struct AuditedSession {
   std::set<std::string> xrays;  // SOPInstanceUIDs
   PlannedSetup planned;
 
+  std::string verdict_in_words() const { return verdict ? std::string(to_string(*verdict)) : "unreadable"; }
   bool counts() const { return left_out.empty(); }
   // Used minus found: where the used shift would leave the patient, if isoshift is right. Empty where one is not known.
   CouchAxes difference() const;

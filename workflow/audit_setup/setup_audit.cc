@@ -73,17 +73,33 @@ bool looks_opposite(const std::vector<const AuditedSession*>& compared, std::siz
   return !apart.empty() && median(apart_from_opposite) < kMuchNearer * median(apart);
 }
 
-void audit_axis(const std::vector<const AuditedSession*>& compared, const DifferencesFound& found, std::size_t axis,
-                SetupAudit::Axis& audited) {
-  std::vector<double> all, without_outliers;
-  for (std::size_t n = 0; n < compared.size(); ++n) {
-    const auto off = compared[n]->difference()[axis];
-    if (!off) continue;
-    all.push_back(*off);
-    if (!found.is_outlier(n)) without_outliers.push_back(*off);
+// Differences of sessions with the numbers of their patients.
+class DifferencesOfPatients {
+ public:
+  void add(double difference, std::size_t patient) {
+    differences_.push_back(difference);
+    patients_.push_back(patient);
   }
-  if (!all.empty()) audited.of_all = agreement_of(all);
-  if (!without_outliers.empty()) audited.without_outliers = agreement_of(without_outliers);
+  std::optional<Agreement> agreement() const {
+    return differences_.empty() ? std::nullopt : std::optional(agreement_of(differences_, patients_));
+  }
+
+ private:
+  std::vector<double> differences_;
+  std::vector<std::size_t> patients_;
+};
+
+void audit_axis(const std::vector<const AuditedSession*>& compared, const std::vector<SessionDifference>& differences,
+                const DifferencesFound& found, std::size_t axis, SetupAudit::Axis& audited) {
+  DifferencesOfPatients all, without_outliers;
+  for (std::size_t n = 0; n < differences.size(); ++n) {
+    const auto off = differences[n].difference[axis];
+    if (!off) continue;
+    all.add(*off, differences[n].patient);
+    if (!found.is_outlier(n)) without_outliers.add(*off, differences[n].patient);
+  }
+  audited.of_all = all.agreement();
+  audited.without_outliers = without_outliers.agreement();
   audited.drift = found.axes[axis].drift;
   audited.scatter = found.axes[axis].scatter;
   audited.looks_opposite = looks_opposite(compared, axis);
@@ -107,7 +123,8 @@ void audit_differences(SetupAudit& audit) {
   const DifferencesFound found = find_in_differences(differences);
   audit.compared = compared.size();
   audit.threshold = found.threshold;
-  for (std::size_t axis = 0; axis < audit.axes.size(); ++axis) audit_axis(compared, found, axis, audit.axes[axis]);
+  for (std::size_t axis = 0; axis < audit.axes.size(); ++axis)
+    audit_axis(compared, differences, found, axis, audit.axes[axis]);
   audit.level.resize(audit.sessions.size());
   ErrorsByPatient left;
   for (std::size_t n = 0; n < compared.size(); ++n) {

@@ -15,7 +15,9 @@
 namespace isoshift {
 
 struct SetupAudit {
-  struct Axis {                                         // of the table top: used minus found
+  std::string made_on;
+  std::string used_sha256;  // of the table of used shifts; empty: there is none, or registration objects say it
+  struct Axis {             // of the table top: used minus found
     std::optional<Agreement> without_outliers, of_all;  // nothing: nothing is compared
     std::optional<Drift> drift;                         // without outliers
     double scatter = 0.0;                               // robust standard deviation about the level

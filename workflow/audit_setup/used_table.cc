@@ -1,12 +1,12 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include <charconv>
 #include <cmath>
 #include <map>
 
 #include "base/csv.h"
 #include "base/error.h"
+#include "base/sha256.h"
 #include "base/text_file.h"
 #include "workflow/audit_setup/used_shifts.h"
 
@@ -20,18 +20,14 @@ std::vector<std::string> split_header() {
 }
 
 std::optional<double> number_of(const std::string& cell, const std::string& where) {
-  const std::size_t first = cell.find_first_not_of(" \t");
-  if (first == std::string::npos) return std::nullopt;
-  const std::string text = cell.substr(first, cell.find_last_not_of(" \t") + 1 - first);
-  const char *begin = text.data() + (text.starts_with('+') ? 1 : 0), *end = text.data() + text.size();
-  double value = 0.0;
-  const auto [stopped, error] = std::from_chars(begin, end, value);
-  if (error != std::errc() || stopped != end || !std::isfinite(value))
+  if (cell.find_first_not_of(" \t") == std::string::npos) return std::nullopt;
+  const auto value = number_in_cell(cell);
+  if (!value)
     throw Error(fmt::format(
         "{}: \"{}\" is not a finite number; expected mm or degrees with a decimal point, or nothing", where, cell));
   constexpr double kMost = 1000.0;  // mm or degrees; no couch moves that far
-  if (std::abs(value) > kMost)
-    throw Error(fmt::format("{}: {:g} is no couch shift; expected mm or degrees", where, value));
+  if (std::abs(*value) > kMost)
+    throw Error(fmt::format("{}: {:g} is no couch shift; expected mm or degrees", where, *value));
   return value;
 }
 
@@ -39,9 +35,10 @@ std::optional<double> number_of(const std::string& cell, const std::string& wher
 
 std::string used_shifts_header() { return fmt::format("{}", fmt::join(split_header(), ",")); }
 
-void read_used_table(const std::filesystem::path& table, std::vector<AuditedSession>& sessions) {
+std::string read_used_table(const std::filesystem::path& table, std::vector<AuditedSession>& sessions) {
   const std::string where = table.string();
-  const CsvTable rows = csv_table(text_of_file(table), where);
+  const std::string text = text_of_file(table);
+  const CsvTable rows = csv_table(text, where);
   const std::vector<std::string> header = split_header();
   if (rows.columns != header)
     throw Error(fmt::format("{}, line 1: the columns are \"{}\", expected {}", where, fmt::join(rows.columns, ","),
@@ -65,6 +62,7 @@ void read_used_table(const std::filesystem::path& table, std::vector<AuditedSess
     for (std::size_t axis = 0; axis < session.used.size(); ++axis)
       session.used[axis] = number_of(cells[axis + 1], fmt::format("{}, column {}", line, kCouchColumns[axis]));
   }
+  return sha256_of(text);
 }
 
 }  // namespace isoshift
