@@ -23,6 +23,11 @@ struct Volume {
   T& at(int i, int j, int k) { return voxels[index(i, j, k)]; }
   const T& at(int i, int j, int k) const { return voxels[index(i, j, k)]; }
 
+  // The middle between the first and the last voxel's centers, patient axes.
+  Eigen::Vector3d center_mm() const {
+    return patient_from_voxel * Eigen::Vector3d(0.5 * (size.cast<double>().array() - 1.0));
+  }
+
   // Edge lengths of one voxel along its own axes, mm.
   Eigen::Vector3d spacing_mm() const { return patient_from_voxel.linear().colwise().norm(); }
 };

@@ -65,7 +65,7 @@ void run_bench_figures(const BenchFiguresOptions& options, Console& console) {
   const XrayView view = table1_view(512, 370.0);
   Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();  // head up, turned a little to its side
   pose.linear() = rotation_x(rad_from_deg(-90)) * rotation_z(rad_from_deg(25));
-  pose.translation() = -(pose.linear() * center_of(volume.hu));
+  pose.translation() = -(pose.linear() * volume.hu.center_mm());
   const auto beams = std::array{view.beam};
   const AttenuationModel bone = paper_model(200.0), model = paper_model(-540.0);
 

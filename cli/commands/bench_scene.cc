@@ -79,10 +79,6 @@ XrayView table1_view(int pixels, double panel_mm) {
   return make_xray_view(geometry, Beam::kKilovoltage);
 }
 
-Vector3d center_of(const Volume<float>& volume) {
-  return volume.patient_from_voxel * (0.5 * (volume.size.array() - 1).cast<double>()).matrix();
-}
-
 std::vector<Eigen::Isometry3d> bench_poses(const Volume<float>& volume, int every) {
   constexpr int kPerAxis = 30;
   static_assert(kPerAxis * kPerAxis * kPerAxis == kBenchPoses);
@@ -91,7 +87,7 @@ std::vector<Eigen::Isometry3d> bench_poses(const Volume<float>& volume, int ever
   for (int n = 0; n < kBenchPoses; n += every) {
     Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
     pose.linear() = rotation_from_zxy({angle_rad(n), angle_rad(n / kPerAxis), angle_rad(n / (kPerAxis * kPerAxis))});
-    pose.translation() = -(pose.linear() * center_of(volume));
+    pose.translation() = -(pose.linear() * volume.center_mm());
     poses.push_back(pose);
   }
   return poses;

@@ -26,8 +26,6 @@ BenchVolume bench_head(const std::filesystem::path& ct_folder);
 // the corners of the volumes, but it always shows the whole body.
 XrayView table1_view(int pixels, double panel_mm = 500.0);
 
-Eigen::Vector3d center_of(const Volume<float>& volume);
-
 // Rotations about the volume's center: -180 to 168 degrees in steps of 12 about three axes, 27,000 poses in all (Spoerk
 // et al. 2012). Returns every `every`-th of them.
 inline constexpr int kBenchPoses = 27000;

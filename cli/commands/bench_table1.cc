@@ -16,6 +16,7 @@
 #include "base/version.h"
 #include "cli/commands/bench_scene.h"
 #include "cli/commands/table1_folder.h"
+#include "drr/gl/context.h"
 #include "workflow/register/rendering_options.h"
 
 namespace isoshift {
@@ -172,13 +173,18 @@ class Cell {
   std::vector<RenderResult> exact_;  // of every pose at which errors are taken
 };
 
-// A row that is kept and wanted must be of the poses that are wanted.
-void require_poses(const Json& row, int every, const std::filesystem::path& folder) {
-  if (row.at("every").get<int>() != every)
-    throw Error(
-        fmt::format("{}: its row \"{}\" has every {}th of the poses, and --every {} is wanted.\n       Choose "
-                    "another folder with -o",
-                    folder.string(), row.at("method").get<std::string>(), row.at("every").get<int>(), every));
+// A row that is kept and wanted must be of the poses and the device that are wanted.
+void require_as_wanted(const Json& row, const Method& method, const Table1Options& options) {
+  const auto refuse = [&](const std::string& has, const std::string& wanted) {
+    throw Error(fmt::format("{}: its row \"{}\" is of {}, and {} is wanted.\n       Choose another folder with -o",
+                            options.output.string(), method.name, has, wanted));
+  };
+  if (const int every = row.at("every").get<int>(); every != options.every)
+    refuse(fmt::format("every {}th of the poses", every), fmt::format("--every {}", options.every));
+  if (!uses_gl(method.kind)) return;
+  const auto device = row.at("device").get<std::string>();
+  if (const GlContext context(gl_choice_from(options.gl, options.gpu)); context.renderer() != device)
+    refuse("the device " + device, context.renderer());
 }
 
 std::string in_words(const Json& ms) {
@@ -219,13 +225,16 @@ Json table1(const Table1Options& options, const std::function<void(double share)
     for (const double threshold_hu : thresholds_hu) {
       Cell cell(options, volume, threshold_hu);
       const Json header = cell.header();
+      if (header.at("share_above") == 0.0)
+        throw Error(fmt::format("{}: holds nothing above {:g} HU, so that no image of Table 1 would show anything",
+                                volume.name, threshold_hu));
       Json table = header;
       table["rows"] = Json::array();
       for (const Method& method : kMethods) {
         std::optional<Json> row = folder.find(header, method.name);
         if (options.wants(method.kind)) {
           if (row)
-            require_poses(*row, options.every, options.output);
+            require_as_wanted(*row, method, options);
           else
             folder.keep(header, *(row = cell.measure(method)));
           progress(++done / work);

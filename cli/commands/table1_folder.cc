@@ -33,7 +33,7 @@ Table1Folder::Table1Folder(std::filesystem::path path, const nlohmann::ordered_j
     throw Error(
         fmt::format("{}: exists and holds no rows of Table 1.\n       Choose another folder with -o", path_.string()));
   std::filesystem::create_directories(path_);
-  write_text(path_ / kProtocolFile, protocol.dump(2) + "\n");
+  replace_text(path_ / kProtocolFile, protocol.dump(2) + "\n");
 }
 
 // "spine phantom", -380, "ours: cpu" -> spine-phantom-380-hu-ours-cpu.json

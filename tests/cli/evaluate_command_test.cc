@@ -111,6 +111,21 @@ TEST_F(EvaluateCommandTest, StoppedAndStartedAgainGivesTheSameRuns) {
   EXPECT_TRUE(std::filesystem::exists(folder_ / "stopped" / "summary.json"));
 }
 
+// Killed between its first files, and then read only.
+TEST_F(EvaluateCommandTest, AnEvaluationThatHadHardlyBegunIsContinued) {
+  ASSERT_EQ(evaluate(folder_ / "whole").exit_status, 0);
+  std::filesystem::create_directory(folder_ / "begun");
+  std::filesystem::copy(folder_ / "whole" / "evaluation.json", folder_ / "begun" / "evaluation.json");
+  const CommandOutcome outcome = evaluate(folder_ / "begun");
+  ASSERT_EQ(outcome.exit_status, 0) << outcome.err;
+  EXPECT_EQ(runs_without_times(folder_ / "begun"), runs_without_times(folder_ / "whole"));
+
+  const std::string cut = content_of(folder_ / "begun" / "runs.csv") + "0,1,2";
+  std::ofstream(folder_ / "begun" / "runs.csv") << cut;
+  EXPECT_EQ(run_command({"evaluate", "--table", (folder_ / "begun").string()}).exit_status, 0);
+  EXPECT_EQ(content_of(folder_ / "begun" / "runs.csv"), cut) << "reading has changed it";
+}
+
 TEST_F(EvaluateCommandTest, AWholeOneStartedAgainIsLeftAsItIs) {
   ASSERT_EQ(evaluate(folder_ / "evaluation").exit_status, 0);
   const std::string runs = content_of(folder_ / "evaluation" / "runs.csv");

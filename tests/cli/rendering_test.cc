@@ -158,13 +158,41 @@ TEST_F(BenchCommandTest, RefusesRowsOfAnotherProtocol) {
   EXPECT_THAT(fewer_pixels.err, HasSubstr("holds rows of another protocol"));
   const CommandOutcome more_poses = measured("13500");
   EXPECT_EQ(more_poses.exit_status, 1);
-  EXPECT_THAT(more_poses.err, HasSubstr("has every 27000th of the poses"));
+  EXPECT_THAT(more_poses.err, HasSubstr("is of every 27000th of the poses"));
 
   std::filesystem::create_directory(folder_ / "notes");
   std::ofstream(folder_ / "notes" / "diary.txt") << "mine";
   const CommandOutcome notes = run_command({"bench", "drr", "-o", (folder_ / "notes").string()});
   EXPECT_EQ(notes.exit_status, 1);
   EXPECT_THAT(notes.err, HasSubstr("exists and holds no rows of Table 1"));
+}
+
+TEST(Bench, RowsOfAnotherDeviceAreNotGoneOnWith) {
+  TemporaryFolder folder;
+  const auto measure = [&] {
+    return run_command({"bench", "drr", "--renderer", "splat-buffers", "--gl", "software", "-o",
+                        (folder / "rows").string(), "--every", "27000", "--pixels", "32"});
+  };
+  ASSERT_EQ(measure().exit_status, 0);
+  const std::filesystem::path file =
+      folder / "rows" / "spine-phantom-380-hu-wobbled-splatting-vertex-buffer-objects.json";
+  Json kept;
+  std::ifstream(file) >> kept;
+  kept["row"]["device"] = "Another GPU";
+  std::ofstream(file) << kept.dump();
+  const CommandOutcome again = measure();
+  EXPECT_EQ(again.exit_status, 1);
+  EXPECT_THAT(again.err, HasSubstr("is of the device Another GPU, and llvmpipe"));
+}
+
+TEST_F(BenchCommandTest, ACtWithNothingAboveAThresholdIsAnError) {
+  const SmallStudy study;
+  for (const auto& slice : std::filesystem::directory_iterator(study.path() / "CT"))
+    edit(slice.path(), [](DicomItem d) { d.put(DCM_RescaleIntercept, "-9000"); });
+  const CommandOutcome outcome = run_command({"bench", "drr", "--renderer", "cpu", "--every", "27000", "--pixels", "32",
+                                              "--ct", (study.path() / "CT").string()});
+  EXPECT_EQ(outcome.exit_status, 1);
+  EXPECT_THAT(outcome.err, HasSubstr("holds nothing above -460 HU"));
 }
 
 TEST(Bench, FiguresAreMade) {

@@ -142,6 +142,24 @@ TEST_F(Table2CommandTest, OneViewIsJudgedByWhatItCanSee) {
   EXPECT_EQ(configuration["rectangles"].size(), 1U);
 }
 
+// A table is of one study: here that of the first row has other X-rays than that of the second.
+TEST_F(Table2CommandTest, RowsOfTwoStudiesAreNoTable) {
+  ASSERT_EQ(table2({"--only", "cpu-mi"}).exit_status, 0);
+  const std::filesystem::path file = output() / "cpu-mi" / "evaluation.json";
+  nlohmann::json configuration;
+  std::ifstream(file) >> configuration;
+  configuration["images"][0] = "1.2.3";
+  std::ofstream(file) << configuration.dump(2);
+  const CommandOutcome outcome = table2({"--only", "cpu-src"});
+  EXPECT_EQ(outcome.exit_status, 1);
+  EXPECT_THAT(outcome.err, HasSubstr("holds evaluations of two studies, cpu-mi and cpu-src"));
+}
+
+TEST_F(Table2CommandTest, JobsThatARowCannotHaveAreRefusedAtOnce) {
+  EXPECT_EQ(table2({"--jobs", "2"}).exit_status, 2);
+  EXPECT_FALSE(std::filesystem::exists(output())) << "rows of the CPU have begun";
+}
+
 TEST_F(Table2CommandTest, RefusesWhatAConfigurationSaysItself) {
   EXPECT_EQ(table2({"--preset", "setup"}).exit_status, 2);
   EXPECT_EQ(table2({"--renderer", "cpu"}).exit_status, 2);

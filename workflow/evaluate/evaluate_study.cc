@@ -222,11 +222,14 @@ EvaluationFolder evaluate_study(const EvaluateOptions& options, Notes& notes, Ob
   return evaluate_loaded(load(options.study, notes, observer), options, observer);
 }
 
+void check_jobs(int jobs, RendererKind kind) {
+  if (uses_gl(kind) && jobs > 1)
+    throw UsageError(fmt::format("--jobs {}: {} renders for one registration at a time", jobs, to_string(kind)));
+}
+
 EvaluationFolder evaluate_loaded(const Study& study, EvaluateOptions options, Observer& observer) {
   const RendererKind kind = options.registration.rendering.kind();
-  if (uses_gl(kind) && options.jobs > 1)
-    throw UsageError(
-        fmt::format("--jobs {}: {} renders for one registration at a time", options.jobs, to_string(kind)));
+  check_jobs(options.jobs, kind);
   const int cores = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
   const int jobs = uses_gl(kind) ? 1 : options.jobs > 0 ? options.jobs : cores;
   const TargetChoice choice = target_of(study, {.by_person = options.target});

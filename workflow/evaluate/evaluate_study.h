@@ -25,8 +25,11 @@ struct EvaluateOptions {
   std::filesystem::path output;
 };
 
-// Runs the registrations that are not yet in the folder, and writes summary and plots. Throws UsageError if several
-// jobs are asked of a renderer that can only do one registration at a time.
+// Throws UsageError if several jobs are asked of a renderer that can only do one registration at a time.
+void check_jobs(int jobs, RendererKind kind);
+
+// Runs the registrations that are not yet in the folder, and writes summary and plots. Throws UsageError as
+// check_jobs() does.
 EvaluationFolder evaluate_study(const EvaluateOptions& options, Notes& notes, Observer& observer);
 
 // The same of a study that options.study has loaded.

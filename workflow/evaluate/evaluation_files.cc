@@ -203,19 +203,18 @@ EvaluationFolder::EvaluationFolder(std::filesystem::path path, Json configuratio
           fmt::format("{}: holds another evaluation (evaluation.json says which).\n       Choose another folder with "
                       "-o, or remove this one",
                       path_.string()));
-    read_runs();
-    std::string bodies = std::string(kBodiesHeader) + "\n";
-    for (const EvaluatedRun& run : runs_) bodies += lines_of_bodies(run);
-    replace_text(path_ / kBodiesFile, bodies);
+    const bool are_whole = read_runs();
+    write_bodies();
+    if (!are_whole) write_runs();
     return;
   }
   if (std::filesystem::exists(path_) && !std::filesystem::is_empty(path_))
     throw Error(
         fmt::format("{}: exists and holds no evaluation.\n       Choose another folder with -o", path_.string()));
   std::filesystem::create_directories(path_);
-  write_text(path_ / kConfigurationFile, configuration_.dump(2) + "\n");
-  write_text(path_ / kRunsFile, std::string(kHeader) + "\n");
-  write_text(path_ / kBodiesFile, std::string(kBodiesHeader) + "\n");
+  replace_text(path_ / kConfigurationFile, configuration_.dump(2) + "\n");
+  write_bodies();
+  write_runs();
 }
 
 EvaluationFolder::EvaluationFolder(std::filesystem::path path)
@@ -223,26 +222,43 @@ EvaluationFolder::EvaluationFolder(std::filesystem::path path)
   read_runs();
 }
 
-// A last line without its end is of a run that was stopped: it is made again.
-void EvaluationFolder::read_runs() {
+bool EvaluationFolder::read_runs() {
+  // Stopped before it was made: nothing has run.
+  if (!std::filesystem::exists(path_ / kRunsFile)) return false;
   std::ifstream stream(path_ / kRunsFile);
-  std::string whole, line;
+  std::string line;
   std::getline(stream, line);
   if (line != kHeader) throw Error(fmt::format("{}: is of another version", (path_ / kRunsFile).string()));
-  whole = line + "\n";
-  bool cut = false;
+  bool is_cut = false;
   while (std::getline(stream, line)) {
-    cut = stream.eof();
-    if (cut) break;
+    is_cut = stream.eof();
+    if (is_cut) break;
     try {
       runs_.push_back(run_of(line));
     } catch (const std::exception&) {
       throw Error(fmt::format("{}: line {} cannot be read: {}", (path_ / kRunsFile).string(), runs_.size() + 2, line));
     }
-    whole += line + "\n";
   }
-  if (cut) replace_text(path_ / kRunsFile, whole);
   read_bodies();
+  return !is_cut;
+}
+
+void EvaluationFolder::write_runs() const {
+  std::string runs = std::string(kHeader) + "\n";
+  for (const EvaluatedRun& run : runs_) runs += line_of(run);
+  replace_text(path_ / kRunsFile, runs);
+}
+
+void EvaluationFolder::write_bodies() const {
+  std::string bodies = std::string(kBodiesHeader) + "\n";
+  for (const EvaluatedRun& run : runs_) bodies += lines_of_bodies(run);
+  replace_text(path_ / kBodiesFile, bodies);
+}
+
+Json EvaluationFolder::study() const {
+  return {{"ct_series", configuration_.at("ct_series")},
+          {"image", configuration_.at("images").at(0)},
+          {"truth", configuration_.at("truth")}};
 }
 
 // Bodies are written before the line of their run: those of a run that was stopped are left out, and made again with

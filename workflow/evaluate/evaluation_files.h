@@ -17,11 +17,15 @@ class EvaluationFolder {
   // Makes the folder, or opens the folder of the same evaluation. Throws Error if it holds anything else.
   EvaluationFolder(std::filesystem::path path, nlohmann::ordered_json configuration);
 
-  // Opens the folder of an evaluation for reading. Throws Error if `path` is not such a folder.
+  // Opens the folder of an evaluation for reading: nothing in it is changed. Throws Error if `path` is not such a
+  // folder.
   explicit EvaluationFolder(std::filesystem::path path);
 
   const std::vector<EvaluatedRun>& runs() const { return runs_; }  // ended so far, in the order they ended
   bool has(int number) const;
+
+  // What evaluations of one study share: its CT, its first X-ray and the truth.
+  nlohmann::ordered_json study() const;
 
   void append(const EvaluatedRun& run);
 
@@ -32,8 +36,12 @@ class EvaluationFolder {
   bool judged_by_mrpd() const { return configuration_.at("success_by") == "mRPD"; }
 
  private:
-  void read_runs();
+  // Returns whether runs.csv is there and holds whole lines alone; a last line without its end is of a run that was
+  // stopped, which is made again.
+  bool read_runs();
   void read_bodies();
+  void write_runs() const;
+  void write_bodies() const;
 
   std::filesystem::path path_;
   nlohmann::ordered_json configuration_;

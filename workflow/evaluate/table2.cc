@@ -4,11 +4,14 @@
 
 #include <algorithm>
 
+#include "base/error.h"
 #include "base/output_folder.h"
 #include "workflow/evaluate/table2_configurations.h"
 
 namespace isoshift {
 namespace {
+
+using Json = nlohmann::ordered_json;
 
 struct Table2Row {
   Table2Configuration configuration;
@@ -29,12 +32,23 @@ std::string optimizer_of(const Table2Configuration& configuration) {
                                      : fmt::format("{}, {} searches", configuration.optimizer, configuration.searches);
 }
 
-// The configurations that have a folder there, in their order.
+// The configurations that have a folder there, in their order. Throws Error for folders of different studies.
 std::vector<Table2Row> rows_in(const std::filesystem::path& folder) {
   std::vector<Table2Row> rows;
+  std::string first;
+  Json study;
   for (const Table2Configuration& configuration : table2_configurations()) {
     if (!std::filesystem::exists(folder / configuration.name)) continue;
     const EvaluationFolder evaluation(folder / configuration.name);
+    if (rows.empty()) {
+      first = configuration.name;
+      study = evaluation.study();
+    } else if (evaluation.study() != study) {
+      throw Error(
+          fmt::format("{}: holds evaluations of two studies, {} and {}; a table is of one.\n       Choose another "
+                      "folder with -o",
+                      folder.string(), first, configuration.name));
+    }
     rows.push_back({configuration, summarized(evaluation.runs(), evaluation.judged_by_mrpd())});
   }
   return rows;
@@ -106,9 +120,14 @@ EvaluateOptions options_for(const Table2Configuration& configuration, const Eval
 
 std::string evaluate_table2(const EvaluateOptions& options, const std::vector<std::string>& names, Notes& notes,
                             Observer& observer) {
+  std::vector<Table2Configuration> wanted;
+  for (const Table2Configuration& configuration : table2_configurations())
+    if (names.empty() || std::ranges::find(names, configuration.name) != names.end()) wanted.push_back(configuration);
+  for (const Table2Configuration& configuration : wanted)
+    check_jobs(options.jobs, request_of(configuration, options.registration).rendering.kind());
   const Study study = load(options.study, notes, observer);
-  for (const Table2Configuration& configuration : table2_configurations()) {
-    if (!names.empty() && std::ranges::find(names, configuration.name) == names.end()) continue;
+  rows_in(options.output);
+  for (const Table2Configuration& configuration : wanted) {
     observer.say(fmt::format("{}:", configuration.name));
     evaluate_loaded(configuration.is_one_view ? first_view_of(study) : study,
                     options_for(configuration, options, study), observer);

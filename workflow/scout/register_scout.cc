@@ -82,10 +82,6 @@ void check_same_patient(const CtSeries& ct, const Scout& scout, const ScoutReque
         request.scout.string(), described(DCM_PatientPosition), scout.patient_position, ct.patient_position));
 }
 
-Vector3d center_of(const Volume<float>& ct) {
-  return ct.patient_from_voxel * Vector3d(0.5 * (ct.size.cast<double>().array() - 1.0));
-}
-
 std::array<Vector3d, 8> corners_of(const Volume<float>& ct) {
   std::array<Vector3d, 8> corners;
   for (std::size_t n = 0; n < corners.size(); ++n)
@@ -118,7 +114,7 @@ class ScoutScene {
  public:
   ScoutScene(const ScoutRequest& request, const CtSeries& ct, const Scout& scout)
       : scout_(scout),
-        center_(center_of(ct.hu)),
+        center_(ct.hu.center_mm()),
         ct_corners_patient_mm_(corners_of(ct.hu)),
         planned_(Eigen::Translation3d(-center_)),
         renderers_(request.rendering.kind(), ct.hu, request.rendering.model(), std::array{Beam::kKilovoltage},
