@@ -76,7 +76,7 @@ std::set<std::string> Coverage::untested_positions() const {
 }
 
 Outcome Commission::outcome() const {
-  std::vector<Outcome> all = {localization.sigma};
+  std::vector<Outcome> all = {localization.calibration.outcome};
   for (const AxisOfLocalization& axis : localization.axes) all.push_back(axis.limit);
   for (const auto& [condition, polarities] : localization.polarities)
     all.insert(all.end(), polarities.begin(), polarities.end());

@@ -67,6 +67,23 @@ std::string in_words(const Share& share) {
                      100.0 * share.value(), 100.0 * share.low, 100.0 * share.high);
 }
 
+std::string in_words(const Calibration& calibration) {
+  if (!calibration.within_one_sigma && !calibration.shared_sigmas)
+    return "Untested: no error that counts has an uncertainty.";
+  std::string words;
+  if (calibration.within_one_sigma)
+    words = fmt::format("One sigma holds {} of the errors, two sigma {}. Expected: 68 and 95 %. ",
+                        in_words(*calibration.within_one_sigma), in_words(*calibration.within_two_sigma));
+  if (calibration.shared_sigmas)
+    words += fmt::format("The mean error, which holds that of the imagers, is at most {:.1f} sigma; limit {:.1f}. ",
+                         *calibration.shared_sigmas, *calibration.shared_sigmas_limit);
+  if (calibration.outcome == Outcome::kUntested) return words + "Untested: no two sessions can be compared.";
+  if (calibration.outcome == Outcome::kPassed) return words + "Passed.";
+  const bool is_shared = calibration.shared_sigmas && *calibration.shared_sigmas > *calibration.shared_sigmas_limit;
+  return words + (is_shared ? "FAILED: the mean error is too large for the imagers' sigma."
+                            : "FAILED: clearly fewer than expected.");
+}
+
 std::string row_of(const AxisOfLocalization& axis, Outcome polarity, const std::string& name, const char* unit) {
   if (!axis.errors) return fmt::format("  {:<22} {}\n", name, kNoErrors);
   const Agreement& errors = *axis.errors;
@@ -106,17 +123,7 @@ CommissionWords words_of(const Commission& commission) {
       break;
     case Known::kPositions: words.known_from = "positions that the site names"; break;
   }
-  if (localization.within_one_sigma) {
-    words.sigma = fmt::format("One sigma holds {} of the errors, two sigma {}. Expected: 68 and 95 %. ",
-                              in_words(*localization.within_one_sigma), in_words(*localization.within_two_sigma));
-    if (localization.shared_sigmas)
-      words.sigma +=
-          fmt::format("What the imagers put off in all of them is {:.1f} of its sigma at most, and may be {:.1f}. ",
-                      *localization.shared_sigmas, localization.shared_sigmas_limit);
-    words.sigma += localization.sigma == Outcome::kPassed ? "Passed." : "FAILED: clearly fewer, or more.";
-  } else {
-    words.sigma = "Untested: no error of an axis with an uncertainty.";
-  }
+  words.sigma = in_words(localization.calibration);
   const Coverage& coverage = commission.coverage;
   for (const auto& [condition, polarities] : localization.polarities)
     if (const auto moved = axes_with(polarities, Outcome::kPassed, words); !moved.empty())
@@ -195,10 +202,11 @@ std::string commission_json(const Commission& commission, const std::string& pdf
                {"site", nullptr},
                {"axes", Json::object()},
                {"uncertainty",
-                {{"outcome", to_string(localization.sigma)},
-                 {"shared_sigmas", or_null(localization.shared_sigmas)},
-                 {"within_one_sigma", json_of(localization.within_one_sigma)},
-                 {"within_two_sigma", json_of(localization.within_two_sigma)}}},
+                {{"outcome", to_string(localization.calibration.outcome)},
+                 {"within_one_sigma", json_of(localization.calibration.within_one_sigma)},
+                 {"within_two_sigma", json_of(localization.calibration.within_two_sigma)},
+                 {"shared_sigmas", or_null(localization.calibration.shared_sigmas)},
+                 {"shared_sigmas_limit", or_null(localization.calibration.shared_sigmas_limit)}}},
                {"polarity", Json::object()},
                {"tested",
                 {{"patient_positions", commission.coverage.patient_positions},

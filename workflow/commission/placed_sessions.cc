@@ -32,10 +32,27 @@ std::array<bool, 6> determined_axes(const SetupResult& session) {
   return are_determined;
 }
 
+bool is_same_angle(double one_deg, double other_deg) {
+  constexpr double kSameDeg = 1.0, kTurnDeg = 360.0;
+  return std::abs(std::remainder(one_deg - other_deg, kTurnDeg)) < kSameDeg;
+}
+
+bool is_same_view(const SetupResult::View& one, const SetupResult::View& other) {
+  if (one.is_megavoltage != other.is_megavoltage) return false;
+  if (one.gantry_deg && other.gantry_deg) return is_same_angle(*one.gantry_deg, *other.gantry_deg);
+  return !one.gantry_deg && !other.gantry_deg && one.pixel_from_room && other.pixel_from_room &&
+         one.pixel_from_room->isApprox(*other.pixel_from_room);
+}
+
 std::string condition_of(const SetupResult& session) {
   std::set<std::string> beams;
   for (const SetupResult::View& view : session.views) beams.insert(view.is_megavoltage ? "MV" : "kV");
   return fmt::format("{}, {}", session.patient_position, fmt::join(beams, " and "));
+}
+
+Vector6d error_of(const Eigen::Isometry3d& found, const Eigen::Isometry3d& known) {
+  const Eigen::Isometry3d error = found * known.inverse();
+  return (Vector6d() << error.translation(), rotation_vector(error.linear())).finished();
 }
 
 }  // namespace
@@ -54,22 +71,26 @@ std::vector<Placed> placed(const std::vector<NamedResult>& sessions, Known known
                .are_angles_known = known == Known::kReadOuts || poses.have_angles,
                .are_determined = determined_axes(result)};
     if (!one.are_angles_known) std::fill_n(one.are_determined.begin() + 3, 3, false);
-    if (result.by_imagers) one.by_imagers = result.by_imagers->covariance;
-    if (result.uncertainty) one.by_session = result.uncertainty->covariance - one.by_imagers;
+    if (result.by_imagers) one.imager_covariance = result.by_imagers->covariance;
+    if (result.uncertainty) one.own_covariance = result.uncertainty->covariance - one.imager_covariance;
     all.push_back(std::move(one));
   }
   return all;
 }
 
 bool have_same_views(const Placed& one, const Placed& other) {
-  constexpr double kSameDeg = 1.0, kTurnDeg = 360.0;
-  const auto is_in_other = [&](const SetupResult::View& view) {
-    return std::ranges::any_of(other.result->views, [&](const SetupResult::View& candidate) {
-      return view.is_megavoltage == candidate.is_megavoltage && view.gantry_deg && candidate.gantry_deg &&
-             std::abs(std::remainder(*view.gantry_deg - *candidate.gantry_deg, kTurnDeg)) < kSameDeg;
+  const std::vector<SetupResult::View>&some = one.result->views, &others = other.result->views;
+  const auto are_in = [](const std::vector<SetupResult::View>& views, const std::vector<SetupResult::View>& all) {
+    return std::ranges::all_of(views, [&](const SetupResult::View& view) {
+      return std::ranges::any_of(all,
+                                 [&](const SetupResult::View& candidate) { return is_same_view(view, candidate); });
     });
   };
-  return one.result->views.size() == other.result->views.size() && std::ranges::all_of(one.result->views, is_in_other);
+  return some.size() == others.size() && are_in(some, others) && are_in(others, some);
+}
+
+bool have_same_couch_angle(const Placed& one, const Placed& other) {
+  return is_same_angle(deg_from_rad(one.result->table.yaw_rad()), deg_from_rad(other.result->table.yaw_rad()));
 }
 
 Matrix6d carried_by(const Eigen::Isometry3d& motion) {
@@ -80,31 +101,35 @@ Matrix6d carried_by(const Eigen::Isometry3d& motion) {
 }
 
 void CarriedErrors::add(const Placed& session, const Matrix6d& carried) {
-  by_sessions_ += carried * session.by_session * carried.transpose();
-  const auto alike = std::ranges::find_if(
-      by_imagers_, [&](const Imagers& imagers) { return have_same_views(*imagers.first, session); });
-  if (alike == by_imagers_.end())
-    by_imagers_.push_back({.first = &session, .carried = carried});
+  if (!session.own_covariance)
+    own_.reset();
+  else if (own_)
+    *own_ += carried * *session.own_covariance * carried.transpose();
+  const auto alike =
+      std::ranges::find_if(imagers_, [&](const Imagers& imagers) { return have_same_views(*imagers.first, session); });
+  if (alike == imagers_.end())
+    imagers_.push_back({.first = &session, .carried = carried});
   else
     alike->carried += carried;
 }
 
-Matrix6d CarriedErrors::covariance() const {
-  Matrix6d covariance = by_sessions_;
-  for (const Imagers& imagers : by_imagers_)
-    covariance += imagers.carried * imagers.first->by_imagers * imagers.carried.transpose();
+std::optional<Matrix6d> CarriedErrors::covariance() const {
+  std::optional<Matrix6d> covariance = own_;
+  if (!covariance) return std::nullopt;
+  for (const Imagers& imagers : imagers_)
+    *covariance += imagers.carried * imagers.first->imager_covariance * imagers.carried.transpose();
   return covariance;
-}
-
-Vector6d Compared::error() const {
-  const Eigen::Isometry3d error = found * known.inverse();
-  return (Vector6d() << error.translation(), rotation_vector(error.linear())).finished();
 }
 
 Compared compared(const Placed& session) {
   CarriedErrors errors;
   errors.add(session, Matrix6d::Identity());
-  return {session.found, session.known, session.are_angles_known, session.are_determined, errors.covariance()};
+  return {.found = session.found,
+          .known = session.known,
+          .are_angles_known = session.are_angles_known,
+          .are_determined = session.are_determined,
+          .error = error_of(session.found, session.known),
+          .covariance = errors.covariance()};
 }
 
 Compared compared(const Placed& before, const Placed& now) {
@@ -113,7 +138,9 @@ Compared compared(const Placed& before, const Placed& now) {
                 .known = now.known * before.known.inverse(),
                 .are_angles_known = now.are_angles_known,
                 .are_determined = now.are_determined,
+                .error = {},
                 .covariance = {}};
+  move.error = error_of(move.found, move.known);
   const Matrix6d carried = carried_by(move.found);
   CarriedErrors errors;
   errors.add(now, Matrix6d::Identity());
@@ -125,6 +152,21 @@ Compared compared(const Placed& before, const Placed& now) {
           std::abs(carried(static_cast<Eigen::Index>(axis), static_cast<Eigen::Index>(from))) > kNothing)
         move.are_determined[axis] = false;
   return move;
+}
+
+Localized localized(const std::string& session, const Compared& compared) {
+  Localized one{.session = session, .known = {}, .found = components_of(compared.found), .error = {}, .sigma = {}};
+  const ErrorComponents known = components_of(compared.known);
+  for (std::size_t axis = 0; axis < 6; ++axis) {
+    if (compared.are_angles_known || !is_rotation(axis)) one.known[axis] = known[axis];
+    if (!compared.are_determined[axis]) continue;
+    const auto n = static_cast<Eigen::Index>(axis);
+    const double unit = is_rotation(axis) ? deg_from_rad(1.0) : 1.0;
+    one.error[axis] = unit * compared.error[n];
+    if (compared.covariance && (*compared.covariance)(n, n) > 0.0)
+      one.sigma[axis] = unit * std::sqrt((*compared.covariance)(n, n));
+  }
+  return one;
 }
 
 }  // namespace isoshift

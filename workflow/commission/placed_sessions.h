@@ -4,9 +4,11 @@
 
 #include <Eigen/Geometry>
 #include <array>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "setup/setup_errors.h"
 #include "workflow/commission/known_poses.h"
 #include "workflow/results_below.h"
 
@@ -22,32 +24,35 @@ struct Placed {
   Eigen::Isometry3d found, known;
   bool are_angles_known = true;  // otherwise nothing is turned in `known`, and no angle is determined
   std::array<bool, 6> are_determined{};
-  Matrix6d by_imagers = Matrix6d::Zero();  // covariance of `found`: what is alike in all sessions of the same views
-  Matrix6d by_session = Matrix6d::Zero();  // and what is this session's own
+  // Of `found`: what may be wrong with the imagers, alike in all sessions of the same views, and what is this session's
+  // own. No own: the result has no uncertainty.
+  Matrix6d imager_covariance = Matrix6d::Zero();
+  std::optional<Matrix6d> own_covariance;
 };
 
 // `poses`: unused with read-outs. The placed point to the sessions.
 std::vector<Placed> placed(const std::vector<NamedResult>& sessions, Known known, const KnownPoses& poses);
 
-// Whether what the imagers put off is alike in both: X-rays by the same beams from the same sides.
+// X-rays by the same beams from the same sides, to within a degree: what imagers put off is alike in both.
 bool have_same_views(const Placed& one, const Placed& other);
+bool have_same_couch_angle(const Placed& one, const Placed& other);
 
 // What a small motion before `motion` is after it: motion * small = small' * motion.
 Matrix6d carried_by(const Eigen::Isometry3d& motion);
 
-// The covariance of a sum of sessions' errors, each of which a matrix carries to where it counts.
+// A sum of sessions' errors, each of which a matrix carries to where it counts.
 class CarriedErrors {
  public:
   void add(const Placed& session, const Matrix6d& carried);
-  Matrix6d covariance() const;
+  std::optional<Matrix6d> covariance() const;  // nothing: one of the sessions has no uncertainty
 
  private:
   struct Imagers {
     const Placed* first;  // session with these views
     Matrix6d carried;     // of all of them together
   };
-  Matrix6d by_sessions_ = Matrix6d::Zero();
-  std::vector<Imagers> by_imagers_;
+  std::optional<Matrix6d> own_ = Matrix6d::Zero();
+  std::vector<Imagers> imagers_;
 };
 
 // A position or a move as it was found, and as it is known.
@@ -55,10 +60,8 @@ struct Compared {
   Eigen::Isometry3d found, known;
   bool are_angles_known = true;
   std::array<bool, 6> are_determined{};
-  Matrix6d covariance;  // of `found`
-
-  // What `found` puts beside `known`: translation at the isocenter in mm, rotation vector in rad.
-  Vector6d error() const;
+  Vector6d error;  // what `found` puts beside `known`: translation at the isocenter in mm, rotation vector in rad
+  std::optional<Matrix6d> covariance;  // of the error
 };
 
 // The position of a session.
@@ -66,5 +69,16 @@ Compared compared(const Placed& session);
 
 // The move between two. Axes that `before` does not determine are not determined where the move carries them.
 Compared compared(const Placed& before, const Placed& now);
+
+// The same per axis, in mm and degrees. Components are along and about the axes of IEC 61217 fixed, of the motion from
+// the planned pose (positions) or from another session's (moves).
+struct Localized {
+  std::string session;
+  std::array<std::optional<double>, 6> known;  // unset: an angle that the table of known poses does not name
+  ErrorComponents found{};
+  // Unset: the X-rays do not determine this axis, or the result has no uncertainty.
+  std::array<std::optional<double>, 6> error, sigma;
+};
+Localized localized(const std::string& session, const Compared& compared);
 
 }  // namespace isoshift
