@@ -22,7 +22,7 @@ std::vector<Ball> balls_in(const Volume<float>& hu);
 
 struct DarkSpots {
   std::vector<Eigen::Vector2d> places;  // (column, row)
-  Image<std::uint8_t> field;            // of the X-ray's size; not 0: irradiated
+  Image<std::uint8_t> field;            // of the X-ray's size; not 0: irradiated and not clipped
 };
 
 // Places in the irradiated field where an X-ray is darker than around, in a round spot of that radius: centers of mass

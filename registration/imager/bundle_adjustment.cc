@@ -113,7 +113,7 @@ class Adjustment {
     return false;
   }
 
-  // Whether a ball, and what lies around it, is in the irradiated field.
+  // Whether a ball, and what lies around it, is in the irradiated field, and no pixel there is clipped.
   static bool is_shown(const Eigen::Vector2d& place, const BallView& view) {
     constexpr double kAround = 2.5;  // radii: with the ring from which dark_spots() has the background
     const Image<std::uint8_t>& field = view.spots.field;
@@ -175,7 +175,7 @@ class Adjustment {
       if (expected == 0)
         throw Error(
             fmt::format("session {}: its X-rays should show no ball alone: all lie outside the irradiated "
-                        "fields, or hide each other. {}",
+                        "fields, hide each other, or are clipped to the ends of the pixels' range. {}",
                         session.name, advice));
       constexpr std::size_t kLeast = 3;  // a shift of the phantom needs two places; what is told beyond that, more
       if (seen < kLeast || static_cast<double>(seen) < share * static_cast<double>(expected))

@@ -3,9 +3,9 @@
 #include <Eigen/Cholesky>
 #include <Eigen/QR>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <map>
-#include <set>
 
 #include "base/error.h"
 #include "registration/imager/imager_effect.h"
@@ -110,33 +110,65 @@ Fit fitted(std::span<const Told> sessions, std::size_t imagers) {
   return fit;
 }
 
-// The variances that leaving out each CT lets expect.
-Eigen::VectorXd jackknifed(const std::map<std::string, std::vector<std::size_t>>& groups, std::span<const Told> told,
-                           std::size_t imagers) {
-  Eigen::MatrixXd without(static_cast<Eigen::Index>(imagers * kImagerParameters),
-                          static_cast<Eigen::Index>(groups.size()));
+// The CTs that an imager saw the patients of, with the numbers of their sessions.
+using SessionsByCt = std::map<std::string, std::vector<std::size_t>>;
+
+SessionsByCt cts_seen_by(std::size_t imager, std::span<const PatientSession> sessions) {
+  SessionsByCt cts;
+  for (std::size_t n = 0; n < sessions.size(); ++n)
+    if (std::ranges::find(sessions[n].views, imager, &PatientView::imager) != sessions[n].views.end())
+      cts[sessions[n].ct].push_back(n);
+  return cts;
+}
+
+// What leaving out each CT tells of an imager's errors.
+struct Jackknife {
+  std::array<double, kImagerParameters> sigmas{};          // by how much the errors then differ
+  std::array<double, kImagerParameters> largest_sigmas{};  // those of the least squares, where the worst is left out
+};
+
+// Precondition: there are two CTs or more.
+Jackknife jackknifed(std::size_t imager, const SessionsByCt& cts, std::span<const Told> told, std::size_t imagers) {
+  constexpr auto kCount = static_cast<Eigen::Index>(kImagerParameters);
+  const auto first = static_cast<Eigen::Index>(imager) * kCount;
+  Eigen::MatrixXd without(kCount, static_cast<Eigen::Index>(cts.size()));
+  Jackknife jackknife;
   Eigen::Index column = 0;
-  for (const auto& [name, members] : groups) {
+  for (const auto& [name, members] : cts) {
     std::vector<Told> others;
     others.reserve(told.size());
     for (std::size_t n = 0; n < told.size(); ++n)
       if (std::ranges::find(members, n) == members.end()) others.push_back(told[n]);
-    without.col(column++) = fitted(others, imagers).errors;
+    const Fit fit = fitted(others, imagers);
+    without.col(column++) = fit.errors.segment(first, kCount);
+    for (std::size_t n = 0; n < kImagerParameters; ++n) {
+      const Eigen::Index at = first + static_cast<Eigen::Index>(n);
+      jackknife.largest_sigmas[n] = std::max(jackknife.largest_sigmas[n], std::sqrt(fit.covariance(at, at)));
+    }
   }
   without.colwise() -= without.rowwise().mean().eval();
-  const auto count = static_cast<double>(groups.size());
-  return (count - 1.0) / count * without.rowwise().squaredNorm();
+  const auto count = static_cast<double>(cts.size());
+  for (std::size_t n = 0; n < kImagerParameters; ++n)
+    jackknife.sigmas[n] = std::sqrt((count - 1.0) / count) * without.row(static_cast<Eigen::Index>(n)).norm();
+  return jackknife;
 }
 
-// Per imager: of how many CTs it saw the patients.
-std::vector<std::size_t> cts_of(std::span<const PatientSession> sessions, std::size_t imagers) {
-  std::vector<std::set<std::string>> cts(imagers);
-  for (const PatientSession& session : sessions)
-    for (const PatientView& view : session.views) cts[view.imager].insert(session.ct);
-  std::vector<std::size_t> counts;
-  counts.reserve(imagers);
-  for (const std::set<std::string>& some : cts) counts.push_back(some.size());
-  return counts;
+ImagerEstimate estimate_of(std::size_t imager, const SessionsByCt& cts, std::span<const Told> told, std::size_t imagers,
+                           const Fit& fit) {
+  ImagerEstimate estimate;
+  const bool are_enough = cts.size() >= kLeastCts;
+  const Jackknife jackknife = are_enough ? jackknifed(imager, cts, told, imagers) : Jackknife{};
+  for (std::size_t n = 0; n < kImagerParameters; ++n) {
+    const ImagerParameterInfo& info = imager_parameters()[n];
+    const auto at = static_cast<Eigen::Index>(imager * kImagerParameters + n);
+    if (!are_enough || only_balls_tell(static_cast<ImagerParameter>(n)))
+      estimate.set(n, 0.0, info.expected);
+    else if (jackknife.largest_sigmas[n] > info.largest_sigma)  // a single CT tells it
+      estimate.set(n, 0.0, jackknife.largest_sigmas[n]);
+    else
+      estimate.set(n, fit.errors[at], std::max(std::sqrt(fit.covariance(at, at)), jackknife.sigmas[n]));
+  }
+  return estimate;
 }
 
 }  // namespace
@@ -148,21 +180,13 @@ ImagersOfPatients imagers_of_patients(std::span<const PatientSession> sessions, 
   if (std::ranges::none_of(told, [](const Told& of) { return of.freedom > 0.0; }))
     throw Error("no session has two views, without which nothing can be told of an imager");
   const Fit fit = fitted(told, imagers);
-  std::map<std::string, std::vector<std::size_t>> by_ct;
-  for (std::size_t n = 0; n < sessions.size(); ++n) by_ct[sessions[n].ct].push_back(n);
-  ImagersOfPatients found{
-      .imagers = std::vector<ImagerEstimate>(imagers), .cts = cts_of(sessions, imagers), .misfit = fit.misfit};
-  const bool are_enough_of_any = std::ranges::max(found.cts) >= kLeastCts;
-  const Eigen::VectorXd variances = fit.covariance.diagonal().cwiseMax(
-      are_enough_of_any ? jackknifed(by_ct, told, imagers) : Eigen::VectorXd::Zero(fit.errors.size()));
-  for (Eigen::Index n = 0; n < variances.size(); ++n) {
-    const std::size_t parameter = static_cast<std::size_t>(n) % kImagerParameters;
-    const std::size_t number = static_cast<std::size_t>(n) / kImagerParameters;
-    ImagerEstimate& imager = found.imagers[number];
-    if (found.cts[number] < kLeastCts || only_balls_tell(static_cast<ImagerParameter>(parameter)))
-      imager.set(parameter, 0.0, imager_parameters()[parameter].expected);
-    else
-      imager.set(parameter, fit.errors[n], std::sqrt(variances[n]));
+  ImagersOfPatients found{.imagers = {}, .cts = {}, .misfit = fit.misfit};
+  found.imagers.reserve(imagers);
+  found.cts.reserve(imagers);
+  for (std::size_t imager = 0; imager < imagers; ++imager) {
+    const SessionsByCt cts = cts_seen_by(imager, sessions);
+    found.imagers.push_back(estimate_of(imager, cts, told, imagers, fit));
+    found.cts.push_back(cts.size());
   }
   return found;
 }

@@ -35,9 +35,9 @@ struct ImagersOfPatients {
 // t-distribution (Lange, Little, Taylor, "Robust statistical modeling using the t distribution", J Am Stat Assoc 84
 // (1989) 881-896), so that sessions of bent patients count less. Sigmas are those of the least squares, with the misfit
 // if it is above 1, or those of a jackknife over CTs, whichever is larger. Of an imager fewer CTs than kLeastCts
-// determine nothing: what is wrong with one of them is in all of its sessions. The longitudinal shift, the distance and
-// the tilts are never determined: only balls tell them. `imagers`: their number. Throws Error if no session has two
-// views.
+// determine nothing, and a single CT determines no error: what is wrong with it is in all of its sessions. The
+// longitudinal shift, the distance and the tilts are never determined: only balls tell them. `imagers`: their number.
+// Throws Error if no session has two views.
 inline constexpr std::size_t kLeastCts = 4;
 ImagersOfPatients imagers_of_patients(std::span<const PatientSession> sessions, std::size_t imagers);
 

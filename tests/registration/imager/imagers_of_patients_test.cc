@@ -134,6 +134,17 @@ TEST(ImagersOfPatients, EveryImagerNeedsCtsOfItsOwn) {
   for (const ImagerEstimate::Parameter& parameter : found.imagers[1].parameters) EXPECT_FALSE(parameter.is_determined);
 }
 
+// Of six CTs that pairs saw, one was also seen from all sides, which alone tells the transverse shift.
+TEST(ImagersOfPatients, NoErrorIsToldByASingleCt) {
+  auto sessions = sessions_with(planted(), {{0.0, 90.0}}, 36, 6);
+  auto from_all_sides = sessions_with(planted(), {{0.0, 90.0, 180.0, 270.0}}, 12, 7);
+  for (PatientSession& session : from_all_sides) session.ct = "0";
+  sessions.insert(sessions.end(), from_all_sides.begin(), from_all_sides.end());
+  const ImagersOfPatients found = imagers_of_patients(sessions, 1);
+  EXPECT_TRUE(parameter_of(found, ImagerParameter::kRoll).is_determined);
+  EXPECT_FALSE(parameter_of(found, ImagerParameter::kShiftX).is_determined);
+}
+
 TEST(ImagersOfPatients, SingleViewsTellNothing) {
   const auto sessions = sessions_with(planted(), {{0.0}}, 3, 4);
   EXPECT_THROW(
