@@ -137,12 +137,20 @@ TEST_F(AuditSetupCommandTest, OfResultsOfOneXrayTheLatestCounts) {
   SetupResult& later = archive.sessions[1].result;
   later.views.push_back(archive.sessions[0].result.views.front());
   later.made_on = "2026-03-01T09:30:00+0000";
+  // And of that one there is a later one, too.
+  archive.sessions[2].result.views.push_back(later.views.front());
+  archive.sessions[2].result.made_on = "2026-03-02T09:30:00+0000";
   write_archive(archive, results(), table());
   const Json audit = Json::parse(run({"--json"}).out);
-  EXPECT_EQ(audit["counted"], 59);
-  const Json earlier = *std::ranges::find(audit["sessions"], MadeArchive::name_of(0),
-                                          [](const Json& session) { return session["session"].get<std::string>(); });
-  EXPECT_EQ(earlier["left_out"], "its X-ray has a later result: " + MadeArchive::name_of(1));
+  EXPECT_EQ(audit["counted"], 58);
+  const auto left_out = [&](std::size_t session) {
+    return std::ranges::find(audit["sessions"], MadeArchive::name_of(session),
+                             [](const Json& one) { return one["session"].get<std::string>(); })
+        ->at("left_out")
+        .get<std::string>();
+  };
+  EXPECT_EQ(left_out(0), "its X-ray has a later result: " + MadeArchive::name_of(1));
+  EXPECT_EQ(left_out(1), "X-rays of it have a later result: " + MadeArchive::name_of(2));
 }
 
 TEST_F(AuditSetupCommandTest, AResultThatCannotBeReadHasNoVerdict) {

@@ -44,12 +44,12 @@ void set_found(const SetupResult& result, ComparedShift compared, AuditedSession
 
 struct ReadSession {
   AuditedSession session;
-  std::set<std::pair<std::string, int>> xrays;  // by instance and frame
-  std::optional<double> made_on;                // seconds of UTC; nothing: unknown
+  std::set<std::pair<std::string, int>> frames;  // of its X-rays: SOP Instance UID and number
+  std::optional<double> made_on;                 // seconds of UTC; nothing: unknown
 };
 
 ReadSession read_session(const fs::path& folder, std::string name, ComparedShift compared) {
-  ReadSession read{.session = {.name = std::move(name), .folder = folder}, .xrays = {}, .made_on = {}};
+  ReadSession read{.session = {.name = std::move(name), .folder = folder}, .frames = {}, .made_on = {}};
   AuditedSession& session = read.session;
   try {
     const SetupResult result = read_report(folder);
@@ -59,7 +59,7 @@ ReadSession read_session(const fs::path& folder, std::string name, ComparedShift
     session.identity = result.identity;
     for (const SetupResult::View& view : result.views) {
       session.xrays.insert(view.sop_instance_uid);
-      read.xrays.emplace(view.sop_instance_uid, view.frame);
+      read.frames.emplace(view.sop_instance_uid, view.frame);
       if (!view.acquired.empty() && (session.acquired.empty() || view.acquired < session.acquired))
         session.acquired = view.acquired;
     }
@@ -77,7 +77,10 @@ ReadSession read_session(const fs::path& folder, std::string name, ComparedShift
     else if (session.counts())
       session.left_out = "the time of its X-rays is not known";
   } catch (const std::exception& error) {
+    session.verdict.reset();
     session.left_out = error.what();
+    session.xrays.clear();
+    read.frames.clear();
   }
   return read;
 }
@@ -90,14 +93,12 @@ void leave_out_earlier_results(std::vector<ReadSession>& all) {
   std::ranges::stable_sort(latest_first, std::greater(), &ReadSession::made_on);
   std::map<std::pair<std::string, int>, const ReadSession*> owners;
   for (ReadSession* one : latest_first) {
-    const auto owned = std::ranges::find_if(one->xrays, [&](const auto& xray) { return owners.contains(xray); });
-    if (owned != one->xrays.end()) {
+    const auto owned = std::ranges::find_if(one->frames, [&](const auto& frame) { return owners.contains(frame); });
+    if (owned != one->frames.end())
       one->session.left_out =
-          fmt::format("{} a later result: {}", one->xrays.size() == 1 ? "its X-ray has" : "X-rays of it have",
+          fmt::format("{} a later result: {}", one->frames.size() == 1 ? "its X-ray has" : "X-rays of it have",
                       owners.at(*owned)->session.name);
-      continue;
-    }
-    for (const auto& xray : one->xrays) owners[xray] = one;
+    for (const auto& frame : one->frames) owners.try_emplace(frame, one);
   }
 }
 

@@ -1,6 +1,6 @@
 #pragma once
-// What an archive of sessions says, once the clinic's shifts are known. Only numbers come in and go out; audit_files
-// and audit_page write them down.
+// What an archive of sessions says, once the clinic's shifts are known. No file is read or written here: archive and
+// used_shifts read, audit_files and audit_page write.
 
 #include <array>
 #include <optional>
@@ -15,7 +15,7 @@
 namespace isoshift {
 
 struct SetupAudit {
-  std::string made_on;
+  std::string made_on;      // local_time()
   std::string used_sha256;  // of the table of used shifts; empty: there is none, or registration objects say it
   struct Axis {             // of the table top: used minus found
     std::optional<Agreement> without_outliers, of_all;  // nothing: nothing is compared
@@ -48,6 +48,7 @@ struct SetupAudit {
   const Outlier* outlier_of(std::size_t session) const;  // null: it is none
 };
 
+// Without made_on, used_sha256 and of_no_use.
 SetupAudit audit_of(std::vector<AuditedSession> sessions);
 
 }  // namespace isoshift
