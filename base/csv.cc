@@ -28,7 +28,7 @@ class Lines {
     rows_.push_back({.line = ++line_, .cells = {}});
   }
   int line() const { return line_; }
-  const std::vector<CsvTable::Row>& rows() const { return rows_; }
+  std::vector<CsvTable::Row> take_rows() { return std::move(rows_); }
 
  private:
   int line_ = 1;
@@ -80,7 +80,7 @@ CsvTable csv_table(std::string_view text, const std::string& where) {
   const int problem = csv_error(&parser);
   csv_free(&parser);
   if (!is_whole) throw Error(fmt::format("{}, line {}: {}", where, lines.line(), csv_strerror(problem)));
-  std::vector<CsvTable::Row> rows = lines.rows();
+  std::vector<CsvTable::Row> rows = lines.take_rows();
   CsvTable table{.columns = std::move(rows.front().cells), .rows = {}};
   for (auto row = rows.begin() + 1; row != rows.end(); ++row) {
     if (row->cells.empty() || (row->cells.size() == 1 && row->cells.front().empty())) continue;

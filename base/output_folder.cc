@@ -21,6 +21,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr const char* kListing = ".isoshift";
+constexpr const char* kAside = ".partial";  // ends the name under which replace_text() writes first
 
 // Staging folders of this process, for abandon_outputs().
 std::mutex unfinished_mutex;
@@ -146,8 +147,16 @@ void abandon_outputs() noexcept {
   for (const fs::path& staging : unfinished) fs::remove_all(staging, ignored);
 }
 
+bool holds_files(const fs::path& folder) {
+  if (!fs::exists(folder)) return false;
+  return std::ranges::any_of(fs::directory_iterator(folder), [](const fs::directory_entry& entry) {
+    const std::string name = entry.path().filename().string();
+    return !(name.starts_with('.') && name.ends_with(kAside));
+  });
+}
+
 void replace_text(const fs::path& path, std::string_view text) {
-  const fs::path aside = path.parent_path() / fmt::format(".{}.{}.partial", path.filename().string(), ::getpid());
+  const fs::path aside = path.parent_path() / fmt::format(".{}.{}{}", path.filename().string(), ::getpid(), kAside);
   std::error_code ignored;
   try {
     fs::remove(aside, ignored);

@@ -45,6 +45,9 @@ void abandon_outputs() noexcept;
 // Waits until a file, or the names in a folder, are on the disk.
 void flush(const std::filesystem::path& path);
 
+// Whether a folder is there and holds anything, but for what a replace_text() that was killed has left.
+bool holds_files(const std::filesystem::path& folder);
+
 // Replaces the file by the whole text, and flushes it. After an Error the file is as it was before.
 void replace_text(const std::filesystem::path& path, std::string_view text);
 

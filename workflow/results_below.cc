@@ -20,48 +20,52 @@ namespace fs = std::filesystem;
 
 constexpr std::array kPutAside = {"superseded", "by_hand", "handed_over"};
 
-// The folders below `top`, or `top` itself, that hold a file of this name, by path.
-std::vector<fs::path> folders_with(const char* file, const fs::path& top) {
-  if (!fs::is_directory(top)) throw Error(fmt::format("{}: is not a folder", top.string()));
-  if (fs::exists(top / file)) return {top};
-  std::vector<fs::path> folders;
-  for (auto entry = fs::recursive_directory_iterator(top); entry != fs::recursive_directory_iterator(); ++entry) {
-    if (!entry->is_directory()) continue;
-    const std::string name = entry->path().filename().string();
-    const bool has_file = fs::exists(entry->path() / file);
-    if (has_file || name.starts_with('.') || std::ranges::find(kPutAside, name) != kPutAside.end())
-      entry.disable_recursion_pending();
-    if (has_file && !name.starts_with('.')) folders.push_back(entry->path());
-  }
-  std::ranges::sort(folders);
-  return folders;
-}
+// The folders below `top`, or `top` itself, by path.
+struct Folders {
+  std::vector<NamedFolder> of_results, of_errors;
+};
 
-// Folders that hold this file, below `top`; a name that several folders of results or of errors have stands with the
-// folders above it.
-std::vector<NamedFolder> named_folders_with(const char* file, const fs::path& top) {
+// A name that several of them have stands with the folders above it.
+void name(Folders& folders, const fs::path& top) {
   std::map<std::string, int> counts;
-  for (const char* each : {kResultFile, kErrorFile})
-    for (const fs::path& folder : folders_with(each, top)) ++counts[folder.filename().string()];
-  std::vector<NamedFolder> named;
-  for (const fs::path& folder : folders_with(file, top)) {
-    const std::string name = folder.filename().string();
-    named.push_back({.name = counts[name] > 1 ? folder.lexically_relative(top).string() : name, .path = folder});
-  }
-  return named;
+  for (const auto* some : {&folders.of_results, &folders.of_errors})
+    for (const NamedFolder& folder : *some) ++counts[folder.path.filename().string()];
+  for (auto* some : {&folders.of_results, &folders.of_errors})
+    for (NamedFolder& folder : *some) {
+      folder.name = folder.path.filename().string();
+      if (counts[folder.name] > 1) folder.name = folder.path.lexically_relative(top).string();
+    }
 }
 
-}  // namespace
-
-std::vector<NamedFolder> result_folders_below(const fs::path& top) {
-  std::vector<NamedFolder> folders = named_folders_with(kResultFile, top);
-  if (folders.empty())
+Folders folders_below(const fs::path& top) {
+  if (!fs::is_directory(top)) throw Error(fmt::format("{}: is not a folder", top.string()));
+  Folders folders;
+  const auto take = [&](const fs::path& folder) {
+    const bool is_result = fs::exists(folder / kResultFile);
+    const bool is_taken = is_result || fs::exists(folder / kErrorFile);
+    if (is_taken) (is_result ? folders.of_results : folders.of_errors).push_back({.name = {}, .path = folder});
+    return is_taken;
+  };
+  if (!take(top))
+    for (auto entry = fs::recursive_directory_iterator(top); entry != fs::recursive_directory_iterator(); ++entry) {
+      if (!entry->is_directory()) continue;
+      const std::string name = entry->path().filename().string();
+      if (name.starts_with('.') || std::ranges::find(kPutAside, name) != kPutAside.end() || take(entry->path()))
+        entry.disable_recursion_pending();
+    }
+  for (auto* some : {&folders.of_results, &folders.of_errors}) std::ranges::sort(*some, {}, &NamedFolder::path);
+  name(folders, top);
+  if (folders.of_results.empty())
     throw Error(
         fmt::format("{}: holds no result of isoshift (no folder with {}). To register sessions: isoshift batch "
                     "SESSIONS -o RESULTS",
                     top.string(), kResultFile));
   return folders;
 }
+
+}  // namespace
+
+std::vector<NamedFolder> result_folders_below(const fs::path& top) { return folders_below(top).of_results; }
 
 std::string NamedResult::acquired() const {
   std::string first;
@@ -72,9 +76,10 @@ std::string NamedResult::acquired() const {
 
 ResultsBelow results_below(const fs::path& top) {
   ResultsBelow found;
-  for (const NamedFolder& folder : result_folders_below(top))
+  const Folders folders = folders_below(top);
+  for (const NamedFolder& folder : folders.of_results)
     found.results.push_back({.name = folder.name, .result = read_report(folder.path)});
-  for (const NamedFolder& folder : named_folders_with(kErrorFile, top)) {
+  for (const NamedFolder& folder : folders.of_errors) {
     const JsonFile file = read_json_file(folder.path / kErrorFile);
     JsonSection section(file.json, (folder.path / kErrorFile).string());
     found.failed.push_back(

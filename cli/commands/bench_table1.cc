@@ -54,11 +54,7 @@ constexpr std::array kMethods = {
 
 // The paper's thresholds, 20 and 70 of 255 for the spine, 10 and 60 for the pig, as HU of the window: low + n / 255
 // (high - low), to the nearest 10 (docs/founding-paper.md).
-struct Table1Volume {
-  bool is_spine;
-  std::array<double, 2> thresholds_hu;
-};
-constexpr std::array kVolumes = {Table1Volume{true, {-380.0, 20.0}}, Table1Volume{false, {-460.0, -60.0}}};
+constexpr std::array<std::array<double, 2>, 2> kThresholdsHu = {{{-380.0, 20.0}, {-460.0, -60.0}}};
 
 // Errors are those of 5 % of the pixels at 30 poses. 899 has no factor in common with 30: all axes turn.
 constexpr int kErrorPoses = 30, kErrorEvery = 899;
@@ -87,6 +83,13 @@ Timing time_of(Renderer& renderer, const XrayView& view, std::span<const Eigen::
 double share_above(const Volume<float>& hu, double threshold_hu) {
   const auto count = std::ranges::count_if(hu.voxels, [&](float value) { return value >= threshold_hu; });
   return static_cast<double>(count) / static_cast<double>(hu.voxels.size());
+}
+
+// Otherwise no image would show anything.
+void require_any_above(const BenchVolume& volume, double threshold_hu) {
+  if (share_above(volume.hu, threshold_hu) == 0.0)
+    throw Error(
+        fmt::format("{}: holds nothing above {:g} HU, the threshold of a cell of Table 1", volume.name, threshold_hu));
 }
 
 std::string processor_name() {
@@ -173,19 +176,38 @@ class Cell {
   std::vector<RenderResult> exact_;  // of every pose at which errors are taken
 };
 
-// A row that is kept and wanted must be of the poses and the device that are wanted.
-void require_as_wanted(const Json& row, const Method& method, const Table1Options& options) {
-  const auto refuse = [&](const std::string& has, const std::string& wanted) {
-    throw Error(fmt::format("{}: its row \"{}\" is of {}, and {} is wanted.\n       Choose another folder with -o",
-                            options.output.string(), method.name, has, wanted));
-  };
+// A row that is kept and wanted must be of the poses that are wanted.
+void require_poses(const Json& row, const Table1Options& options) {
   if (const int every = row.at("every").get<int>(); every != options.every)
-    refuse(fmt::format("every {}th of the poses", every), fmt::format("--every {}", options.every));
-  if (!uses_gl(method.kind)) return;
-  const auto device = row.at("device").get<std::string>();
-  if (const GlContext context(gl_choice_from(options.gl, options.gpu)); context.renderer() != device)
-    refuse("the device " + device, context.renderer());
+    throw Error(
+        fmt::format("{}: its row \"{}\" has every {}th of the poses, and --every {} is wanted.\n       Choose "
+                    "another folder with -o",
+                    options.output.string(), row.at("method").get<std::string>(), every, options.every));
 }
+
+// All rows by OpenGL are of one device: of that which renders now, or else of the first row.
+class OneDevice {
+ public:
+  explicit OneDevice(const Table1Options& options) : folder_(options.output) {
+    if (std::ranges::any_of(kMethods, [&](const Method& one) { return uses_gl(one.kind) && options.wants(one.kind); }))
+      device_ = gl_context(gl_choice_from(options.gl, options.gpu)).renderer();
+  }
+
+  void require_of(const Json& row, const Method& method) {
+    if (!uses_gl(method.kind)) return;
+    const auto device = row.at("device").get<std::string>();
+    if (device_.empty()) device_ = device;
+    if (device != device_)
+      throw Error(
+          fmt::format("{}: its row \"{}\" is of the device {}, and others are of {}.\n       Choose another folder "
+                      "with -o",
+                      folder_.string(), method.name, device, device_));
+  }
+
+ private:
+  std::filesystem::path folder_;
+  std::string device_;
+};
 
 std::string in_words(const Json& ms) {
   return ms.is_null() ? fmt::format("{:>22}", "-")
@@ -214,32 +236,34 @@ Json table1(const Table1Options& options, const std::function<void(double share)
                        {"window_hu", {model.window_low_hu, model.window_high_hu}}}}};
   const Table1Folder folder(options.output, kept);
   const auto wanted = std::ranges::count_if(kMethods, [&](const Method& method) { return options.wants(method.kind); });
-  const double work = static_cast<double>(wanted) * 2.0 * kVolumes.size();
+  const double work = static_cast<double>(wanted) * 2.0 * kThresholdsHu.size();
   double done = 0.0;
   Json result = kept;
   result["protocol"]["poses"] = (kBenchPoses + options.every - 1) / options.every;
   result["protocol"]["every"] = options.every;
   result["tables"] = Json::array();
-  for (const auto& [is_spine, thresholds_hu] : kVolumes) {
-    const BenchVolume volume = is_spine ? bench_spine() : bench_head(options.ct);
-    for (const double threshold_hu : thresholds_hu) {
-      Cell cell(options, volume, threshold_hu);
+  OneDevice device(options);
+  const std::array volumes = {bench_spine(), bench_head(options.ct)};
+  for (std::size_t n = 0; n < volumes.size(); ++n)
+    for (const double threshold_hu : kThresholdsHu[n]) require_any_above(volumes[n], threshold_hu);
+  for (std::size_t n = 0; n < volumes.size(); ++n) {
+    for (const double threshold_hu : kThresholdsHu[n]) {
+      Cell cell(options, volumes[n], threshold_hu);
       const Json header = cell.header();
-      if (header.at("share_above") == 0.0)
-        throw Error(fmt::format("{}: holds nothing above {:g} HU, so that no image of Table 1 would show anything",
-                                volume.name, threshold_hu));
       Json table = header;
       table["rows"] = Json::array();
       for (const Method& method : kMethods) {
         std::optional<Json> row = folder.find(header, method.name);
         if (options.wants(method.kind)) {
           if (row)
-            require_as_wanted(*row, method, options);
+            require_poses(*row, options);
           else
             folder.keep(header, *(row = cell.measure(method)));
           progress(++done / work);
         }
-        if (row) table["rows"].push_back(*std::move(row));
+        if (!row) continue;
+        device.require_of(*row, method);
+        table["rows"].push_back(*std::move(row));
       }
       on_cell(table);
       result["tables"].push_back(std::move(table));

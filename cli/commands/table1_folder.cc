@@ -29,7 +29,7 @@ Table1Folder::Table1Folder(std::filesystem::path path, const nlohmann::ordered_j
                       path_.string()));
     return;
   }
-  if (std::filesystem::exists(path_) && !std::filesystem::is_empty(path_))
+  if (holds_files(path_))
     throw Error(
         fmt::format("{}: exists and holds no rows of Table 1.\n       Choose another folder with -o", path_.string()));
   std::filesystem::create_directories(path_);

@@ -152,7 +152,16 @@ TEST_F(Table2CommandTest, RowsOfTwoStudiesAreNoTable) {
   std::ofstream(file) << configuration.dump(2);
   const CommandOutcome outcome = table2({"--only", "cpu-src"});
   EXPECT_EQ(outcome.exit_status, 1);
-  EXPECT_THAT(outcome.err, HasSubstr("holds evaluations of two studies, cpu-mi and cpu-src"));
+  EXPECT_THAT(outcome.err, HasSubstr("its other evaluations are of another study"));
+  EXPECT_FALSE(std::filesystem::exists(output() / "cpu-src")) << "it has begun";
+}
+
+// Killed before anything of the second row was written.
+TEST_F(Table2CommandTest, ARowThatHadHardlyBegunIsMade) {
+  std::filesystem::create_directories(output() / "cpu-mi");
+  std::ofstream(output() / "cpu-mi" / ".evaluation.json.77.partial") << "{";
+  const CommandOutcome outcome = table2({"--only", "cpu-mi"});
+  EXPECT_EQ(outcome.exit_status, 0) << outcome.err;
 }
 
 TEST_F(Table2CommandTest, JobsThatARowCannotHaveAreRefusedAtOnce) {

@@ -241,7 +241,13 @@ EvaluationFolder evaluate_loaded(const Study& study, EvaluateOptions options, Ob
   RendererStore renderers;
   const RegistrationSetup setup(options.registration, study, beams_of(study), renderers);
   const TargetRegistration registration(study, options.registration, setup, choice, surrogate, bodies);
-  EvaluationFolder folder(options.output, configuration_of(options, study, setup.renderers().finest(), choice.target));
+  const Json configuration = configuration_of(options, study, setup.renderers().finest(), choice.target);
+  if (!options.of_study.empty() && study_in(configuration) != options.of_study)
+    throw Error(
+        fmt::format("{}: its other evaluations are of another study (CT, X-rays or truth); a table is of one.\n       "
+                    "Choose another folder with -o",
+                    options.output.parent_path().string()));
+  EvaluationFolder folder(options.output, configuration);
   run_missing(folder, study, choice.target, registration, options, jobs, observer);
   folder.write_summary();
   return folder;

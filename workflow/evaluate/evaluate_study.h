@@ -23,13 +23,15 @@ struct EvaluateOptions {
   Eigen::Isometry3d truth = Eigen::Isometry3d::Identity();  // the true setup error, at the isocenter
   std::vector<BodyTruth> body_truths;                       // empty: nobody knows what single bones did
   std::filesystem::path output;
+  // What EvaluationFolder::study() must be, so that the evaluation belongs to others. Empty: anything.
+  nlohmann::ordered_json of_study;
 };
 
 // Throws UsageError if several jobs are asked of a renderer that can only do one registration at a time.
 void check_jobs(int jobs, RendererKind kind);
 
 // Runs the registrations that are not yet in the folder, and writes summary and plots. Throws UsageError as
-// check_jobs() does.
+// check_jobs() does, and Error for another study than options.of_study; then nothing is written.
 EvaluationFolder evaluate_study(const EvaluateOptions& options, Notes& notes, Observer& observer);
 
 // The same of a study that options.study has loaded.

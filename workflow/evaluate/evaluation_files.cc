@@ -195,9 +195,17 @@ Json parsed(const std::filesystem::path& file) {
 
 }  // namespace
 
+Json study_in(const Json& configuration) {
+  return {{"ct_series", configuration.at("ct_series")},
+          {"image", configuration.at("images").at(0)},
+          {"truth", configuration.at("truth")}};
+}
+
+bool is_evaluation(const std::filesystem::path& folder) { return std::filesystem::exists(folder / kConfigurationFile); }
+
 EvaluationFolder::EvaluationFolder(std::filesystem::path path, Json configuration)
     : path_(std::move(path)), configuration_(std::move(configuration)) {
-  if (std::filesystem::exists(path_ / kConfigurationFile)) {
+  if (is_evaluation(path_)) {
     if (parsed(path_ / kConfigurationFile) != configuration_)
       throw Error(
           fmt::format("{}: holds another evaluation (evaluation.json says which).\n       Choose another folder with "
@@ -208,7 +216,7 @@ EvaluationFolder::EvaluationFolder(std::filesystem::path path, Json configuratio
     if (!are_whole) write_runs();
     return;
   }
-  if (std::filesystem::exists(path_) && !std::filesystem::is_empty(path_))
+  if (holds_files(path_))
     throw Error(
         fmt::format("{}: exists and holds no evaluation.\n       Choose another folder with -o", path_.string()));
   std::filesystem::create_directories(path_);
@@ -253,12 +261,6 @@ void EvaluationFolder::write_bodies() const {
   std::string bodies = std::string(kBodiesHeader) + "\n";
   for (const EvaluatedRun& run : runs_) bodies += lines_of_bodies(run);
   replace_text(path_ / kBodiesFile, bodies);
-}
-
-Json EvaluationFolder::study() const {
-  return {{"ct_series", configuration_.at("ct_series")},
-          {"image", configuration_.at("images").at(0)},
-          {"truth", configuration_.at("truth")}};
 }
 
 // Bodies are written before the line of their run: those of a run that was stopped are left out, and made again with

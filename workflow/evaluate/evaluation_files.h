@@ -12,6 +12,12 @@
 
 namespace isoshift {
 
+// Of the configuration of an evaluation what those of one study share: its CT, its first X-ray and the truth.
+nlohmann::ordered_json study_in(const nlohmann::ordered_json& configuration);
+
+// Whether a folder holds an evaluation; one that was killed at its beginning may hold none yet.
+bool is_evaluation(const std::filesystem::path& folder);
+
 class EvaluationFolder {
  public:
   // Makes the folder, or opens the folder of the same evaluation. Throws Error if it holds anything else.
@@ -24,8 +30,7 @@ class EvaluationFolder {
   const std::vector<EvaluatedRun>& runs() const { return runs_; }  // ended so far, in the order they ended
   bool has(int number) const;
 
-  // What evaluations of one study share: its CT, its first X-ray and the truth.
-  nlohmann::ordered_json study() const;
+  nlohmann::ordered_json study() const { return study_in(configuration_); }
 
   void append(const EvaluatedRun& run);
 

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <utility>
 
 #include "base/error.h"
 #include "base/output_folder.h"
@@ -15,6 +16,7 @@ using Json = nlohmann::ordered_json;
 
 struct Table2Row {
   Table2Configuration configuration;
+  Json study;  // EvaluationFolder::study()
   EvaluationSummary summary;
 };
 
@@ -35,21 +37,15 @@ std::string optimizer_of(const Table2Configuration& configuration) {
 // The configurations that have a folder there, in their order. Throws Error for folders of different studies.
 std::vector<Table2Row> rows_in(const std::filesystem::path& folder) {
   std::vector<Table2Row> rows;
-  std::string first;
-  Json study;
   for (const Table2Configuration& configuration : table2_configurations()) {
-    if (!std::filesystem::exists(folder / configuration.name)) continue;
+    if (!is_evaluation(folder / configuration.name)) continue;
     const EvaluationFolder evaluation(folder / configuration.name);
-    if (rows.empty()) {
-      first = configuration.name;
-      study = evaluation.study();
-    } else if (evaluation.study() != study) {
+    if (!rows.empty() && evaluation.study() != rows.front().study)
       throw Error(
           fmt::format("{}: holds evaluations of two studies, {} and {}; a table is of one.\n       Choose another "
                       "folder with -o",
-                      folder.string(), first, configuration.name));
-    }
-    rows.push_back({configuration, summarized(evaluation.runs(), evaluation.judged_by_mrpd())});
+                      folder.string(), rows.front().configuration.name, configuration.name));
+    rows.push_back({configuration, evaluation.study(), summarized(evaluation.runs(), evaluation.judged_by_mrpd())});
   }
   return rows;
 }
@@ -62,7 +58,7 @@ std::string markdown(const std::vector<Table2Row>& rows) {
       "| configuration | start | views | renderer | similarity | optimizer | starts | failures | mTRE mm | mPD mm | "
       "mRPD "
       "mm | time s | iterations | rendering |\n|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n";
-  for (const auto& [configuration, summary] : rows) {
+  for (const auto& [configuration, study, summary] : rows) {
     const OverAllRuns& all = summary.all;
     table +=
         fmt::format("| {} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {:.1f} % |\n",
@@ -80,7 +76,7 @@ std::string csv(const std::vector<Table2Row>& rows) {
       "configuration,reading,views,renderer,similarity,optimizer,searches,starts,failures,without_pose,mtre_mm,"
       "mtre_sd_mm,mpd_mm,mpd_sd_mm,mrpd_mm,mrpd_sd_mm,search_s,search_sd_s,evaluations,evaluations_sd,"
       "rendering_share\n";
-  for (const auto& [configuration, summary] : rows) {
+  for (const auto& [configuration, study, summary] : rows) {
     const OverAllRuns& all = summary.all;
     table += fmt::format("{},{},{},{},{},{},{},{},{},{}", configuration.name, in_words(configuration.reading),
                          configuration.is_one_view ? 1 : 2, configuration.renderer, configuration.similarity,
@@ -126,16 +122,17 @@ std::string evaluate_table2(const EvaluateOptions& options, const std::vector<st
   for (const Table2Configuration& configuration : wanted)
     check_jobs(options.jobs, request_of(configuration, options.registration).rendering.kind());
   const Study study = load(options.study, notes, observer);
-  rows_in(options.output);
+  std::vector<Table2Row> rows = rows_in(options.output);
   for (const Table2Configuration& configuration : wanted) {
     observer.say(fmt::format("{}:", configuration.name));
-    evaluate_loaded(configuration.is_one_view ? first_view_of(study) : study,
-                    options_for(configuration, options, study), observer);
-    const std::vector<Table2Row> rows = rows_in(options.output);
+    EvaluateOptions of_configuration = options_for(configuration, options, study);
+    if (!rows.empty()) of_configuration.of_study = rows.front().study;
+    evaluate_loaded(configuration.is_one_view ? first_view_of(study) : study, std::move(of_configuration), observer);
+    rows = rows_in(options.output);
     replace_text(options.output / "table2.md", markdown(rows));
     replace_text(options.output / "table2.csv", csv(rows));
   }
-  return markdown(rows_in(options.output));
+  return markdown(rows);
 }
 
 }  // namespace isoshift
