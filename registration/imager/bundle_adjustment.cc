@@ -113,17 +113,16 @@ class Adjustment {
     return false;
   }
 
-  // Whether a ball, and what lies around it, is in the irradiated field, and no pixel there is clipped.
+  // Whether a view should show a ball at that place: it is in the irradiated field, and not clipped.
   static bool is_shown(const Eigen::Vector2d& place, const BallView& view) {
-    constexpr double kAround = 2.5;  // radii: with the ring from which dark_spots() has the background
     const Image<std::uint8_t>& field = view.spots.field;
-    for (const double u : {-1.0, 0.0, 1.0})
-      for (const double v : {-1.0, 0.0, 1.0}) {
-        const Eigen::Vector2d at = place + kAround * view.radius_px * Eigen::Vector2d(u, v);
-        if (!(at.x() >= 0.0 && at.y() >= 0.0 && at.x() <= field.columns - 1 && at.y() <= field.rows - 1)) return false;
-        if (field.at(static_cast<int>(std::lround(at.x())), static_cast<int>(std::lround(at.y()))) == 0) return false;
-      }
-    return true;
+    const auto is_in_field = [&](double u, double v) {
+      const Eigen::Vector2d at = place + view.radius_px * Eigen::Vector2d(u, v);
+      return at.x() >= 0.0 && at.y() >= 0.0 && at.x() <= field.columns - 1 && at.y() <= field.rows - 1 &&
+             field.at(static_cast<int>(std::lround(at.x())), static_cast<int>(std::lround(at.y()))) != 0;
+    };
+    return is_in_field(0.0, 0.0) && is_in_field(-1.0, 0.0) && is_in_field(1.0, 0.0) && is_in_field(0.0, -1.0) &&
+           is_in_field(0.0, 1.0);
   }
 
   // Takes for every ball the nearest spot of every view, if it lies near enough and is no other ball's nearest.
@@ -147,12 +146,12 @@ class Adjustment {
         std::vector<Sight> nearest(spots.size());
         std::vector<double> distance(spots.size(), std::numeric_limits<double>::infinity());
         for (std::size_t ball = 0; ball < balls_.size(); ++ball) {
-          if (!is_shown(expected[ball], view) || is_crowded(ball, expected, view.radius_px)) continue;
-          ++places;
+          if (is_crowded(ball, expected, view.radius_px)) continue;
           const auto spot = std::ranges::min_element(
               spots, {}, [&](const Eigen::Vector2d& place) { return (place - expected[ball]).squaredNorm(); });
-          if (spot == spots.end()) continue;
-          const double mm = view.model.pixel_mm() * (*spot - expected[ball]).norm();
+          const double mm = spot == spots.end() ? std::numeric_limits<double>::infinity()
+                                                : view.model.pixel_mm() * (*spot - expected[ball]).norm();
+          if (mm <= within_mm || is_shown(expected[ball], view)) ++places;
           const auto n = static_cast<std::size_t>(spot - spots.begin());
           if (mm > within_mm || mm >= distance[n]) continue;
           distance[n] = mm;

@@ -47,8 +47,8 @@ struct BundleAdjustment {
   double rms_mm = 0.0;                 // of what remains, on the receptor, per axis
 };
 
-// `imagers`: their number. Balls outside the irradiated field, and balls that hide each other, are not used. Throws
-// Error if too few balls are found where the views should show them.
+// `imagers`: their number. Balls that hide each other are not used, and those outside the irradiated field are not
+// missed. Throws Error if too few balls are found where the views should show them.
 BundleAdjustment adjusted(const std::vector<Ball>& balls, const std::vector<BallSession>& sessions, BallPoses poses,
                           std::size_t imagers);
 

@@ -109,7 +109,7 @@ TEST_F(AuditArchive, CountsTheLastResultOfTheSameXraysAndWhatWasAccepted) {
   write_text(archive() / "d" / kResultFile, "{}");
   std::map<std::string, std::string> left_out;
   for (const AuditedSession& session : read()) left_out[session.name] = session.left_out;
-  EXPECT_EQ(left_out["a"], "its X-rays have a later result: a-2");
+  EXPECT_EQ(left_out["a"], "its X-ray has a later result: a-2");
   EXPECT_EQ(left_out["a-2"], "");
   EXPECT_EQ(left_out["b"], "isoshift did not accept it (review)");
   EXPECT_EQ(left_out["c"], "the time of its X-rays is not known");
