@@ -143,6 +143,7 @@ TABLES = [("What holds, what does not, what is open", words("| finding of the pa
           ("On a GPU of today", lambda: times("table1-h200.json")),
           ("On a GPU of today", lambda: errors("table1-h200.json")),
           ("On a GPU and the 16 cores beside it", lambda: table2("h200")),
+          ("On two cores", lambda: table2("2-cores-2.4GHz")),
           ("On two cores", lambda: table2("2-cores-2.6GHz")),
           ("On two cores", lambda: table2("2-cores-2.6GHz-whole-image")),
           ("On two cores", lambda: table2("2-cores-2.6GHz-llvmpipe")),
