@@ -26,10 +26,17 @@ def errors(summary):
             f"{summary['mrpd_mm']:.2f}"]
 
 
+def capture(summary):
+    """The capture range: a lower bound where all starts were captured, of which the farthest are in this bin."""
+    farthest_mm = 20
+    captured_mm = summary["capture_range_mm"]
+    return f"at least {captured_mm}" if captured_mm == farthest_mm else captured_mm
+
+
 def cells_of_case(case, summary):
     has_failures = summary["successes"] < summary["runs"]
     near, far = summary["within_1_mm"], summary["beyond_2_mm"]
-    return [case, share(summary["successes"], summary["runs"]), *errors(summary), summary["capture_range_mm"],
+    return [case, share(summary["successes"], summary["runs"]), *errors(summary), capture(summary),
             f"{100 * summary['rotation_share_of_failures']:.0f} %" if has_failures else "-",
             share(near["accepted"], near["runs"]), share(far["accepted"], far["runs"]), f"{summary['mean_evaluations']:.0f}"]
 
@@ -127,6 +134,25 @@ def intensity():
                   for words, changes in INTENSITY.items()])
 
 
+def coarse():
+    rows = rows_of("coarse.csv")
+    receptor_mm, magnification = 410, 1.5
+
+    def span(of_size, column):
+        values = sorted((float(row[column]) for row in of_size), key=abs)
+        return f"{values[0]:.2f} to {values[-1]:.2f}"
+
+    def cells(voxel_mm, pixels):
+        of_size = [row for row in rows if (row["voxel_mm"], row["pixels"]) == (voxel_mm, pixels)]
+        accepted = [row["verdict"] for row in of_size].count("accepted")
+        return [f"{voxel_mm} mm ({1.5 * float(voxel_mm):.1f} mm)", f"{receptor_mm / magnification / int(pixels):.1f} mm",
+                share(accepted, len(of_size)), span(of_size, "error_y_deg"), span(of_size, "sigma_y_deg")]
+
+    sizes = dict.fromkeys((row["voxel_mm"], row["pixels"]) for row in rows)
+    return table(["voxels (slices)", "pixels at the isocenter", "accepted", "error about y, degrees", "sigma about y, degrees"],
+                 [cells(*size) for size in sizes])
+
+
 TABLES = [("Baseline", lambda: cases("baseline")),
           ("Preset setup", lambda: cases("setup")),
           ("Uncertainty", uncertainty),
@@ -136,4 +162,5 @@ TABLES = [("Baseline", lambda: cases("baseline")),
           ("Bodies that bend", targets),
           ("Faults in files", faults_table),
           ("Changes of intensity", intensity),
+          ("Coarse data", coarse),
           ("On a GPU", lambda: cases("gpu"))]
