@@ -250,7 +250,9 @@ EvaluationSummary summarized(std::span<const EvaluatedRun> runs, bool by_mrpd) {
   summary.mean_mpd_mm = mean_of(values_of(std::span<const EvaluatedRun>(found), &EvaluatedRun::mpd_mm));
   summary.mean_mrpd_mm = mean_of(values_of(std::span<const EvaluatedRun>(found), &EvaluatedRun::mrpd_mm));
   for (const SuccessBin& bin : success_bins(runs, by_mrpd)) {
-    if (bin.start_mm != summary.capture_range_mm || bin.successes < 0.95 * bin.runs) break;
+    if (bin.start_mm != summary.capture_range_mm) break;
+    summary.may_capture_more = bin.successes >= 0.95 * bin.runs;
+    if (!summary.may_capture_more) break;
     summary.capture_range_mm = bin.start_mm + 1;
   }
   summary.rotation_share_of_failures = mean_of(failed_rotation_share);

@@ -104,6 +104,7 @@ struct EvaluationSummary {
   double mean_mpd_mm = 0.0, mean_mrpd_mm = 0.0;        // of the successes
   // The last bin of 1 mm of start mTRE before success falls below 95 %: its upper end.
   int capture_range_mm = 0;
+  bool may_capture_more = true;             // no start from the next mm was tried
   double rotation_share_of_failures = 0.0;  // mean
   double median_seconds = 0.0, mean_evaluations = 0.0;
   double rendering_share = 0.0, similarity_share = 0.0;  // of all time

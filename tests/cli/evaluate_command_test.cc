@@ -11,6 +11,7 @@
 #include "tests/support/small_study.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/support/tiny_study.h"
+#include "workflow/evaluate/evaluation_files.h"
 
 namespace isoshift::evaluate_command_test {
 namespace {
@@ -212,6 +213,12 @@ TEST_F(EvaluateCommandTest, TheTableHasARowPerFolder) {
   const CommandOutcome none = run_command({"evaluate", "--table", (folder_ / "nowhere").string()});
   EXPECT_EQ(none.exit_status, 1);
   EXPECT_THAT(none.err, HasSubstr("is this the folder of an evaluation?"));
+}
+
+TEST_F(EvaluateCommandTest, ErrorsOfSuccessesNeedSuccesses) {
+  EXPECT_THAT(evaluation_table({{"none", {.runs = 3}}}), HasSubstr("| 0/3 (0.0 %) | - | - | - | - | at least 0 mm |"));
+  EXPECT_THAT(evaluation_table({{"one", {.runs = 3, .successes = 1, .mean_mm = 0.5, .median_mm = 0.5}}}),
+              HasSubstr("| 1/3 (33.3 %) | 0.50 mm | 0.50 mm |"));
 }
 
 TEST_F(EvaluateCommandTest, NeedsATruthAndAFolder) {

@@ -234,6 +234,12 @@ TEST(EvaluationSummary, CaptureRangeEndsBeforeTheFirstBinThatFails) {
       2);
 }
 
+TEST(EvaluationSummary, CaptureRangeIsABoundWhereTheNextStartsWereNotTried) {
+  EXPECT_TRUE(summarized(all_of({runs_in_bin(0, 10, 0), runs_in_bin(1, 10, 0)}), false).may_capture_more);
+  EXPECT_TRUE(summarized(all_of({runs_in_bin(0, 10, 0), runs_in_bin(2, 0, 10)}), false).may_capture_more);
+  EXPECT_FALSE(summarized(all_of({runs_in_bin(0, 10, 0), runs_in_bin(1, 9, 1)}), false).may_capture_more);
+}
+
 TEST(EvaluationSummary, BinsCountRunsAndSuccesses) {
   const auto bins = success_bins(all_of({runs_in_bin(3, 4, 1), runs_in_bin(0, 2, 0)}), false);
   ASSERT_EQ(bins.size(), 2U);

@@ -116,14 +116,36 @@ Json json_of(const OverAllRuns& all) {
           {"rendering_share_of_an_iteration", all.rendering_share}};
 }
 
+// Mean and median need one success, a standard deviation two.
+Json of_successes(const EvaluationSummary& summary, double value, int least = 1) {
+  return summary.successes >= least ? Json(value) : Json(nullptr);
+}
+
+std::string mm_of_successes(const EvaluationSummary& summary, double value_mm) {
+  return summary.successes > 0 ? fmt::format("{:.2f} mm", value_mm) : "-";
+}
+
+std::string mtre_of_successes(const EvaluationSummary& summary) {
+  return summary.successes > 1 ? fmt::format("{:.2f} +/- {:.2f} mm", summary.mean_mm, summary.sd_mm)
+                               : mm_of_successes(summary, summary.mean_mm);
+}
+
+std::string capture_in_words(const EvaluationSummary& summary) {
+  return fmt::format("{}{} mm", summary.may_capture_more ? "at least " : "", summary.capture_range_mm);
+}
+
 Json json_of(const EvaluationSummary& summary) {
   Json json = {{"runs", summary.runs},
                {"successes", summary.successes},
                {"success_share", summary.success_share()},
-               {"mtre_mm", {{"mean", summary.mean_mm}, {"sd", summary.sd_mm}, {"median", summary.median_mm}}},
-               {"mpd_mm", summary.mean_mpd_mm},
-               {"mrpd_mm", summary.mean_mrpd_mm},
+               {"mtre_mm",
+                {{"mean", of_successes(summary, summary.mean_mm)},
+                 {"sd", of_successes(summary, summary.sd_mm, 2)},
+                 {"median", of_successes(summary, summary.median_mm)}}},
+               {"mpd_mm", of_successes(summary, summary.mean_mpd_mm)},
+               {"mrpd_mm", of_successes(summary, summary.mean_mrpd_mm)},
                {"capture_range_mm", summary.capture_range_mm},
+               {"may_capture_more", summary.may_capture_more},
                {"rotation_share_of_failures", summary.rotation_share_of_failures},
                {"median_seconds", summary.median_seconds},
                {"mean_evaluations", summary.mean_evaluations},
@@ -170,8 +192,8 @@ BarChart error_histogram(const std::vector<EvaluatedRun>& runs, bool by_mrpd, co
 }
 
 BarChart success_chart(const std::vector<EvaluatedRun>& runs, bool by_mrpd, const EvaluationSummary& summary) {
-  BarChart chart{.title = fmt::format("Success: {:.1f} % of {} starts, capture range {} mm",
-                                      100.0 * summary.success_share(), summary.runs, summary.capture_range_mm),
+  BarChart chart{.title = fmt::format("Success: {:.1f} % of {} starts, capture range {}",
+                                      100.0 * summary.success_share(), summary.runs, capture_in_words(summary)),
                  .x_label = "mTRE at the start [mm]",
                  .y_label = "success [%]; dashed: 95 %",
                  .y_max = 100.0,
@@ -305,16 +327,16 @@ std::string evaluation_table(const std::vector<std::pair<std::string, Evaluation
   for (const auto& [name, summary] : rows) width = std::max(width, name.size());
   std::string table = fmt::format(
       "| {:<{}} | success | mTRE mean +/- SD | median | mPD | mRPD | capture | rotation | accepted <1 mm | accepted >2 "
-      "mm | target median | target <1 mm (accepted) | target >2 mm accepted | evaluations | time | rendering "
+      "mm | target median | target <1 mm (accepted) | target >2 mm accepted | evaluations | time | rendering of time "
       "|\n|{:-<{}}|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n",
       "", width, "", width + 2);
   for (const auto& [name, s] : rows)
     table += fmt::format(
-        "| {:<{}} | {}/{} ({:.1f} %) | {:.2f} +/- {:.2f} mm | {:.2f} mm | {:.2f} mm | {:.2f} mm | {} mm | {} | {}/{} | "
+        "| {:<{}} | {}/{} ({:.1f} %) | {} | {} | {} | {} | {} | {} | {}/{} | "
         "{}/{} | {:.2f} mm | {} ({}) | {} | {:.0f} | {:.2f} s | {:.0f} % |\n",
-        name, width, s.successes, s.runs, 100.0 * s.success_share(), s.mean_mm, s.sd_mm, s.median_mm, s.mean_mpd_mm,
-        s.mean_mrpd_mm, s.capture_range_mm,
-        s.successes < s.runs ? fmt::format("{:.0f} %", 100.0 * s.rotation_share_of_failures) : "-",
+        name, width, s.successes, s.runs, 100.0 * s.success_share(), mtre_of_successes(s),
+        mm_of_successes(s, s.median_mm), mm_of_successes(s, s.mean_mpd_mm), mm_of_successes(s, s.mean_mrpd_mm),
+        capture_in_words(s), s.successes < s.runs ? fmt::format("{:.0f} %", 100.0 * s.rotation_share_of_failures) : "-",
         s.within_1_mm_accepted, s.within_1_mm, s.beyond_2_mm_accepted, s.beyond_2_mm, s.median_target_mm,
         s.target_within_1_mm, s.target_within_1_mm_accepted, s.target_beyond_2_mm_accepted, s.mean_evaluations,
         s.median_seconds, 100.0 * s.rendering_share);
