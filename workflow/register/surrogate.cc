@@ -149,11 +149,15 @@ std::optional<std::string> doubt_of_neck(const Study& study, const Spine& spine,
       spine.vertebrae.size());
 }
 
-// Why the dense places near a target may not carry it as the whole patient moves. What is near its center counts, and
-// where nothing is, what most of its surface is near to. Only in a trunk: in a head bones hang together. Vertebrae are
-// asked first, because they are found quickly and are what most targets lie near.
-std::optional<std::string> doubt_of_bones(const Study& study, const Spine& spine, const Target& target,
-                                          BodyStore& bodies) {
+struct NearTarget {
+  std::string what = "bone";
+  std::optional<std::string> doubt;  // why it may not carry the target as the whole patient moves
+};
+
+// The dense places near a target. What is near its center counts, and where nothing is, what most of its surface is
+// near to. Doubted only in a trunk: in a head bones hang together. Vertebrae are asked first, because they are found
+// quickly and are what most targets lie near.
+NearTarget bones_near(const Study& study, const Spine& spine, const Target& target, BodyStore& bodies) {
   const Volume<float>& ct_hu = study.ct->hu;
   const std::vector<Eigen::Vector3d> points = points_patient_mm(study, target);
   if (!spine.is_of_trunk || is_vertebra_near(spine.vertebrae, points.front())) return {};
@@ -162,14 +166,15 @@ std::optional<std::string> doubt_of_bones(const Study& study, const Spine& spine
   if (near.of_spine + near.of_others == 0) near = points_by_bone(ct_hu, map, points);
   if (near.are_carried()) return {};
   if (near.of_others < near.unrecognized)
-    return fmt::format(
-        "what is dense within {:.0f} mm of the target was not recognized as a bone that could carry it "
-        "(it may be contrast agent, calcification or a thin bone), and the site file names no surrogate",
-        kCarriersNearMm);
-  return fmt::format(
-      "hardly more than ribs, bones of the shoulders or other bones that do not hang on the spine lies within "
-      "{:.0f} mm of the target: they move by themselves, and the site file names no surrogate",
-      kCarriersNearMm);
+    return {.what = "dense places, not recognized as bone,",
+            .doubt = fmt::format(
+                "what is dense within {:.0f} mm of the target was not recognized as a bone that could carry it "
+                "(it may be contrast agent, calcification or a thin bone), and the site file names no surrogate",
+                kCarriersNearMm)};
+  return {.doubt = fmt::format(
+              "hardly more than ribs, bones of the shoulders or other bones that do not hang on the spine lies within "
+              "{:.0f} mm of the target: they move by themselves, and the site file names no surrogate",
+              kCarriersNearMm)};
 }
 
 }  // namespace
@@ -192,9 +197,11 @@ Surrogate surrogate_of(const Study& study, const Target& target, const std::stri
   if (std::ranges::any_of(points_patient_mm(study, target),
                           [&](const Eigen::Vector3d& point) { return is_bone_near(study.ct->hu, point); })) {
     const Spine spine = spine_of(study.ct->hu);
-    std::optional<std::string> doubt = doubt_of_neck(study, spine, target);
-    if (!doubt) doubt = doubt_of_bones(study, spine, target, bodies);
-    return {.words = fmt::format("bone within {:.0f} mm", kCarriersNearMm), .drawn = {}, .doubt = std::move(doubt)};
+    NearTarget near{.doubt = doubt_of_neck(study, spine, target)};
+    if (!near.doubt) near = bones_near(study, spine, target, bodies);
+    return {.words = fmt::format("{} within {:.0f} mm", near.what, kCarriersNearMm),
+            .drawn = {},
+            .doubt = std::move(near.doubt)};
   }
   return {
       .words = "none",

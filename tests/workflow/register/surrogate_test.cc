@@ -162,6 +162,7 @@ TEST(Surrogate, DenseSoftTissueIsNoBone) {
   const Surrogate surrogate = surrogate_of(study, target_at(study, front, 5.0), "", bodies);
   ASSERT_TRUE(surrogate.doubt);
   EXPECT_THAT(*surrogate.doubt, HasSubstr("was not recognized as a bone"));
+  EXPECT_EQ(surrogate.words, "dense places, not recognized as bone, within 20 mm");
 }
 
 TEST(Surrogate, IsTheStructureThatTheSiteNames) {
