@@ -3,9 +3,11 @@
 
 #include <algorithm>
 #include <exception>
+#include <span>
 #include <sstream>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "base/error.h"
 #include "base/version.h"
@@ -74,6 +76,20 @@ void add_commands(CLI::App& app, Console& console, int& exit_status) {
   add_bench_command(app, console, exit_status);
 }
 
+// CLI11 would say only that a command is missing, or of what stands before it that the command lacks it.
+void check_command(const CLI::App& app, std::span<const char* const> words) {
+  std::vector<std::string> names;
+  for (const CLI::App* command : app.get_subcommands({})) names.push_back(command->get_name());
+  const auto is_command = [&](std::string_view word) { return std::ranges::count(names, word) > 0; };
+  const auto command = std::ranges::find_if(words, is_command);
+  if (words.empty() || command == words.begin()) return;
+  const std::string_view first = words.front();
+  if (!first.starts_with('-'))
+    throw UsageError(fmt::format("there is no command {}; the commands are {}", first, fmt::join(names, ", ")));
+  if (command != words.end() && app.get_option_no_throw(std::string(first)) == nullptr)
+    throw UsageError(fmt::format("{} belongs behind the command: isoshift {} ... {}", first, *command, first));
+}
+
 }  // namespace
 
 void write_manual(const std::filesystem::path& folder) {
@@ -90,13 +106,7 @@ int run_isoshift(int argc, const char* const* argv, Console& console) {
   CLI::App app(kDescription, "isoshift");
   add_commands(app, console, exit_status);
   try {
-    // CLI11 would say only that a command is missing.
-    const auto commands = app.get_subcommands({});
-    std::vector<std::string> names;
-    std::ranges::transform(commands, std::back_inserter(names), &CLI::App::get_name);
-    const auto is_chosen = [&](const CLI::App* command) { return command->get_name() == argv[1]; };
-    if (argc > 1 && argv[1][0] != '-' && std::ranges::none_of(commands, is_chosen))
-      throw UsageError(fmt::format("there is no command {}; the commands are {}", argv[1], fmt::join(names, ", ")));
+    check_command(app, std::span(argv, static_cast<std::size_t>(argc)).subspan(1));
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() == 0) return app.exit(error, console.out, console.err);

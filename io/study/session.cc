@@ -151,7 +151,9 @@ std::vector<Finding> session_findings(std::span<const RtImage> images, Notes& no
           [](const RtImage& image, const RtImage& first) -> std::optional<Finding> {
             const double apart_s = std::abs(*acquisition_seconds(image) - *acquisition_seconds(first));
             if (apart_s <= kMaxTimeSpanS) return std::nullopt;
-            return Finding{"time-span", fmt::format("{}: taken {:.0f} minutes from {}, expected at most 10 ({})",
+            return Finding{"time-span", fmt::format("{}: taken {:.0f} minutes from {}, expected at most 10 ({})\n"
+                                                    "       Of several sessions isoshift batch registers each, and "
+                                                    "--image names the X-rays of one.",
                                                     image.path.string(), apart_s / 60.0, first.path.string(),
                                                     described(DCM_AcquisitionTime))};
           });

@@ -47,6 +47,15 @@ TEST_F(ErrorMessagesTest, NamesCannotSteerATerminal) {
   EXPECT_THAT(outcome.err, HasSubstr("no [2Jstudy"));
 }
 
+TEST_F(ErrorMessagesTest, WhatStandsBeforeTheCommand) {
+  const CommandOutcome outcome = run_command({"-o", "result", "register", "study"});
+  EXPECT_EQ(outcome.exit_status, 2);
+  EXPECT_THAT(outcome.err, HasSubstr("-o belongs behind the command: isoshift register ... -o"));
+  EXPECT_THAT(run_command({"regster", "study"}).err,
+              HasSubstr("there is no command regster; the commands are inspect,"));
+  EXPECT_EQ(run_command({"--version", "register"}).exit_status, 0);
+}
+
 TEST_F(ErrorMessagesTest, TwoCtSeries) {
   for (const int k : {0, 1, 2}) edit(study_.ct_slice(k), [](DicomItem d) { d.put(DCM_SeriesInstanceUID, "1.2.3"); });
   const CommandOutcome outcome = register_study(study_);
@@ -216,6 +225,7 @@ TEST_F(ErrorMessagesTest, ViewsTooFarApartInTime) {
   edit(study_.image(1), [](DicomItem d) { d.put(DCM_AcquisitionTime, "104500"); });
   expect_error(
       fmt::format("{}: taken 30 minutes from {}, expected at most 10 (AcquisitionTime (0008,0032))\n"
+                  "       Of several sessions isoshift batch registers each, and --image names the X-rays of one.\n"
                   "       If that is known to be right, allow it: --allow time-span=REASON",
                   where(study_.image(1)), where(study_.image(0))));
 }
