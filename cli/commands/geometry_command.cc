@@ -112,7 +112,14 @@ std::string text_of(const PatientGeometry& geometry) {
       text += fmt::format("             {} saw {} {}: nothing is determined by fewer than {}\n",
                           geometry.imagers[imager], cts, cts == 1 ? "CT" : "CTs", kLeastCts);
   for (const auto& [why, count] : geometry.left_out) text += fmt::format("Left out     {} {}\n", count, why);
-  return text + text_of(geometry.imagers, geometry.found.imagers);
+  std::vector<std::string> names;  // of those that saw enough CTs
+  std::vector<ImagerEstimate> estimates;
+  for (std::size_t imager = 0; imager < geometry.imagers.size(); ++imager) {
+    if (geometry.found.cts[imager] < kLeastCts) continue;
+    names.push_back(geometry.imagers[imager]);
+    estimates.push_back(geometry.found.imagers[imager]);
+  }
+  return text + text_of(names, estimates);
 }
 
 std::string text_of(const BallGeometry& geometry, BallPoses poses) {

@@ -79,16 +79,20 @@ class Adjustment {
   }
 
   BundleAdjustment run() {
-    constexpr const char* kIsItThePhantom = "Is this the CT of that phantom, within 10 mm and 5 degrees of its plan?";
+    const char* const is_it_the_phantom =
+        poses_ == BallPoses::kFree
+            ? "Is this the CT of that phantom, within 10 mm and 5 degrees of its plan?"
+            : "Is this the CT of that phantom, and does it lie within 10 mm and 5 degrees of where the CSV file says? "
+              "Check its signs and axes (IEC 61217 fixed).";
     // Poses first, from the places nearest to where balls are expected; then all, from ever nearer ones.
     for (const double within_mm : {20.0, 10.0}) {
       look(within_mm);
-      require_seen(0.0, kIsItThePhantom);
+      require_seen(0.0, is_it_the_phantom);
       solve(within_mm / 10.0, false);
     }
     for (const double within_mm : {6.0, 3.0, 2.0}) {
       look(within_mm);
-      require_seen(0.0, kIsItThePhantom);
+      require_seen(0.0, is_it_the_phantom);
       solve(noise_mm(), true);
     }
     require_seen(kLeastShare, "Is its pose, or its move, the one that the CSV file says, with the right sign?");

@@ -124,7 +124,7 @@ TEST_F(AuditSetupCommandTest, DescribesWhatIsoshiftFoundWithoutUsedShifts) {
   write_archive(made_archive(1, 0.0, false), results(), table());
   const CommandOutcome outcome = run();
   EXPECT_EQ(outcome.exit_status, 0) << outcome.err;
-  EXPECT_THAT(outcome.out, HasSubstr("60 sessions, 60 of 10 patients counted, 2026-01-01 to"));
+  EXPECT_THAT(outcome.out, HasSubstr("sessions: 60, counted: 60 (patients: 10), 2026-01-01 to"));
   EXPECT_THAT(outcome.out, HasSubstr("0 compared with used shifts"));
   EXPECT_THAT(outcome.out, Not(HasSubstr("AGREEMENT")));
   EXPECT_THAT(outcome.out, HasSubstr("MARGINS"));

@@ -109,7 +109,7 @@ std::string remark_on(std::size_t session, const SetupAudit& audit) {
 
 std::string counts_of(const SetupAudit& audit) {
   std::string text =
-      fmt::format("{} sessions, {} of {} patients counted", audit.sessions.size(), audit.counted, audit.patients);
+      fmt::format("sessions: {}, counted: {} (patients: {})", audit.sessions.size(), audit.counted, audit.patients);
   const auto counted = [](const AuditedSession& session) { return session.counts(); };
   const auto first = std::ranges::find_if(audit.sessions, counted);
   const auto last = std::find_if(audit.sessions.rbegin(), audit.sessions.rend(), counted);

@@ -6,6 +6,7 @@
 
 #include "base/error.h"
 #include "geometry/rotation.h"
+#include "io/dicom/dicom_dataset.h"
 #include "io/objects/registration_check.h"
 #include "io/objects/registration_meaning.h"
 #include "io/study/session.h"
@@ -19,8 +20,11 @@ namespace fs = std::filesystem;
 std::vector<CheckedRegistration> registrations_below(const fs::path& folder, std::vector<std::string>& of_no_use) {
   if (!fs::is_directory(folder)) throw Error(fmt::format("{}: is not a folder", folder.string()));
   std::vector<fs::path> files;
+  const auto may_be_object = [](const fs::path& path) {
+    return path.extension() == ".dcm" || beginning_of(path) == Beginning::kDicom;
+  };
   for (const auto& entry : fs::recursive_directory_iterator(folder))
-    if (entry.is_regular_file()) files.push_back(entry.path());
+    if (entry.is_regular_file() && may_be_object(entry.path())) files.push_back(entry.path());
   std::ranges::sort(files);
   std::vector<CheckedRegistration> objects;
   for (const fs::path& file : files) {

@@ -137,8 +137,10 @@ CommissionWords words_of(const Commission& commission) {
   if (!blind.empty()) words.untested.push_back(fmt::format("axes {}: {}", kNoErrors, fmt::join(blind, ", ")));
   for (const auto& [condition, polarities] : localization.polarities)
     if (const auto unmoved = axes_with(polarities, Outcome::kUntested, words); !unmoved.empty())
-      words.untested.push_back(fmt::format("{}: polarity of {}, since nothing moved enough to show a sign", condition,
-                                           fmt::join(unmoved, ", ")));
+      words.untested.push_back(
+          fmt::format("{}: polarity of {}, since no known move reached 1 mm (1 degree) and ten "
+                      "sigma of the move found",
+                      condition, fmt::join(unmoved, ", ")));
   if (localization.known != Known::kPositions)
     words.untested.emplace_back("errors that all sessions share, such as those of a displaced imager (--positions)");
   if (const auto positions = coverage.untested_positions(); !positions.empty())
