@@ -47,8 +47,8 @@ class AuditedPhantomsCommandTest : public testing::Test {
   void make_and_register() {
     for (int patient = 0; patient < kPatients; ++patient) {
       const CommandOutcome made = run_command(
-          {"phantom", "-o", study_of(patient).string(), "--image-pixels", "256", "--fractions",
-           fmt::format("{}", kFractions), "--seed", fmt::format("{}", patient + 1), "--translation",
+          {"phantom", "-o", study_of(patient).string(), "--fractions", fmt::format("{}", kFractions), "--seed",
+           fmt::format("{}", patient + 1), "--translation",
            fmt::format("{},{},{}", 2 * patient - 5, 4 - patient, patient % 3 - 1), "--rotation", "0.5,-0.5,0.5"});
       ASSERT_EQ(made.exit_status, 0) << made.err;
     }
