@@ -107,18 +107,18 @@ std::string text_of(const PatientGeometry& geometry) {
       "GEOMETRY OF IMAGERS\n{}\n\nPatients     CTs {}, sessions {}, X-rays {}\n"
       "Misfit       {:.2f} (what single views want, in their own sigmas)\n",
       kDisclaimer, geometry.cts, geometry.sessions, geometry.views, geometry.found.misfit);
-  for (std::size_t imager = 0; imager < geometry.imagers.size(); ++imager)
-    if (const std::size_t cts = geometry.found.cts[imager]; cts < kLeastCts)
-      text += fmt::format("             {} saw {} {}: nothing is determined by fewer than {}\n",
-                          geometry.imagers[imager], cts, cts == 1 ? "CT" : "CTs", kLeastCts);
-  for (const auto& [why, count] : geometry.left_out) text += fmt::format("Left out     {} {}\n", count, why);
   std::vector<std::string> names;  // of those that saw enough CTs
   std::vector<ImagerEstimate> estimates;
   for (std::size_t imager = 0; imager < geometry.imagers.size(); ++imager) {
-    if (geometry.found.cts[imager] < kLeastCts) continue;
-    names.push_back(geometry.imagers[imager]);
-    estimates.push_back(geometry.found.imagers[imager]);
+    if (const std::size_t cts = geometry.found.cts[imager]; cts < kLeastCts) {
+      text += fmt::format("             {} saw {} {}: nothing is determined by fewer than {}\n",
+                          geometry.imagers[imager], cts, cts == 1 ? "CT" : "CTs", kLeastCts);
+    } else {
+      names.push_back(geometry.imagers[imager]);
+      estimates.push_back(geometry.found.imagers[imager]);
+    }
   }
+  for (const auto& [why, count] : geometry.left_out) text += fmt::format("Left out     {} {}\n", count, why);
   return text + text_of(names, estimates);
 }
 
