@@ -3,6 +3,7 @@
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <stdio.h>  // renameat2
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -14,6 +15,7 @@
 #include <string>
 
 #include "base/error.h"
+#include "base/random_word.h"
 
 namespace isoshift {
 namespace {
@@ -86,9 +88,9 @@ OutputFolder::OutputFolder(fs::path destination, bool overwrite) : destination_(
     replaces_ = !fs::is_empty(destination_);
   }
   make_parents();
-  std::string staging = destination_.string() + ".partial-XXXXXX";
+  const std::string staging = destination_.string() + ".partial-" + random_word().substr(0, 8);
   const std::lock_guard lock(unfinished_mutex);
-  if (::mkdtemp(staging.data()) == nullptr) {
+  if (::mkdir(staging.c_str(), 0777) != 0) {
     const int reason = errno;
     for (auto parent = made_parents_.rbegin(); parent != made_parents_.rend(); ++parent) fs::remove(*parent, error);
     fail(destination_, std::strerror(reason));
@@ -124,7 +126,6 @@ void OutputFolder::commit() {
   write_text(staging_ / kListing, listing);
   for (const fs::path& file : files_in(staging_)) flush(staging_ / file);
   flush(staging_);
-  fs::permissions(staging_, fs::perms::owner_all | fs::perms::group_read | fs::perms::group_exec);
 
   // An earlier output changes places with the new one, and is then removed from the staging name. Without one, a rename
   // takes an empty folder's place and fails if anything has appeared there meanwhile.

@@ -6,26 +6,48 @@
 
 #include <array>
 #include <fstream>
-#include <sstream>
 
 #include "base/error.h"
+#include "base/text_file.h"
 
 namespace isoshift {
 
-std::string sha256_of(std::string_view content) {
+namespace {
+
+void check(int done) {
+  if (done != 1) throw Error("SHA-256 is not available");
+}
+
+}  // namespace
+
+Sha256::Sha256() : context_(EVP_MD_CTX_new(), &EVP_MD_CTX_free) {
+  check(EVP_DigestInit_ex(context_.get(), EVP_sha256(), nullptr));
+}
+
+void Sha256::add(std::string_view piece) { check(EVP_DigestUpdate(context_.get(), piece.data(), piece.size())); }
+
+std::string Sha256::hex() {
   std::array<unsigned char, EVP_MAX_MD_SIZE> digest{};
   unsigned size = 0;
-  if (EVP_Digest(content.data(), content.size(), digest.data(), &size, EVP_sha256(), nullptr) != 1)
-    throw Error("SHA-256 is not available");
+  check(EVP_DigestFinal_ex(context_.get(), digest.data(), &size));
   return fmt::format("{:02x}", fmt::join(digest.begin(), digest.begin() + size, ""));
 }
 
+std::string sha256_of(std::string_view content) {
+  Sha256 sha256;
+  sha256.add(content);
+  return sha256.hex();
+}
+
 std::string sha256_of_file(const std::filesystem::path& path) {
+  expect_no_pipe(path);
   std::ifstream file(path, std::ios::binary);
-  std::ostringstream content;
-  content << file.rdbuf();
-  if (!file) throw Error(fmt::format("{}: cannot be read", path.string()));
-  return sha256_of(content.view());
+  Sha256 sha256;
+  std::array<char, 65536> piece{};
+  while (file.read(piece.data(), piece.size()) || file.gcount() > 0)
+    sha256.add({piece.data(), static_cast<std::size_t>(file.gcount())});
+  if (!file.eof()) throw Error(fmt::format("{}: cannot be read", path.string()));
+  return sha256.hex();
 }
 
 std::string sha256_of_files(const std::vector<std::filesystem::path>& paths) {

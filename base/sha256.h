@@ -2,11 +2,25 @@
 // SHA-256, hexadecimal: results name the files they were made from by it.
 
 #include <filesystem>
+#include <memory>
 #include <string>
 #include <string_view>
 #include <vector>
 
+struct evp_md_ctx_st;  // of OpenSSL
+
 namespace isoshift {
+
+// Of bytes that come in pieces.
+class Sha256 {
+ public:
+  Sha256();
+  void add(std::string_view piece);
+  std::string hex();  // of all pieces; once
+
+ private:
+  std::unique_ptr<evp_md_ctx_st, void (*)(evp_md_ctx_st*)> context_;
+};
 
 std::string sha256_of(std::string_view content);
 

@@ -23,23 +23,6 @@ namespace {
 constexpr int kMaxEdge = 8192;
 constexpr int kMaxFrames = 20000;
 
-// DCMTK keeps its decoders in a global list: registered once, before any thread decodes, and removed at exit.
-void register_decoders() {
-  struct Decoders {
-    Decoders() {
-      DcmRLEDecoderRegistration::registerCodecs();
-      DJDecoderRegistration::registerCodecs();
-      DJLSDecoderRegistration::registerCodecs();
-    }
-    ~Decoders() {
-      DJLSDecoderRegistration::cleanup();
-      DJDecoderRegistration::cleanup();
-      DcmRLEDecoderRegistration::cleanup();
-    }
-  };
-  static const Decoders decoders;
-}
-
 int whole_number(const DicomItem& dataset, const DcmTagKey& tag, int max) {
   const double value = dataset.required_number(tag);
   if (!(value >= 1 && value <= max))
@@ -121,6 +104,11 @@ PixelFormat pixel_format(const DicomItem& dataset) {
   format.rows = whole_number(dataset, DCM_Rows, kMaxEdge);
   if (dataset.has_value(DCM_NumberOfFrames)) format.frames = whole_number(dataset, DCM_NumberOfFrames, kMaxFrames);
   expect(dataset, DCM_SamplesPerPixel, 1);
+  // Of a palette the stored values are numbers of colors.
+  const std::string photometric = dataset.text(DCM_PhotometricInterpretation).value_or("MONOCHROME2");
+  if (photometric != "MONOCHROME2" && photometric != "MONOCHROME1")
+    throw Error(fmt::format("{}: {} is {}, expected MONOCHROME2", dataset.where(),
+                            described(DCM_PhotometricInterpretation), photometric));
   const double allocated = dataset.required_number(DCM_BitsAllocated);
   if (allocated != 8 && allocated != 16)
     throw Error(
@@ -173,8 +161,26 @@ std::vector<std::int32_t> decode_frame(const DicomFile& file, const PixelFormat&
   return stored_values;
 }
 
+void prepare_decoding() {
+  struct Decoders {
+    Decoders() {
+      (void)described(DCM_PixelData);  // DCMTK reads its dictionary from a file
+      const DicomFile configures_dcmtk;
+      DcmRLEDecoderRegistration::registerCodecs();
+      DJDecoderRegistration::registerCodecs();
+      DJLSDecoderRegistration::registerCodecs();
+    }
+    ~Decoders() {
+      DJLSDecoderRegistration::cleanup();
+      DJDecoderRegistration::cleanup();
+      DcmRLEDecoderRegistration::cleanup();
+    }
+  };
+  static const Decoders decoders;
+}
+
 std::vector<std::uint8_t> decompressed_frame(const DicomFile& file, int frame) {
-  register_decoders();
+  prepare_decoding();
   const std::string where = file.path().string();
   const PixelFormat format = pixel_format(file.dataset());
   const std::size_t size = format.bytes_per_frame();

@@ -34,6 +34,10 @@ void put_pixel_format(DicomItem dataset, const PixelFormat& format);
 // any other, and for pixel data that are damaged or not as long as the format says.
 std::vector<std::int32_t> decode_frame(const DicomFile& file, const PixelFormat& format, int frame);
 
+// Reads DCMTK's dictionary and registers its decoders, which it keeps in a list of the process: once, and before the
+// process is confined.
+void prepare_decoding();
+
 // One compressed frame as bytes, those of 16-bit pixels in the order of this machine: DCMTK's decoders, run here. Only
 // for the child process and for tests of hostile files.
 std::vector<std::uint8_t> decompressed_frame(const DicomFile& file, int frame);

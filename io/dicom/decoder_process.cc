@@ -2,28 +2,34 @@
 
 #include <fmt/format.h>
 #include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
+#include <cerrno>
 #include <chrono>
 #include <csignal>
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <span>
 #include <string>
+#include <string_view>
 #include <utility>
 
 #include "base/error.h"
 #include "base/process.h"
+#include "base/sha256.h"
 #include "io/dicom/decode.h"
+#include "io/dicom/decoder_confinement.h"
 #include "io/dicom/decoder_messages.h"
+#include "io/dicom/file_bytes.h"
 
 namespace isoshift {
 namespace {
 
-// Per frame: the largest takes about one. A child that computes without end meets the first limit, one that waits for a
-// file or for its turn on a busy computer the second.
-constexpr rlim_t kMaxCpuS = 10;
+// Per frame. What computes without end meets the limit of its confinement; this is for a child that waits for a file,
+// or for its turn on a busy computer.
 constexpr std::chrono::seconds kMaxWallTime(30);
-constexpr rlim_t kMaxMemoryBytes = rlim_t{4} << 30;
 constexpr std::size_t kMaxErrorBytes = 4096;
 constexpr std::size_t kMaxAnswerBytes = 6 * kMaxErrorBytes + 64;  // an error whose every byte is escaped
 
@@ -121,36 +127,57 @@ IdleDecoders& idle_decoders() {
   return decoders;
 }
 
-// The file that the child read last: frames of one file come one after another.
+// The bytes of the file that was asked for last: frames of a file come one after another.
 class LastFile {
  public:
-  const DicomFile& at(const std::filesystem::path& path, std::string_view sha256) {
-    if (file_ && file_->sha256() == sha256) return *file_;
-    file_.reset();
-    file_ = DicomFile::read(path, DicomFile::Extent::kWhole);
-    if (file_->sha256() != sha256) throw Error(fmt::format("{}: was changed while it was read", path.string()));
-    return *file_;
+  std::string_view at(const std::filesystem::path& path, std::string_view sha256) {
+    if (sha256_ != sha256) {
+      sha256_.clear();
+      FileBytes file(path);
+      bytes_ = file.whole(file.size());
+      if (sha256_of(bytes_) != sha256) throw Error(fmt::format("{}: was changed while it was read", path.string()));
+      sha256_ = sha256;
+    }
+    return bytes_;
   }
 
  private:
-  std::optional<DicomFile> file_;
+  std::string sha256_, bytes_;
 };
 
-// Of the child, before it looks at a file. (The sanitizers of addresses and threads need all addresses there are.)
-void limit_resources() {
-  const auto limit = [](auto resource, rlim_t soft, rlim_t hard) {
-    const rlimit value{.rlim_cur = soft, .rlim_max = hard};
-    ::setrlimit(resource, &value);
-  };
-#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
-  limit(RLIMIT_AS, kMaxMemoryBytes, kMaxMemoryBytes);
-#endif
-  limit(RLIMIT_FSIZE, 0, 0);
-  limit(RLIMIT_CORE, 0, 0);
-  rusage used{};
-  ::getrusage(RUSAGE_SELF, &used);
-  const auto used_s = static_cast<rlim_t>(used.ru_utime.tv_sec + used.ru_stime.tv_sec);
-  limit(RLIMIT_CPU, used_s + 1 + kMaxCpuS, RLIM_INFINITY);
+bool send_answer(Channel& parent, const DecodedFrame& answer, std::span<const std::uint8_t> pixels = {}) {
+  return parent.send(to_line(answer)) && parent.send({reinterpret_cast<const char*>(pixels.data()), pixels.size()});
+}
+
+// All that a child of the child does.
+bool answer_frame(Channel& parent, const FrameToDecode& request, std::string_view file) {
+  DecodedFrame answer;
+  std::vector<std::uint8_t> pixels;
+  try {
+    confine_decoder();
+    FileBytes bytes(file, request.path);
+    pixels = decompressed_frame(DicomFile(bytes, DicomFile::Extent::kWhole), request.frame);
+    answer.bytes = pixels.size();
+  } catch (const Error& refused) {
+    answer.error = std::string(refused.what()).substr(0, kMaxErrorBytes);
+  } catch (const std::exception& failed) {
+    answer.error = fmt::format("{}: its pixel data cannot be decoded: {}", request.path.string(), failed.what());
+  }
+  return send_answer(parent, answer, pixels);
+}
+
+// Ends this process as its child ended, unless that one answered.
+void end_like(pid_t child) {
+  int status = 0;
+  while (::waitpid(child, &status, 0) < 0 && errno == EINTR) {
+  }
+  if (WIFSIGNALED(status)) {
+    const rlimit none{.rlim_cur = 0, .rlim_max = 0};
+    ::setrlimit(RLIMIT_CORE, &none);
+    ::signal(WTERMSIG(status), SIG_DFL);
+    ::raise(WTERMSIG(status));
+  }
+  if (status != 0) ::_exit(WIFEXITED(status) ? WEXITSTATUS(status) : 1);
 }
 
 }  // namespace
@@ -174,23 +201,19 @@ std::vector<std::uint8_t> frame_from_decoder(const DicomFile& file, int frame, s
 
 int run_decoder() {
   Channel parent(parent_socket());
-  LastFile file;
+  prepare_decoding();
+  LastFile last;
   while (const std::optional<std::string> line = parent.line()) {
-    limit_resources();
-    FrameToDecode request;
-    std::vector<std::uint8_t> pixels;
-    DecodedFrame answer;
     try {
-      request = frame_to_decode_from(*line, "the request of the parent");
-      pixels = decompressed_frame(file.at(request.path, request.sha256), request.frame);
-      answer.bytes = pixels.size();
+      const FrameToDecode request = frame_to_decode_from(*line, "the request of the parent");
+      const std::string_view file = last.at(request.path, request.sha256);
+      const pid_t child = ::fork();
+      if (child == 0) ::_exit(answer_frame(parent, request, file) ? 0 : 1);
+      if (child < 0) throw Error(fmt::format("{}: no process can be made that decodes it", request.path.string()));
+      end_like(child);
     } catch (const Error& refused) {
-      answer.error = std::string(refused.what()).substr(0, kMaxErrorBytes);
-    } catch (const std::exception& failed) {
-      answer.error = fmt::format("{}: its pixel data cannot be decoded: {}", request.path.string(), failed.what());
+      if (!send_answer(parent, {.error = std::string(refused.what()).substr(0, kMaxErrorBytes)})) return 1;
     }
-    if (!parent.send(to_line(answer)) || !parent.send({reinterpret_cast<const char*>(pixels.data()), pixels.size()}))
-      return 1;
   }
   return 0;
 }

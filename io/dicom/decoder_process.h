@@ -1,7 +1,8 @@
 #pragma once
-// Compressed pixels of unknown origin are decoded in a child process with limits on memory, CPU and wall time: a
-// decoder that crashes or never ends costs one file, not the program (docs/dicom.md, 6.6). A child answers many
-// requests, one after the other; between requests it waits.
+// Compressed pixels of unknown origin are decoded in a process of their own, which can do nothing but that
+// (decoder_confinement.h): a decoder that crashes or never ends costs one file, not the program (docs/dicom.md, 6.6). A
+// child reads files without looking into them, and makes a process for each frame, so that no frame is decoded by what
+// another may have taken over; between requests it waits.
 
 #include <cstdint>
 #include <filesystem>

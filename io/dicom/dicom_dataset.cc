@@ -1,6 +1,7 @@
 #include "io/dicom/dicom_dataset.h"
 
 #include <dcmtk/dcmdata/dcistrmb.h>
+#include <dcmtk/dcmdata/dcostrmb.h>
 #include <dcmtk/dcmdata/dctk.h>
 #include <fcntl.h>
 #include <fmt/format.h>
@@ -16,8 +17,11 @@
 #include <utility>
 
 #include "base/error.h"
+#include "base/output_folder.h"
 #include "base/sha256.h"
-#include "io/dicom/nesting.h"
+#include "base/text_file.h"
+#include "io/dicom/file_bytes.h"
+#include "io/dicom/file_structure.h"
 
 namespace isoshift {
 namespace {
@@ -136,9 +140,19 @@ std::vector<double> DicomItem::numbers(const DcmTagKey& tag) const {
 }
 
 std::optional<double> DicomItem::number(const DcmTagKey& tag) const {
-  const std::vector<double> values = numbers(tag);
-  if (values.empty()) return std::nullopt;
-  return values.front();
+  if (numbers(tag).empty()) return std::nullopt;
+  return required_number(tag);
+}
+
+std::optional<std::string> DicomItem::uid(const DcmTagKey& tag) const {
+  // Some programs that take names out of files write hexadecimal digits and hyphens, too.
+  constexpr std::size_t kLongest = 64;
+  const auto may_be_in_uid = [](unsigned char c) { return std::isalnum(c) != 0 || c == '.' || c == '-'; };
+  auto value = text(tag);
+  if (value && (value->size() > kLongest || !std::ranges::all_of(*value, may_be_in_uid)))
+    throw Error(fmt::format("{}: {} is \"{}\", which is no UID: expected at most {} digits and dots", where_,
+                            described(tag), value->substr(0, 2 * kLongest), kLongest));
+  return value;
 }
 
 std::vector<DicomItem> DicomItem::items(const DcmTagKey& sequence_tag) const {
@@ -155,6 +169,12 @@ std::vector<DicomItem> DicomItem::items(const DcmTagKey& sequence_tag) const {
 
 std::string DicomItem::required_text(const DcmTagKey& tag) const {
   auto value = text(tag);
+  if (!value) throw Error(fmt::format("{}: {} is missing", where_, described(tag)));
+  return *value;
+}
+
+std::string DicomItem::required_uid(const DcmTagKey& tag) const {
+  auto value = uid(tag);
   if (!value) throw Error(fmt::format("{}: {} is missing", where_, described(tag)));
   return *value;
 }
@@ -231,23 +251,6 @@ void DicomItem::erase(const DcmTagKey& tag) {
   if (item_->tagExists(tag)) check(item_->findAndDeleteElement(tag), where_, described(tag));
 }
 
-namespace {
-
-std::string bytes_of(const std::filesystem::path& path) {
-  std::error_code failed;
-  const std::uintmax_t size = std::filesystem::file_size(path, failed);
-  std::ifstream stream(path, std::ios::binary);
-  if (!failed && !stream) failed = {errno, std::generic_category()};
-  std::string bytes(failed ? 0 : size, '\0');
-  stream.read(bytes.data(), static_cast<std::streamsize>(bytes.size()));
-  if (stream.bad()) failed = std::make_error_code(std::errc::io_error);
-  if (failed) throw Error(fmt::format("{}: cannot be read as a DICOM file: {}", path.string(), failed.message()));
-  bytes.resize(static_cast<std::size_t>(stream.gcount()));  // fewer where the file is being cut off
-  return bytes;
-}
-
-}  // namespace
-
 DicomFile::DicomFile() : path_("new DICOM object") {
   configure_dcmtk();
   file_ = std::make_unique<DcmFileFormat>();
@@ -257,29 +260,42 @@ DicomFile& DicomFile::operator=(DicomFile&&) noexcept = default;
 DicomFile::~DicomFile() = default;
 
 DicomFile DicomFile::read(const std::filesystem::path& path, Extent extent) {
-  const std::string bytes = bytes_of(path);
-  check_nesting(bytes, path);
-  DicomFile file;
-  file.path_ = path;
-  if (extent == Extent::kWhole) file.sha256_ = sha256_of(bytes);
+  FileBytes bytes(path);
+  DicomFile file(bytes, extent);
+  // Where the character set is unknown to the converter, the bytes stay as they are, together with their set.
+  (void)file.file_->getDataset()->convertToUTF8();
+  return file;
+}
+
+DicomFile::DicomFile(FileBytes& bytes, Extent extent) : DicomFile() {
+  path_ = bytes.path();
+  const FileStructure structure = structure_of(bytes);
+  const std::string deflated = structure.is_deflated ? bytes.whole(bytes.size()) : "";
+  const std::uint64_t end = extent == Extent::kHeader ? structure.header_end : bytes.size();
+  Sha256 sha256;
   DcmInputBufferStream stream;
-  stream.setBuffer(bytes.data(), static_cast<offile_off_t>(bytes.size()));
-  stream.setEos();
-  file.file_->transferInit();
-  const OFCondition loaded =
-      extent == Extent::kWhole
-          ? file.file_->read(stream, EXS_Unknown, EGL_noChange, DCM_MaxReadLength)
-          : file.file_->readUntilTag(stream, EXS_Unknown, EGL_noChange, DCM_MaxReadLength, DCM_PixelData);
-  file.file_->transferEnd();
+  OFCondition loaded = EC_StreamNotifyClient;
+  file_->transferInit();
+  for (std::uint64_t at = 0; loaded == EC_StreamNotifyClient;) {
+    const auto left = static_cast<std::size_t>(std::min<std::uint64_t>(end - at, FileBytes::kLongestPiece));
+    const std::string_view piece = structure.is_deflated ? std::string_view(deflated) : bytes.piece(at, left);
+    at += piece.size();
+    sha256.add(piece);
+    stream.setBuffer(piece.data(), static_cast<offile_off_t>(piece.size()));
+    if (at == end || piece.empty()) stream.setEos();
+    loaded = extent == Extent::kWhole
+                 ? file_->read(stream, EXS_Unknown, EGL_noChange, DCM_MaxReadLength)
+                 : file_->readUntilTag(stream, EXS_Unknown, EGL_noChange, DCM_MaxReadLength, DCM_PixelData);
+    stream.releaseBuffer();
+  }
+  file_->transferEnd();
   if (loaded == EC_InvalidStream || loaded == EC_EndOfStream)
     throw Error(
         fmt::format("{}: ends before what its elements announce: the file has been cut off, or is still being "
                     "written",
-                    path.string()));
-  if (loaded.bad()) throw Error(fmt::format("{}: cannot be read as a DICOM file: {}", path.string(), loaded.text()));
-  // Where the character set is unknown to the converter, the bytes stay as they are, together with their set.
-  (void)file.file_->getDataset()->convertToUTF8();
-  return file;
+                    path_.string()));
+  if (loaded.bad()) throw Error(fmt::format("{}: cannot be read as a DICOM file: {}", path_.string(), loaded.text()));
+  if (extent == Extent::kWhole) sha256_ = sha256.hex();
 }
 
 DicomItem DicomFile::dataset() const { return DicomItem(*file_->getDataset(), path_.string()); }
@@ -287,12 +303,28 @@ DicomItem DicomFile::dataset() const { return DicomItem(*file_->getDataset(), pa
 void DicomFile::write(const std::filesystem::path& path) {
   const std::string where = path.string();
   if (std::filesystem::exists(path)) throw Error(fmt::format("{}: exists already", where));
-  check(file_->saveFile(path.c_str(), EXS_LittleEndianExplicit, EET_ExplicitLength, EGL_recalcGL, EPD_noChange, 0, 0,
-                        EWM_createNewMeta),
-        where, "cannot be written");
+  // In memory first: DCMTK does not notice that the last bytes of a file cannot be written.
+  std::vector<char> buffer(FileBytes::kLongestPiece);
+  DcmOutputBufferStream stream(buffer.data(), static_cast<offile_off_t>(buffer.size()));
+  std::string bytes;
+  OFCondition written = EC_StreamNotifyClient;
+  file_->transferInit();
+  while (written == EC_StreamNotifyClient) {
+    written = file_->write(stream, EXS_LittleEndianExplicit, EET_ExplicitLength, nullptr, EGL_recalcGL, EPD_noChange, 0,
+                           0, 0, EWM_createNewMeta);
+    void* filled = nullptr;
+    offile_off_t size = 0;
+    stream.flushBuffer(filled, size);
+    bytes.append(static_cast<const char*>(filled), static_cast<std::size_t>(size));
+  }
+  file_->transferEnd();
+  check(written, where, "cannot be written");
+  write_text(path, bytes);
+  flush(path);
 }
 
 Beginning beginning_of(const std::filesystem::path& path) {
+  expect_no_pipe(path);
   std::ifstream stream(path, std::ios::binary);
   std::array<char, 132> head{};
   if (!stream) throw Error(fmt::format("{}: cannot be opened: {}", path.string(), std::strerror(errno)));

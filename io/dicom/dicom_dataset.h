@@ -19,6 +19,8 @@ class DcmItem;
 
 namespace isoshift {
 
+class FileBytes;
+
 // "RTImageSID (3002,0026)".
 std::string described(const DcmTagKey& tag);
 
@@ -36,12 +38,14 @@ class DicomItem {
   std::optional<std::string> text(const DcmTagKey& tag) const;
   std::optional<std::string> raw_text(const DcmTagKey& tag) const;  // with control characters, to copy to another file
   std::vector<std::string> texts(const DcmTagKey& tag) const;
-  std::optional<double> number(const DcmTagKey& tag) const;
+  std::optional<std::string> uid(const DcmTagKey& tag) const;  // throws Error for what cannot be meant as one
+  std::optional<double> number(const DcmTagKey& tag) const;    // throws Error for several: which of them counts?
   std::vector<double> numbers(const DcmTagKey& tag) const;
   std::vector<DicomItem> items(const DcmTagKey& sequence) const;
 
   // The same for what must be there; `count` numbers, all finite.
   std::string required_text(const DcmTagKey& tag) const;
+  std::string required_uid(const DcmTagKey& tag) const;
   double required_number(const DcmTagKey& tag) const;
   std::vector<double> required_numbers(const DcmTagKey& tag, std::size_t count) const;
 
@@ -70,6 +74,8 @@ class DicomFile {
   DicomFile();  // a new, empty object
   // Reads the file once: header, pixels and SHA-256 come from the same bytes.
   static DicomFile read(const std::filesystem::path& path, Extent extent);
+  // The same of bytes that are at hand, without converting texts to UTF-8.
+  DicomFile(FileBytes& bytes, Extent extent);
   DicomFile(DicomFile&&) noexcept;
   DicomFile& operator=(DicomFile&&) noexcept;
   ~DicomFile();

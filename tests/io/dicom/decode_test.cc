@@ -110,7 +110,19 @@ TEST_F(DecodeTest, FormatsThatAreNoneAreNamed) {
   };
   EXPECT_THAT(error_of(DCM_HighBit, 12), testing::HasSubstr("HighBit (0028,0102) is 12, expected 15"));
   EXPECT_THAT(error_of(DCM_SamplesPerPixel, 3), testing::HasSubstr("SamplesPerPixel (0028,0002) is 3, expected 1"));
+  edit(study_.ct_slice(1), [&](DicomItem d) { d.put(DCM_SamplesPerPixel, 1); });
   EXPECT_THAT(error_of(DCM_Rows, 9000), testing::HasSubstr("Rows (0028,0010) is 9000, expected 1 to 8192"));
+}
+
+TEST_F(DecodeTest, NumbersOfColorsAreNoIntensities) {
+  edit(study_.ct_slice(1), [](DicomItem d) { d.put(DCM_PhotometricInterpretation, "PALETTE COLOR"); });
+  try {
+    pixels_of(study_.ct_slice(1));
+    ADD_FAILURE();
+  } catch (const Error& error) {
+    EXPECT_THAT(error.what(),
+                testing::HasSubstr("PhotometricInterpretation (0028,0004) is PALETTE COLOR, expected MONOCHROME2"));
+  }
 }
 
 // Other programs in the decoder's place, as a hostile file may make of it.
