@@ -7,6 +7,7 @@
 #include "base/error.h"
 #include "base/local_time.h"
 #include "cli/commands/commands.h"
+#include "cli/switches/study_switches.h"
 #include "workflow/audit_setup/archive.h"
 #include "workflow/audit_setup/audit_files.h"
 #include "workflow/audit_setup/audit_words.h"
@@ -68,12 +69,7 @@ void add_audit_setup_command(CLI::App& app, Console& console, int& exit_status) 
                    "without it only what isoshift found is described")
       ->check(CLI::ExistingPath)
       ->type_name("PATH");
-  command
-      ->add_option("--source-isocenter", options->source_isocenter,
-                   "Machine's isocenter in the source frames of objects of another program, mm (as in check)")
-      ->expected(3)
-      ->delimiter(',')
-      ->type_name("X,Y,Z");
+  add_source_isocenter_option(*command, options->source_isocenter);
   CLI::Option* output =
       command->add_option("-o,--output", options->output, "Folder for audit.html, audit.csv and audit.json")
           ->type_name("FOLDER");

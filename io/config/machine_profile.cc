@@ -8,6 +8,7 @@
 
 #include "base/error.h"
 #include "base/json_file.h"
+#include "base/text_file.h"
 #include "geometry/rotation.h"
 
 namespace isoshift {
@@ -112,6 +113,7 @@ MachineProfile::Rule rule_from(JsonSection section) {
 // FILE.sig beside FILE, as openssl pkeyutl writes it.
 void require_signature(const std::filesystem::path& path, const std::string& text, const VerifyingKey& key) {
   const std::string name = path.string() + ".sig";
+  expect_no_pipe(name);
   std::ifstream file(name, std::ios::binary);
   if (!file) throw Error(fmt::format("{}: cannot be read; --machine-key needs the signature of the profile", name));
   const std::string signature{std::istreambuf_iterator<char>(file), {}};

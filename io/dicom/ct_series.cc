@@ -5,9 +5,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <mutex>
 #include <optional>
 #include <set>
+#include <utility>
 
 #include "base/error.h"
 #include "base/large_vector.h"
@@ -27,6 +29,7 @@ constexpr float kAirHu = -1000.0F;
 
 struct Slice {
   std::string where;
+  std::size_t frame = 0;                     // of its file
   Eigen::Vector3d position_mm;               // ImagePositionPatient: center of the first voxel
   Eigen::Vector3d row_direction;             // ImageOrientationPatient, first three
   Eigen::Vector3d column_direction;          // ImageOrientationPatient, last three
@@ -52,7 +55,7 @@ std::vector<float> hu_from_stored(const DicomItem& dataset, const DicomItem& res
   const double slope = rescale.required_number(DCM_RescaleSlope);
   const double intercept = rescale.required_number(DCM_RescaleIntercept);
   if (slope == 0.0) throw Error(fmt::format("{}: {} is 0", rescale.where(), described(DCM_RescaleSlope)));
-  if (const auto type = rescale.text(DCM_RescaleType); type && *type != "HU")
+  if (const auto type = rescale.text(DCM_RescaleType); type && *type != "HU" && *type != "hu")
     throw Error(fmt::format("{}: {} is {}, expected HU", rescale.where(), described(DCM_RescaleType), *type));
 
   const PixelPadding padding(dataset);
@@ -99,8 +102,8 @@ class FunctionalGroups {
 Slice slice_at(const FrameGeometry& geometry, const DicomItem& dataset, const std::string& where) {
   Slice slice;
   slice.where = where;
-  slice.sop_instance_uid = dataset.required_text(DCM_SOPInstanceUID);
-  slice.frame_of_reference_uid = dataset.required_text(DCM_FrameOfReferenceUID);
+  slice.sop_instance_uid = dataset.required_uid(DCM_SOPInstanceUID);
+  slice.frame_of_reference_uid = dataset.required_uid(DCM_FrameOfReferenceUID);
   slice.identity = read_identity(dataset);
   slice.is_lossy = dataset.text(DCM_LossyImageCompression) == "01";
   slice.position_mm = Eigen::Vector3d(geometry.position.required_numbers(DCM_ImagePositionPatient, 3).data());
@@ -159,6 +162,7 @@ std::vector<Slice> read_slices_of(const std::filesystem::path& path) {
       where += fmt::format(" frame {}", frame + 1);
     }
     slices.push_back(slice_at(geometry, dataset, where));
+    slices.back().frame = frame;
     slices.back().format = format;
     slices.back().sha256 = file.sha256();
     slices.back().hu = hu_from_stored(dataset, geometry.rescale, decode_frame(file, format, static_cast<int>(frame)));
@@ -223,6 +227,18 @@ std::vector<Finding> patient_findings(const std::vector<Slice>& slices) {
         return {{"patient-mismatch", fmt::format("{}: {} differs from that of {}: slices of different patients",
                                                  slice.where, described(tag), first.where)}};
   return {};
+}
+
+// An instance lies in one place. What copied it to another one may have got other things wrong.
+void check_instances(const std::vector<Slice>& slices) {
+  std::map<std::pair<std::string, std::size_t>, const Slice*> by_instance;
+  for (const Slice& slice : slices) {
+    const Slice& first = *by_instance.try_emplace({slice.sop_instance_uid, slice.frame}, &slice).first->second;
+    if ((slice.position_mm - first.position_mm).norm() > kMinPositionDifferenceMm)
+      throw Error(fmt::format("{}: has the {} of {}, but lies elsewhere ({})\n       Export the series again",
+                              slice.where, described(DCM_SOPInstanceUID), first.where,
+                              described(DCM_ImagePositionPatient)));
+  }
 }
 
 // CT-6. The same instance twice counts once; two different slices in one place are an error.
@@ -335,9 +351,10 @@ CtSeries read_ct_series(std::span<const std::filesystem::path> files, const Allo
   const DicomItem header = file.dataset();
   CtSeries series;
   series.identity = read_identity(header);
-  series.sop_class_uid = header.required_text(DCM_SOPClassUID);
-  series.series_instance_uid = header.required_text(DCM_SeriesInstanceUID);
-  series.frame_of_reference_uid = header.required_text(DCM_FrameOfReferenceUID);
+  make_writable(series.identity, header.where(), notes);
+  series.sop_class_uid = header.required_uid(DCM_SOPClassUID);
+  series.series_instance_uid = header.required_uid(DCM_SeriesInstanceUID);
+  series.frame_of_reference_uid = header.required_uid(DCM_FrameOfReferenceUID);
   series.body_part_examined = header.text(DCM_BodyPartExamined).value_or("");
   series.patient_position = header.text(DCM_PatientPosition).value_or("");
 
@@ -346,6 +363,7 @@ CtSeries read_ct_series(std::span<const std::filesystem::path> files, const Allo
     notes.warnings.push_back("the CT has been compressed with loss (LossyImageCompression is 01)");
   settle(patient_findings(slices), allowed, notes);
   check_same_lattice(slices);
+  check_instances(slices);
   const Eigen::Matrix3d axes = orthonormal_axes(slices.front());
   std::ranges::sort(slices, {}, [&](const Slice& slice) { return slice.position_mm.dot(axes.col(2)); });
   drop_duplicates(slices, axes.col(2), notes);

@@ -1,5 +1,13 @@
 #include "io/dicom/identity.h"
 
+#include <dcmtk/dcmdata/dctk.h>
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <string_view>
+
+#include "base/error.h"
+
 namespace isoshift {
 namespace {
 
@@ -21,6 +29,26 @@ const Attribute kAttributes[] = {
     {DCM_ReferringPhysicianName, &Identity::referring_physician},
 };
 
+// Of UTF-8: the bytes that begin one.
+std::ptrdiff_t characters(std::string_view text) {
+  return std::ranges::count_if(text, [](char c) { return (static_cast<unsigned char>(c) & 0xC0) != 0x80; });
+}
+
+// Whether the value is one of its VR (PS3.5 6.2). The groups of a name (alphabetic=ideographic=phonetic) count each.
+bool is_allowed(const DcmTagKey& tag, std::string_view text) {
+  const DcmVR vr = DcmTag(tag).getVR();
+  const OFString value(text.data(), text.size());
+  if (vr.getEVR() == EVR_DA) return DcmDate::checkStringValue(value, "1").good();
+  if (vr.getEVR() == EVR_TM) return DcmTime::checkStringValue(value, "1").good();
+  if (vr.getEVR() == EVR_CS) return DcmCodeString::checkStringValue(value, "1").good();
+  while (vr.getEVR() == EVR_PN && text.find('=') != std::string_view::npos) {
+    const std::size_t end = text.find('=');
+    if (!is_allowed(tag, text.substr(0, end))) return false;
+    text.remove_prefix(end + 1);
+  }
+  return characters(text) <= static_cast<std::ptrdiff_t>(vr.getMaxValueLength());
+}
+
 }  // namespace
 
 Identity read_identity(const DicomItem& dataset) {
@@ -28,7 +56,29 @@ Identity read_identity(const DicomItem& dataset) {
   identity.character_set = dataset.text(DCM_SpecificCharacterSet).value_or("");
   identity.patient_id_issuer = dataset.text(DCM_IssuerOfPatientID).value_or("");
   for (const auto& [tag, member] : kAttributes) identity.*member = dataset.raw_text(tag).value_or("");
+  identity.study_instance_uid = dataset.uid(DCM_StudyInstanceUID).value_or("");
   return identity;
+}
+
+void make_writable(Identity& identity, const std::string& where, Notes& notes) {
+  if (identity.study_instance_uid.empty())
+    throw Error(fmt::format("{}: {} is missing", where, described(DCM_StudyInstanceUID)));
+  const auto check_whose_it_is = [&](const DcmTagKey& tag, const std::string& text) {
+    if (!is_allowed(tag, text))
+      throw Error(
+          fmt::format("{}: {} is longer than the {} characters that DICOM allows: no object of this patient can "
+                      "be written",
+                      where, described(tag), DcmTag(tag).getVR().getMaxValueLength()));
+  };
+  check_whose_it_is(DCM_PatientID, identity.patient_id);
+  check_whose_it_is(DCM_IssuerOfPatientID, identity.patient_id_issuer);
+  check_whose_it_is(DCM_PatientName, identity.patient_name);
+  for (const auto& [tag, member] : kAttributes) {
+    if ((identity.*member).empty() || is_allowed(tag, identity.*member)) continue;
+    notes.warnings.push_back(
+        fmt::format("{}: {} is not as DICOM allows, and left out of what is written", where, described(tag)));
+    (identity.*member).clear();
+  }
 }
 
 void put_identity(DicomItem& dataset, const Identity& identity) {

@@ -25,7 +25,7 @@ struct AllowKey {
 inline constexpr AllowKey kAllowKeys[] = {
     {"patient-mismatch", "inputs of different patients"},
     {"for-mismatch", "plan or structures and CT in different frames of reference"},
-    {"plan-mismatch", "an X-ray that refers to another plan"},
+    {"plan-mismatch", "an X-ray that refers to another plan, or has another isocenter"},
     {"planned-geometry", "angles that are planned or typed in, not measured (ReportedValuesOrigin)"},
     {"gaps", "a CT with missing slices or uneven spacing, interpolated"},
     {"drr", "an RT Image that is itself a DRR"},

@@ -65,6 +65,15 @@ class FrameAttributes {
     return agreed ? agreed : dataset_.number(tag);
   }
 
+  // A read-out of more than a turn is no angle.
+  std::optional<double> angle_deg(const DcmTagKey& tag) const {
+    const std::optional<double> value_deg = number(tag);
+    if (value_deg && std::abs(*value_deg) > 360.0)
+      throw Error(
+          fmt::format("{}: {} is {} degrees, expected -360 to 360", dataset_.where(), described(tag), *value_deg));
+    return value_deg;
+  }
+
  private:
   DicomItem dataset_;
   std::vector<DicomItem> exposures_;
@@ -115,10 +124,10 @@ RtImage read_frame(const std::filesystem::path& path, const DicomItem& d, const 
   const FrameAttributes attributes(d, std::move(exposures));
   image.path = path;
   image.identity = read_identity(d);
-  image.sop_class_uid = d.required_text(DCM_SOPClassUID);
-  image.sop_instance_uid = d.required_text(DCM_SOPInstanceUID);
-  image.series_instance_uid = d.text(DCM_SeriesInstanceUID).value_or("");
-  image.frame_of_reference_uid = d.text(DCM_FrameOfReferenceUID);
+  image.sop_class_uid = d.required_uid(DCM_SOPClassUID);
+  image.sop_instance_uid = d.required_uid(DCM_SOPInstanceUID);
+  image.series_instance_uid = d.uid(DCM_SeriesInstanceUID).value_or("");
+  image.frame_of_reference_uid = d.uid(DCM_FrameOfReferenceUID);
   image.label = d.text(DCM_RTImageLabel).value_or(path.stem().string());
   image.frame = frame;
   if (format.frames > 1) image.label += fmt::format("#{}", frame + 1);
@@ -127,7 +136,7 @@ RtImage read_frame(const std::filesystem::path& path, const DicomItem& d, const 
   image.fraction_number = d.number(DCM_FractionNumber);
   image.patient_position = d.text(DCM_PatientPosition);
   for (const DicomItem& plan : d.items(DCM_ReferencedRTPlanSequence))
-    image.plan_sop_instance_uid = plan.text(DCM_ReferencedSOPInstanceUID);
+    image.plan_sop_instance_uid = plan.uid(DCM_ReferencedSOPInstanceUID);
   if (const auto number = d.number(DCM_ReferencedBeamNumber)) image.beam_number = static_cast<int>(*number);
   read_acquisition_time(d, image);
   const std::optional<double> offset_s = frame_offset_s(d, frame);
@@ -139,15 +148,18 @@ RtImage read_frame(const std::filesystem::path& path, const DicomItem& d, const 
   image.sad_mm = d.number(DCM_RadiationMachineSAD);
   image.sid_mm = d.number(DCM_RTImageSID);
   image.receptor_translation_mm = vector_of<3>(d, DCM_XRayImageReceptorTranslation);
-  image.receptor_angle_deg = d.number(DCM_XRayImageReceptorAngle);
+  image.receptor_angle_deg = attributes.angle_deg(DCM_XRayImageReceptorAngle);
   if (d.has_value(DCM_RTImageOrientation)) image.orientation = d.required_numbers(DCM_RTImageOrientation, 6);
   image.pixel_spacing_mm = vector_of<2>(d, DCM_ImagePlanePixelSpacing);
   image.position_mm = vector_of<2>(d, DCM_RTImagePosition);
-  image.gantry_angle_deg = attributes.number(DCM_GantryAngle);
-  image.gantry_pitch_angle_deg = attributes.number(DCM_GantryPitchAngle);
-  image.collimator_angle_deg = attributes.number(DCM_BeamLimitingDeviceAngle);
-  image.table =
-      read_table_read_outs([&](const DcmTagKey& tag) { return attributes.number(tag); }, image.reported_values_origin);
+  image.gantry_angle_deg = attributes.angle_deg(DCM_GantryAngle);
+  image.gantry_pitch_angle_deg = attributes.angle_deg(DCM_GantryPitchAngle);
+  image.collimator_angle_deg = attributes.angle_deg(DCM_BeamLimitingDeviceAngle);
+  image.table = read_table_read_outs(
+      [&](const TableReadOut& read_out) {
+        return read_out.is_angle ? attributes.angle_deg(read_out.tag) : attributes.number(read_out.tag);
+      },
+      image.reported_values_origin);
   image.isocenter_mm = vector_of<3>(d, DCM_IsocenterPosition);
 
   for (const auto& [keyword, tag] : kEquipmentAttributes)
@@ -155,8 +167,7 @@ RtImage read_frame(const std::filesystem::path& path, const DicomItem& d, const 
   image.columns = format.columns;
   image.rows = format.rows;
   image.intensity_relationship = d.text(DCM_PixelIntensityRelationship);
-  if (const auto sign = d.number(DCM_PixelIntensityRelationshipSign); sign && (*sign == 1 || *sign == -1))
-    image.intensity_sign = static_cast<int>(*sign);
+  if (const auto sign = d.number(DCM_PixelIntensityRelationshipSign)) image.intensity_sign = static_cast<int>(*sign);
   image.photometric_interpretation = d.text(DCM_PhotometricInterpretation).value_or("");
   image.is_lossy = d.text(DCM_LossyImageCompression) == "01";
   image.has_modality_lut = !d.items(DCM_ModalityLUTSequence).empty();

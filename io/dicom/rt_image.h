@@ -75,7 +75,7 @@ struct RtImage {
 
   int columns = 0, rows = 0;
   std::optional<std::string> intensity_relationship;
-  std::optional<int> intensity_sign;
+  std::optional<int> intensity_sign;  // as written; 1 or -1 where it says something
   std::string photometric_interpretation;
   bool has_modality_lut = false;
   bool is_lossy = false;  // compressed with loss
@@ -114,10 +114,14 @@ struct RtImageSwitches {
 // command line.
 RtImage with_switches(RtImage image, const RtImageSwitches& switches, Notes& notes, const std::string& origin = "");
 
-// A required attribute without value, and the switch that supplies it (empty: no switch does).
+// A required attribute without a value of use, and the switch that supplies it (empty: no switch does).
 struct MissingAttribute {
   DcmTagKey tag;
   std::string supplied_by;
+  std::string found;  // a value that says nothing: "DISP"; empty where there is none
+
+  // "is missing", `is "DISP", which does not tell`.
+  std::string problem() const { return found.empty() ? "is missing" : "is \"" + found + "\", which does not tell"; }
 };
 
 // Everything that registration needs and `image` lacks, all at once.

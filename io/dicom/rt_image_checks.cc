@@ -87,9 +87,11 @@ RtImage with_switches(RtImage image, const RtImageSwitches& switches, Notes& not
 
 std::vector<MissingAttribute> missing_attributes(const RtImage& image) {
   std::vector<MissingAttribute> missing;
-  const auto need = [&](bool there, const DcmTagKey& tag, std::string supplied_by) {
-    if (!there) missing.push_back({tag, std::move(supplied_by)});
+  const auto need = [&](bool there, const DcmTagKey& tag, std::string supplied_by, std::string found = "") {
+    if (!there) missing.push_back({tag, std::move(supplied_by), std::move(found)});
   };
+  need(!image.identity.study_instance_uid.empty(), DCM_StudyInstanceUID, "");
+  need(!image.series_instance_uid.empty(), DCM_SeriesInstanceUID, "");
   if (!image.is_rt_image() && !image.pixel_from_room)
     need(false, DCM_ImagePlanePixelSpacing, "a projection matrix in a machine profile (--machine FILE)");
   const bool needs_geometry = image.is_rt_image() && !image.pixel_from_room;
@@ -104,9 +106,10 @@ std::vector<MissingAttribute> missing_attributes(const RtImage& image) {
   need(image.table.support_angle_deg.has_value(), DCM_PatientSupportAngle, "--couch-angle DEG");
   need(image.patient_position.has_value(), DCM_PatientPosition, "--patient-position HFS");
   const bool known = image.intensity_relationship == "LIN" || image.intensity_relationship == "LOG";
-  need(known, DCM_PixelIntensityRelationship, "--intensity LIN+|LIN-|LOG+|LOG-");
-  need(!known || image.intensity_sign.has_value(), DCM_PixelIntensityRelationshipSign,
-       "--intensity LIN+|LIN-|LOG+|LOG-");
+  need(known, DCM_PixelIntensityRelationship, "--intensity LIN+|LIN-|LOG+|LOG-",
+       image.intensity_relationship.value_or(""));
+  need(!known || image.intensity_sign == 1 || image.intensity_sign == -1, DCM_PixelIntensityRelationshipSign,
+       "--intensity LIN+|LIN-|LOG+|LOG-", image.intensity_sign ? fmt::format("{}", *image.intensity_sign) : "");
   return missing;
 }
 

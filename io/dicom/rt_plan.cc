@@ -61,12 +61,13 @@ RtPlan read_rt_plan(const std::filesystem::path& path) {
   plan.path = path;
   plan.sha256 = file.sha256();
   plan.identity = read_identity(dataset);
-  plan.sop_class_uid = dataset.required_text(DCM_SOPClassUID);
-  plan.sop_instance_uid = dataset.required_text(DCM_SOPInstanceUID);
-  plan.series_instance_uid = dataset.text(DCM_SeriesInstanceUID).value_or("");
+  plan.sop_class_uid = dataset.required_uid(DCM_SOPClassUID);
+  plan.sop_instance_uid = dataset.required_uid(DCM_SOPInstanceUID);
+  plan.series_instance_uid = dataset.uid(DCM_SeriesInstanceUID).value_or("");
   plan.label = dataset.text(DCM_RTPlanLabel).value_or("");
-  plan.frame_of_reference_uid = dataset.text(DCM_FrameOfReferenceUID);
+  plan.frame_of_reference_uid = dataset.uid(DCM_FrameOfReferenceUID);
   plan.approval_status = dataset.text(DCM_ApprovalStatus).value_or("");
+  plan.geometry = dataset.text(DCM_RTPlanGeometry).value_or("");
   const bool is_ion = plan.sop_class_uid == UID_RTIonPlanStorage;
   for (const DicomItem& beam : dataset.items(is_ion ? DCM_IonBeamSequence : DCM_BeamSequence)) {
     if (is_ion && beam.text(DCM_PatientSupportType) == "CHAIR")

@@ -42,6 +42,7 @@ struct RtPlan {
   std::string label;
   std::optional<std::string> frame_of_reference_uid;
   std::string approval_status;
+  std::string geometry;  // RTPlanGeometry: PATIENT, or TREATMENT_DEVICE where there is no structure set
   std::vector<Beam> beams;
   std::vector<DoseReference> dose_references;
 };

@@ -90,13 +90,13 @@ RtStructures read_rt_structures(const std::filesystem::path& path) {
   RtStructures read;
   read.path = path;
   read.identity = read_identity(dataset);
-  read.sop_instance_uid = dataset.required_text(DCM_SOPInstanceUID);
+  read.sop_instance_uid = dataset.required_uid(DCM_SOPInstanceUID);
   read.label = dataset.text(DCM_StructureSetLabel).value_or("");
   for (const DicomItem& roi : dataset.items(DCM_StructureSetROISequence)) {
     Structure structure;
     structure.number = required_integer(roi, DCM_ROINumber);
     structure.name = roi.text(DCM_ROIName).value_or("");
-    structure.frame_of_reference_uid = roi.text(DCM_ReferencedFrameOfReferenceUID);
+    structure.frame_of_reference_uid = roi.uid(DCM_ReferencedFrameOfReferenceUID);
     if (std::ranges::find(read.structures, structure.number, &Structure::number) != read.structures.end())
       throw Error(fmt::format("{}: {} is {}, as in an earlier item; expected each number once", roi.where(),
                               described(DCM_ROINumber), structure.number));

@@ -151,8 +151,8 @@ Scout read_scout(const std::filesystem::path& path, const ScoutSwitches& switche
                             described(DCM_GantryDetectorTilt), *tilt));
   Scout scout;
   scout.identity = read_identity(dataset);
-  scout.sop_instance_uid = dataset.required_text(DCM_SOPInstanceUID);
-  scout.frame_of_reference_uid = dataset.required_text(DCM_FrameOfReferenceUID);
+  scout.sop_instance_uid = dataset.required_uid(DCM_SOPInstanceUID);
+  scout.frame_of_reference_uid = dataset.required_uid(DCM_FrameOfReferenceUID);
   scout.patient_position = dataset.text(DCM_PatientPosition).value_or("");
   scout.sha256 = file.sha256();
   scout.sad_mm = distance_from(dataset, DCM_DistanceSourceToPatient, switches.sad_mm, "--sad", notes);

@@ -38,10 +38,10 @@ bool TableReadOuts::has_same_read_outs(const TableReadOuts& other) const {
   });
 }
 
-TableReadOuts read_table_read_outs(const std::function<std::optional<double>(const DcmTagKey&)>& number,
+TableReadOuts read_table_read_outs(const std::function<std::optional<double>(const TableReadOut&)>& value_of,
                                    const std::optional<std::string>& origin) {
   TableReadOuts table{.are_measured = origin == "ACTUAL"};
-  for (const TableReadOut& read_out : table_read_outs()) table.*read_out.value = number(read_out.tag);
+  for (const TableReadOut& read_out : table_read_outs()) table.*read_out.value = value_of(read_out);
   return table;
 }
 

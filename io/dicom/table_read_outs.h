@@ -31,10 +31,6 @@ struct TableReadOuts {
   bool operator==(const TableReadOuts&) const = default;
 };
 
-// `number` gives the value of an attribute of the X-ray, and `origin` is its ReportedValuesOrigin.
-TableReadOuts read_table_read_outs(const std::function<std::optional<double>(const DcmTagKey&)>& number,
-                                   const std::optional<std::string>& origin);
-
 // Whether the read-outs of all these X-rays tell where the table stood, each by the same read-outs.
 template <class Xrays>
 bool all_tell_position(const Xrays& xrays) {
@@ -50,6 +46,10 @@ struct TableReadOut {
   bool is_angle;
 };
 const std::vector<TableReadOut>& table_read_outs();
+
+// `value_of` gives what the X-ray says, and `origin` is its ReportedValuesOrigin.
+TableReadOuts read_table_read_outs(const std::function<std::optional<double>(const TableReadOut&)>& value_of,
+                                   const std::optional<std::string>& origin);
 
 // How a read-out differs between two X-rays, in words ("moved by 3.1 mm"); nothing where it does not, or where one of
 // them has no value.

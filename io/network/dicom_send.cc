@@ -76,11 +76,11 @@ class Association {
 
 // Whether the peer lists the object. One that does not answer queries, or refuses this one, lists nothing.
 bool is_listed(const DicomItem& object, const DicomPeer& peer) {
-  const std::string uid = object.required_text(DCM_SOPInstanceUID);
+  const std::string uid = object.required_uid(DCM_SOPInstanceUID);
   DcmDataset query;
   query.putAndInsertString(DCM_QueryRetrieveLevel, "IMAGE");
-  query.putAndInsertString(DCM_StudyInstanceUID, object.required_text(DCM_StudyInstanceUID).c_str());
-  query.putAndInsertString(DCM_SeriesInstanceUID, object.required_text(DCM_SeriesInstanceUID).c_str());
+  query.putAndInsertString(DCM_StudyInstanceUID, object.required_uid(DCM_StudyInstanceUID).c_str());
+  query.putAndInsertString(DCM_SeriesInstanceUID, object.required_uid(DCM_SeriesInstanceUID).c_str());
   query.putAndInsertString(DCM_SOPInstanceUID, uid.c_str());
   OFList<QRResponse*> responses;
   try {
@@ -123,7 +123,7 @@ std::string send_object(const std::filesystem::path& file, const std::string& sh
   DcmFileFormat object = read_released(file, sha256);
   const DicomItem dataset(*object.getDataset(), file.string());
   if (may_be_there && is_listed(dataset, peer)) return "was there, from an earlier attempt";
-  Association association(peer, dataset.required_text(DCM_SOPClassUID).c_str());
+  Association association(peer, dataset.required_uid(DCM_SOPClassUID).c_str());
   Uint16 status = 0xFFFF;
   association.check(association.scu().sendSTORERequest(association.context(), "", object.getDataset(), status),
                     "the object was not sent whole");

@@ -79,7 +79,9 @@ void write_drr_image(const Study& study, std::size_t index, const Image<float>& 
   dataset.put(DCM_DerivationDescription, fmt::format("DRR of the planning CT as {} should have seen it", image.label));
   dataset.put(DCM_FrameOfReferenceUID, is_as_planned ? study.ct->frame_of_reference_uid : new_uid());
   dataset.put(DCM_PositionReferenceIndicator, "");
-  if (is_as_planned) dataset.put(DCM_IsocenterPosition, std::span(study.isocenter_patient_mm.data(), 3));
+  // Off plan, the new frame of reference has its origin at the machine's isocenter.
+  const Eigen::Vector3d isocenter_mm = is_as_planned ? study.isocenter_patient_mm : Eigen::Vector3d(0.0, 0.0, 0.0);
+  dataset.put(DCM_IsocenterPosition, std::span(isocenter_mm.data(), 3));
   dataset.put(DCM_PatientPosition, to_string(study.patient_position));
   put_geometry(dataset, image);
   if (study.plan) {

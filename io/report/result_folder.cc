@@ -11,6 +11,7 @@
 #include "base/error.h"
 #include "base/output_folder.h"
 #include "base/parallel.h"
+#include "base/text_file.h"
 #include "io/objects/encapsulated_pdf.h"
 #include "io/report/drawings.h"
 #include "io/report/formats.h"
@@ -82,6 +83,7 @@ void write_result(const SetupResult& report, const std::filesystem::path& folder
 
 SetupResult read_report(const std::filesystem::path& folder) {
   const std::filesystem::path path = folder / kResultFile;
+  expect_no_pipe(path);
   std::ifstream file(path, std::ios::binary);
   const std::string json{std::istreambuf_iterator<char>(file), {}};
   if (!file) throw Error(fmt::format("{}: cannot be read: this is not the folder of a result", path.string()));

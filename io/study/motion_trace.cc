@@ -13,6 +13,7 @@
 #include <string_view>
 
 #include "base/error.h"
+#include "base/text_file.h"
 
 namespace isoshift {
 namespace {
@@ -38,6 +39,7 @@ std::optional<std::size_t> column_named(const std::vector<std::string>& names, s
 }  // namespace
 
 std::vector<MotionSample> read_motion_trace(const std::filesystem::path& path, Notes& notes) {
+  expect_no_pipe(path);
   std::ifstream file(path);
   std::string line;
   if (!std::getline(file, line)) throw Error(fmt::format("{}: cannot be read, or is empty", path.string()));

@@ -1,6 +1,7 @@
 #pragma once
 // Whether files belong together: one patient, one session on one table.
 
+#include <array>
 #include <span>
 #include <string>
 #include <vector>
@@ -12,10 +13,18 @@
 
 namespace isoshift {
 
-// Checks that two files are of one patient: both have the same ID, and issuer, name and birth date agree if both files
-// have them. Messages call the two files `where` and `reference_name`.
-std::vector<Finding> patient_findings(const Identity& reference, const Identity& other, const std::string& where,
-                                      const std::string& reference_name = "the CT");
+// A file with a patient, as messages name it.
+struct PatientInput {
+  const Identity* identity;
+  std::string name;
+};
+
+// Checks that all are of one patient: each has the same ID, and issuer, name and birth date agree where they are given.
+// Each input is compared with the first that has the attribute: two may differ in what the CT does not say.
+std::vector<Finding> patient_findings(std::span<const PatientInput> inputs);
+inline std::vector<Finding> patient_findings(const PatientInput& one, const PatientInput& other) {
+  return patient_findings(std::array{one, other});
+}
 
 // Checks that the views were taken at one time and at one table position. Each view is compared with the first view
 // that has the attribute. If only some views have the attribute, a warning names the others.

@@ -17,21 +17,24 @@ namespace isoshift {
 namespace {
 
 std::vector<Finding> patient_findings(const Study& study) {
-  std::vector<Finding> findings;
-  const auto compare = [&](const Identity& identity, const std::filesystem::path& path) {
-    std::ranges::move(patient_findings(study.ct->identity, identity, path.string()), std::back_inserter(findings));
-  };
-  if (study.plan) compare(study.plan->identity, study.plan->path);
-  if (study.structures) compare(study.structures->identity, study.structures->path);
-  for (const RtImage& image : study.rt_images) compare(image.identity, image.path);
-  return findings;
+  std::vector<PatientInput> inputs = {{&study.ct->identity, "the CT"}};
+  if (study.plan) inputs.push_back({&study.plan->identity, study.plan->path.string()});
+  if (study.structures) inputs.push_back({&study.structures->identity, study.structures->path.string()});
+  for (const RtImage& image : study.rt_images) inputs.push_back({&image.identity, image.path.string()});
+  return patient_findings(inputs);
 }
 
 std::vector<Finding> plan_findings(const Study& study, Notes& notes) {
   std::vector<Finding> findings;
   if (!study.plan) return findings;
   const RtPlan& plan = *study.plan;
-  if (!plan.frame_of_reference_uid)
+  if (!plan.frame_of_reference_uid && plan.geometry == "TREATMENT_DEVICE")
+    findings.push_back(
+        {"for-mismatch",
+         fmt::format("{}: has no {}, and {} is TREATMENT_DEVICE: nothing says where its isocenter lies "
+                     "in the CT",
+                     plan.path.string(), described(DCM_FrameOfReferenceUID), described(DCM_RTPlanGeometry))});
+  else if (!plan.frame_of_reference_uid)
     notes.warnings.push_back(
         fmt::format("the plan has no {}; taken as that of the CT", described(DCM_FrameOfReferenceUID)));
   else if (*plan.frame_of_reference_uid != study.ct->frame_of_reference_uid)
@@ -161,7 +164,7 @@ void check_nothing_missing(const std::vector<RtImage>& images, std::string refus
   for (const RtImage& image : images)
     for (const MissingAttribute& missing : missing_attributes(image)) {
       if (!refused.empty()) refused += '\n';
-      refused += fmt::format("{}: {} is missing.\n       {}", image.path.string(), described(missing.tag),
+      refused += fmt::format("{}: {} {}.\n       {}", image.path.string(), described(missing.tag), missing.problem(),
                              missing.supplied_by.empty() ? "No switch supplies it: the image cannot be used."
                                                          : "Supply it: " + missing.supplied_by);
     }
@@ -280,6 +283,21 @@ void check_together(const StudyRequest& request, const SaidOfSession& said, Stud
   check_one_patient_position(study);
 }
 
+// An X-ray in the CT's frame of reference says where the machine's isocenter lay in it (docs/dicom.md, D2).
+void check_isocenter_of_images(const Study& study, const Allowances& allowed, Notes& notes) {
+  constexpr double kSameMm = 0.5;
+  std::vector<Finding> findings;
+  for (const RtImage& image : study.rt_images)
+    if (image.isocenter_mm && image.frame_of_reference_uid == study.ct->frame_of_reference_uid &&
+        (*image.isocenter_mm - study.isocenter_patient_mm).norm() > kSameMm)
+      findings.push_back(
+          {"plan-mismatch",
+           fmt::format("{}: {} is ({}) mm, that of the plan is ({}) mm in the same {}", image.path.string(),
+                       described(DCM_IsocenterPosition), fmt::join(*image.isocenter_mm, ", "),
+                       fmt::join(study.isocenter_patient_mm, ", "), described(DCM_FrameOfReferenceUID))});
+  settle(findings, allowed, notes);
+}
+
 // How the patient was planned to lie: position, table, isocenter. `beams`: those of the plan that were imaged.
 void place_patient(const StudyRequest& request, const std::vector<RtPlan::Beam>& beams, Study& study, Notes& notes) {
   study.patient_position = patient_position_from(study.rt_images.front().patient_position.value()).value();
@@ -290,6 +308,7 @@ void place_patient(const StudyRequest& request, const std::vector<RtPlan::Beam>&
                                           fmt::join(study.isocenter_patient_mm, ", ")));
   } else if (study.plan) {
     study.isocenter_patient_mm = common_isocenter(*study.plan, beams);
+    check_isocenter_of_images(study, request.allowed, notes);
   } else {
     throw Error(fmt::format(
         "no RT Plan found ({}), so the planned isocenter is unknown.\n"

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <fstream>
@@ -170,7 +171,7 @@ TEST_F(ErrorMessagesTest, PatientsWithoutAnId) {
   const CommandOutcome outcome = register_study(study_);
   EXPECT_EQ(outcome.exit_status, 1);
   EXPECT_THAT(outcome.err,
-              HasSubstr(where(study_.image(0)) + ": PatientID (0010,0020) is empty in this file or in the CT"));
+              HasSubstr(where(study_.image(0)) + ": PatientID (0010,0020) is empty: whose it is is unknown"));
 }
 
 TEST_F(ErrorMessagesTest, PatientsOfDifferentNames) {
@@ -181,9 +182,99 @@ TEST_F(ErrorMessagesTest, PatientsOfDifferentNames) {
   EXPECT_THAT(outcome.err, testing::Not(HasSubstr("Other^Person")));
 }
 
-TEST_F(ErrorMessagesTest, NamesThatDifferInEmptyComponentsAreTheSame) {
-  edit(study_.image(1), [](DicomItem d) { d.put(DCM_PatientName, "Phantom^Digital^^^"); });
+TEST_F(ErrorMessagesTest, NamesThatDifferInEmptyComponentsOrCapitalsAreTheSame) {
+  edit(study_.image(1), [](DicomItem d) { d.put(DCM_PatientName, "PHANTOM^Digital^^^"); });
   EXPECT_EQ(register_study(study_).exit_status, 0);
+}
+
+// What the CT does not say, the plan and an X-ray may contradict each other in.
+TEST_F(ErrorMessagesTest, EveryPairOfInputsIsOfOnePatient) {
+  for (const DcmTagKey& tag : {DCM_PatientBirthDate, DCM_IssuerOfPatientID}) {
+    SmallStudy study;
+    const bool is_date = tag == DCM_PatientBirthDate;
+    edit(study.plan(), [&](DicomItem d) { d.put(tag, is_date ? "19600101" : "A"); });
+    edit(study.image(1), [&](DicomItem d) { d.put(tag, is_date ? "19600102" : "B"); });
+    const CommandOutcome outcome = register_study(study);
+    EXPECT_EQ(outcome.exit_status, 1);
+    EXPECT_THAT(outcome.err,
+                HasSubstr(fmt::format("{}: {} differs from that of {}: the inputs are of different patients",
+                                      where(study.image(1)), described(tag), where(study.plan()))));
+  }
+}
+
+TEST_F(ErrorMessagesTest, ADateWithDotsIsTheSameDate) {
+  edit(study_.plan(), [](DicomItem d) { d.put(DCM_PatientBirthDate, "1960.01.01"); });
+  edit(study_.image(1), [](DicomItem d) { d.put(DCM_PatientBirthDate, "19600101"); });
+  EXPECT_EQ(register_study(study_).exit_status, 0);
+}
+
+TEST_F(ErrorMessagesTest, AnIsocenterThatContradictsThePlan) {
+  std::string frame;
+  edit(study_.ct_slice(0), [&](DicomItem d) { frame = d.required_text(DCM_FrameOfReferenceUID); });
+  edit(study_.image(1), [&](DicomItem d) {
+    d.put(DCM_FrameOfReferenceUID, frame);
+    d.put(DCM_IsocenterPosition, "0\\0\\5");
+  });
+  const CommandOutcome outcome = register_study(study_);
+  EXPECT_EQ(outcome.exit_status, 1);
+  EXPECT_THAT(outcome.err, StartsWith(fmt::format("error: {}: IsocenterPosition (300A,012C) is (0, 0, 5) mm, that of "
+                                                  "the plan is (",
+                                                  where(study_.image(1)))));
+  EXPECT_THAT(outcome.err, HasSubstr("--allow plan-mismatch=REASON"));
+}
+
+TEST_F(ErrorMessagesTest, APlanOfATreatmentDevice) {
+  edit(study_.plan(), [](DicomItem d) { d.put(DCM_RTPlanGeometry, "TREATMENT_DEVICE"); });
+  EXPECT_EQ(register_study(study_).exit_status, 0);  // its frame of reference says where its isocenter lies
+  edit(study_.plan(), [](DicomItem d) { d.erase(DCM_FrameOfReferenceUID); });
+  const CommandOutcome outcome = register_study(study_, {"--overwrite"});
+  EXPECT_EQ(outcome.exit_status, 1);
+  EXPECT_THAT(outcome.err, HasSubstr("RTPlanGeometry (300A,000C) is TREATMENT_DEVICE: nothing says where its isocenter "
+                                     "lies in the CT\n       If that is known to be right, allow it: --allow "
+                                     "for-mismatch=REASON"));
+}
+
+TEST_F(ErrorMessagesTest, AnIntensityThatSaysNothing) {
+  edit(study_.image(0), [](DicomItem d) { d.put(DCM_PixelIntensityRelationship, "DISP"); });
+  edit(study_.image(1), [](DicomItem d) { d.put(DCM_PixelIntensityRelationshipSign, 0); });
+  expect_error(
+      fmt::format("{}: PixelIntensityRelationship (0028,1040) is \"DISP\", which does not tell.\n"
+                  "       Supply it: --intensity LIN+|LIN-|LOG+|LOG-\n"
+                  "{}: PixelIntensityRelationshipSign (0028,1041) is \"0\", which does not tell.\n"
+                  "       Supply it: --intensity LIN+|LIN-|LOG+|LOG-",
+                  where(study_.image(0)), where(study_.image(1))));
+}
+
+TEST_F(ErrorMessagesTest, APipeIsNoFile) {
+  const std::filesystem::path pipe = study_.path() / "pipe";
+  ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
+  for (const std::vector<std::string>& words :
+       {std::vector<std::string>{"check", pipe.string()},
+        {"inspect", pipe.string()},
+        {"register", study_.path().string(), "-o", study_.output().string(), "--plan", pipe.string()},
+        {"register", study_.path().string(), "-o", study_.output().string(), "--truth", pipe.string()},
+        {"predict", pipe.string()},
+        {"register", study_.path().string(), "-o", "x", "--machine", pipe.string()}}) {
+    const CommandOutcome outcome = run_command(words);
+    EXPECT_EQ(outcome.exit_status, 1) << words.front();
+    EXPECT_THAT(outcome.out + outcome.err, HasSubstr("is a pipe, a socket or a device, expected a file"));
+  }
+}
+
+TEST_F(ErrorMessagesTest, WhatIsNoUid) {
+  edit(study_.image(1), [](DicomItem d) { d.put(DCM_SeriesInstanceUID, "../../x"); });
+  expect_error(
+      fmt::format("{}: SeriesInstanceUID (0020,000E) is \"../../x\", which is no UID: expected at most 64 "
+                  "digits and dots",
+                  where(study_.image(1))));
+}
+
+TEST_F(ErrorMessagesTest, AnXrayOfNoStudy) {
+  edit(study_.image(1), [](DicomItem d) { d.erase(DCM_StudyInstanceUID); });
+  expect_error(
+      fmt::format("{}: StudyInstanceUID (0020,000D) is missing.\n       No switch supplies it: the image cannot "
+                  "be used.",
+                  where(study_.image(1))));
 }
 
 TEST_F(ErrorMessagesTest, BlankXray) {
@@ -223,11 +314,12 @@ TEST_F(ErrorMessagesTest, TableMovedBetweenTheViews) {
 
 TEST_F(ErrorMessagesTest, ViewsTooFarApartInTime) {
   edit(study_.image(1), [](DicomItem d) { d.put(DCM_AcquisitionTime, "104500"); });
-  expect_error(
-      fmt::format("{}: taken 30 minutes from {}, expected at most 10 (AcquisitionTime (0008,0032))\n"
-                  "       Of several sessions isoshift batch registers each, and --image names the X-rays of one.\n"
-                  "       If that is known to be right, allow it: --allow time-span=REASON",
-                  where(study_.image(1)), where(study_.image(0))));
+  expect_error(fmt::format(
+      "{}: taken 30 minutes from {}, expected at most 10 (AcquisitionTime (0008,0032))\n"
+      "       Of several sessions isoshift batch registers each, and --latest, --date, --fraction or --session "
+      "chooses one.\n"
+      "       If that is known to be right, allow it: --allow time-span=REASON",
+      where(study_.image(1)), where(study_.image(0))));
 }
 
 TEST_F(ErrorMessagesTest, IsocenterOutsideTheCt) {

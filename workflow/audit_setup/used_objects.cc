@@ -44,7 +44,7 @@ std::vector<CheckedRegistration> registrations_below(const fs::path& folder, std
 std::string use_object(CheckedRegistration& object, const std::optional<Eigen::Vector3d>& source_isocenter_mm,
                        AuditedSession& session) {
   for (const Finding& finding :
-       patient_findings(session.identity, object.identity, object.path.string(), "session " + session.name))
+       patient_findings({&session.identity, "session " + session.name}, {&object.identity, object.path.string()}))
     return finding.message;
   const RegistrationMeaning meaning = meaning_of(object, session.planned, source_isocenter_mm);
   if (!meaning.couch_shift) {

@@ -20,11 +20,12 @@ std::optional<TimedXray> XrayStream::checked(RtImage header) const {
   header = with_switches(header, request_.switches, said);
   if (!header.patient_position) header.patient_position = std::string(to_string(study_.patient_position));
   std::vector<Finding> findings = rt_image_findings(header);
-  std::ranges::move(patient_findings(study_.ct->identity, header.identity, where), std::back_inserter(findings));
+  std::ranges::move(patient_findings({&study_.ct->identity, "the CT"}, {&header.identity, where}),
+                    std::back_inserter(findings));
   std::ranges::move(table_findings(header, study_.rt_images.front()), std::back_inserter(findings));
   settle(findings, request_.allowed, said);
   if (const auto missing = missing_attributes(header); !missing.empty())
-    throw Error(fmt::format("{}: {} is missing", where, described(missing.front().tag)));
+    throw Error(fmt::format("{}: {} {}", where, described(missing.front().tag), missing.front().problem()));
   const auto time_s = acquisition_seconds(header);
   if (!time_s) throw Error(fmt::format("{}: {} is missing", where, described(DCM_AcquisitionTime)));
   TimedXray timed{.header = std::move(header), .time_s = *time_s, .xray = std::nullopt};

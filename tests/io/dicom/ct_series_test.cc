@@ -27,6 +27,7 @@ class CtSeriesTest : public testing::Test {
     DicomItem d = file.dataset();
     d.put(DCM_SOPClassUID, "1.2.840.10008.5.1.4.1.1.2");
     d.put(DCM_SOPInstanceUID, fmt::format("1.2.3.{}", k + 1));
+    d.put(DCM_StudyInstanceUID, "1.2");
     d.put(DCM_SeriesInstanceUID, "1.2.3");
     d.put(DCM_FrameOfReferenceUID, "1.2.4");
     d.put(DCM_ImagePositionPatient, std::span(position.data(), 3));
@@ -54,6 +55,10 @@ class CtSeriesTest : public testing::Test {
 
   void write_even(int count, double spacing_mm = 5.0) {
     for (int k = 0; k < count; ++k) write(k, {10, 20, 30 + spacing_mm * k});
+  }
+
+  void edit_all(const std::function<void(DicomItem)>& change) {
+    for (const std::filesystem::path& path : files_) edit(path, change);
   }
 
   CtSeries read(const Allowances& allowed = {}) {
@@ -96,6 +101,7 @@ class CtSeriesTest : public testing::Test {
     shared.append_item(DCM_PixelMeasuresSequence).put(DCM_PixelSpacing, "0.5\\0.25");
     d.put(DCM_SOPClassUID, "1.2.840.10008.5.1.4.1.1.2.1");
     d.put(DCM_SOPInstanceUID, "1.2.3.99");
+    d.put(DCM_StudyInstanceUID, "1.2.5");
     d.put(DCM_SeriesInstanceUID, "1.2.3");
     d.put(DCM_FrameOfReferenceUID, "1.2.4");
     d.put(DCM_NumberOfFrames, number);
@@ -179,6 +185,14 @@ TEST_F(CtSeriesTest, TheSameSliceTwiceCountsOnce) {
   files_.push_back(folder_ / "again.dcm");
   EXPECT_EQ(read().hu.size.z(), 6);
   EXPECT_THAT(notes_.warnings, testing::ElementsAre(testing::HasSubstr("counted once")));
+}
+
+TEST_F(CtSeriesTest, AnInstanceInTwoPlacesIsRefused) {
+  write_even(6);
+  edit(files_[4], [](DicomItem d) { d.put(DCM_SOPInstanceUID, "1.2.3.2"); });
+  EXPECT_THAT(error_of_reading(), testing::AllOf(testing::StartsWith(files_[4].string()),
+                                                 testing::HasSubstr("has the SOPInstanceUID (0008,0018) of"),
+                                                 testing::HasSubstr("but lies elsewhere")));
 }
 
 TEST_F(CtSeriesTest, TwoSlicesInOnePlaceAreRefused) {
@@ -325,6 +339,42 @@ TEST_F(CtSeriesTest, MoreFramesThanItemsAreRefused) {
 TEST_F(CtSeriesTest, AStackThatIsNoBodyIsRefused) {
   write_even(4);
   EXPECT_THAT(error_of_reading(), testing::HasSubstr("its slices span 15.0 mm, expected 20 to 2500 mm"));
+}
+
+// What would make an invalid object of everything that is written of this CT (PS3.5 6.2).
+TEST_F(CtSeriesTest, APatientWhomNoObjectCanNameIsRefused) {
+  write_even(6);
+  edit_all([](DicomItem d) { d.put(DCM_PatientName, std::string(64, 'A') + "=" + std::string(64, 'B')); });
+  EXPECT_EQ(read().identity.patient_name.size(), 129U);  // each group of a name counts by itself
+  edit_all([](DicomItem d) { d.put(DCM_PatientName, std::string(65, 'A')); });
+  EXPECT_THAT(error_of_reading(), testing::HasSubstr("PatientName (0010,0010) is longer than the 64 characters"));
+  edit_all([](DicomItem d) {
+    d.put(DCM_PatientName, "A");
+    d.put(DCM_PatientID, std::string(65, '1'));
+  });
+  EXPECT_THAT(error_of_reading(), testing::HasSubstr("PatientID (0010,0020) is longer than the 64 characters"));
+}
+
+TEST_F(CtSeriesTest, WhatDicomDoesNotAllowIsLeftOutOfWhatIsWritten) {
+  write_even(6);
+  edit_all([](DicomItem d) {
+    d.put(DCM_AccessionNumber, "12345678901234567");
+    d.put(DCM_StudyDate, "2026.03.01");
+    d.put(DCM_StudyID, "1234567890123456");
+  });
+  const Identity identity = read().identity;
+  EXPECT_EQ(identity.accession_number, "");
+  EXPECT_EQ(identity.study_date, "");
+  EXPECT_EQ(identity.study_id, "1234567890123456");
+  EXPECT_THAT(notes_.warnings,
+              testing::UnorderedElementsAre(testing::HasSubstr("AccessionNumber (0008,0050) is not as DICOM allows"),
+                                            testing::HasSubstr("StudyDate (0008,0020) is not as DICOM allows")));
+}
+
+TEST_F(CtSeriesTest, ACtOfNoStudyIsRefused) {
+  write_even(6);
+  edit_all([](DicomItem d) { d.erase(DCM_StudyInstanceUID); });
+  EXPECT_THAT(error_of_reading(), testing::HasSubstr("StudyInstanceUID (0020,000D) is missing"));
 }
 
 TEST_F(CtSeriesTest, CompressionWithLossIsWarnedOf) {

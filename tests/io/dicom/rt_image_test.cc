@@ -38,6 +38,15 @@ class RtImageTest : public testing::Test {
         .values.at(0, 0);
   }
 
+  std::string error_of_reading(const std::function<void(DicomItem)>& change) {
+    try {
+      changed(change);
+    } catch (const Error& error) {
+      return error.what();
+    }
+    return "no error";
+  }
+
   std::string error_of_geometry(const RtImage& image) {
     try {
       rt_image_findings(image);
@@ -121,6 +130,21 @@ TEST_F(RtImageTest, AnglesAreModulo360) {
   const TableAngles table = table_angles(std::span(&image, 1), notes_);
   EXPECT_NEAR(deg_from_rad(table.support_rad), -0.002, 1e-9);
   EXPECT_NEAR(deg_from_rad(table.pitch_rad), -0.002, 1e-4);
+}
+
+TEST_F(RtImageTest, AReadOutOfMoreThanATurnIsNoAngle) {
+  for (const DcmTagKey& tag : {DCM_GantryAngle, DCM_PatientSupportAngle, DCM_XRayImageReceptorAngle,
+                               DCM_TableTopPitchAngle, DCM_BeamLimitingDeviceAngle}) {
+    EXPECT_THAT(error_of_reading([&](DicomItem d) { d.put(tag, 1e9); }),
+                HasSubstr(described(tag) + " is 1000000000 degrees, expected -360 to 360"));
+    edit(study_.image(0), [&](DicomItem d) { d.put(tag, -360.0); });
+    EXPECT_NO_THROW(read_rt_images(study_.image(0), notes_));
+  }
+}
+
+TEST_F(RtImageTest, OfTwoValuesNoneIsChosen) {
+  EXPECT_THAT(error_of_reading([](DicomItem d) { d.put(DCM_GantryAngle, "0\\90"); }),
+              HasSubstr("GantryAngle (300A,011E) has 2 values, expected 1"));
 }
 
 TEST_F(RtImageTest, IntensityFollowsRelationshipAndSign) {

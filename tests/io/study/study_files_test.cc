@@ -69,6 +69,28 @@ TEST_F(StudyFilesTest, TakesThePlanThatTheXraysReferTo) {
   EXPECT_THAT(notes_.left_aside, Contains(HasSubstr("other/RTPLAN.dcm: an RT Plan that no X-ray refers to")));
 }
 
+TEST_F(StudyFilesTest, ACopyOfThePlanIsThePlan) {
+  fs::copy_file(study_.plan(), study_.path() / "copy.dcm");
+  find();
+  EXPECT_THAT(notes_.left_aside, Contains(HasSubstr("the same RT Plan as")));
+  edit(study_.path() / "copy.dcm", [](DicomItem d) { d.put(DCM_RTPlanLabel, "OTHER"); });
+  EXPECT_THAT(error_of_finding(), HasSubstr("but other contents.\n       Name the plan: --plan FILE"));
+}
+
+TEST_F(StudyFilesTest, AnXrayOfAPlanThatIsNotHereIsLeftAside) {
+  const fs::path stray = study_.path() / "stray.dcm";
+  fs::copy_file(study_.image(0), stray);
+  edit(stray, [](DicomItem d) {
+    d.put(DCM_SOPInstanceUID, "1.2.3.4");
+    d.items(DCM_ReferencedRTPlanSequence)[0].put(DCM_ReferencedSOPInstanceUID, "1.2.3");
+  });
+  EXPECT_THAT(find().images, ElementsAre(study_.image(0), study_.image(1)));
+  EXPECT_THAT(notes_.left_aside, Contains(HasSubstr("stray.dcm: an X-ray of a plan that is not here (1.2.3)")));
+  StudyParts named;
+  named.images = {study_.image(0), study_.image(1), stray};
+  EXPECT_EQ(find(named).images.size(), 3U) << "what a person names is a matter for checks";
+}
+
 TEST_F(StudyFilesTest, TwoWholeStudiesNeedAName) {
   add("other", 2);
   EXPECT_THAT(error_of_finding(), HasSubstr("2 RT Plans found, and the X-rays do not tell which one is meant"));
