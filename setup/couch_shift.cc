@@ -7,10 +7,11 @@ Eigen::Isometry3d setup_error_from_poses(const Eigen::Isometry3d& planned_room_f
   return actual_room_from_patient * planned_room_from_patient.inverse();
 }
 
-CouchShift couch_shift_for(const Eigen::Isometry3d& setup_error, const TableAngles& table) {
+CouchShift couch_shift_for(const Eigen::Isometry3d& setup_error, const TableAngles& table,
+                           const Eigen::Vector3d& about_mm) {
   CouchShift shift;
   // The table top translates along axes that turn with support and eccentric angle, but not with pitch and roll.
-  shift.translation_mm = rotation_z(-table.yaw_rad()) * -setup_error.translation();
+  shift.translation_mm = rotation_z(-table.yaw_rad()) * (about_mm - setup_error * about_mm);
   shift.target = zxy_from_rotation(setup_error.linear().transpose() * rotation_from_zxy(table.zxy()));
   shift.change = {.z_rad = wrapped_rad(shift.target.z_rad - table.yaw_rad()),
                   .x_rad = wrapped_rad(shift.target.x_rad - table.pitch_rad),

@@ -22,7 +22,10 @@ struct CouchShift {
 
 // The shift that undoes `setup_error` for a table standing at `table` at imaging. The target angles come from
 // R_new = R^T Rz Rx Ry: negated angles would leave an error of second order, since rotations do not commute.
-CouchShift couch_shift_for(const Eigen::Isometry3d& setup_error, const TableAngles& table);
+// `about_mm` (from the isocenter, IEC 61217 fixed): the point about which the rotation turns. The angles do not depend
+// on it; the translation is the one that brings anatomy planned there to where it was planned.
+CouchShift couch_shift_for(const Eigen::Isometry3d& setup_error, const TableAngles& table,
+                           const Eigen::Vector3d& about_mm = Eigen::Vector3d::Zero());
 
 // Which of its six motions a couch can make: all; translations and yaw; translations.
 enum class CouchDof { kThree = 3, kFour = 4, kSix = 6 };

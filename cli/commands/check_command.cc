@@ -9,8 +9,11 @@
 #include <nlohmann/json.hpp>
 
 #include "base/error.h"
+#include "base/output_folder.h"
 #include "cli/commands/commands.h"
+#include "cli/switches/study_switches.h"
 #include "io/dicom/rt_plan.h"
+#include "io/objects/itk_transform.h"
 #include "io/objects/registration_check.h"
 #include "io/objects/registration_meaning.h"
 #include "io/objects/spatial_registration.h"
@@ -25,7 +28,8 @@ using Json = nlohmann::ordered_json;
 struct CheckOptions {
   std::vector<std::filesystem::path> registrations;
   std::filesystem::path plan;
-  std::vector<double> isocenter, source_isocenter;
+  std::vector<double> isocenter, source_isocenter, about;
+  std::filesystem::path transform;
   std::string patient_position;
   std::optional<double> couch_angle_deg, couch_pitch_deg, couch_roll_deg;
   bool as_json = false;
@@ -36,6 +40,7 @@ struct CheckOptions {
 void CheckOptions::check() const {
   check_finite("--isocenter", isocenter);
   check_finite("--source-isocenter", source_isocenter);
+  check_finite("--about", about);
   const bool asks_for_shift = !plan.empty() || !isocenter.empty() || !patient_position.empty();
   for (const auto& [flag, angle_deg] :
        {std::pair("--couch-angle", couch_angle_deg), std::pair("--couch-pitch", couch_pitch_deg),
@@ -45,7 +50,20 @@ void CheckOptions::check() const {
           fmt::format("{} is used only for a couch shift: add --plan FILE, or --isocenter X,Y,Z and "
                       "--patient-position HFS",
                       flag));
+  if (!about.empty() && !asks_for_shift)
+    throw UsageError(
+        "--about is used only for a couch shift: add --plan FILE, or --isocenter X,Y,Z and --patient-position HFS");
+  if (!transform.empty() && registrations.size() > 1)
+    throw UsageError("--tfm writes the matrix of one object: name one");
   check_couch_angles(couch_angle_deg, couch_pitch_deg, couch_roll_deg);
+}
+
+void write_transform(const CheckedRegistration& checked, const std::filesystem::path& path) {
+  const auto matrix = rigid_of(checked);
+  if (!matrix)
+    throw Error(fmt::format("{}: holds no rigid matrix from one frame to another, so that none is written",
+                            checked.path.string()));
+  write_text(path, itk_transform(*matrix));
 }
 
 // What the switches say, else the plan; nothing where neither says anything.
@@ -99,9 +117,25 @@ Json json_of_couch(const PlannedSetup& setup) {
           {"roll_taken_as_0", !setup.couch_roll_deg}};
 }
 
-// For machines; the same for people is added to `text`.
+// The shift of a couch, or of a system, that turns about another point of the planned patient than the isocenter.
+Json describe_about(const Eigen::Vector3d& point_patient_mm, const Eigen::Isometry3d& setup_error,
+                    const PlannedSetup& setup, std::string& text) {
+  const Eigen::Vector3d point_mm = setup.room_from_patient() * point_patient_mm;
+  const Eigen::Vector3d shift_mm = couch_shift_for(setup_error, setup.table(), point_mm).translation_mm;
+  text += fmt::format(
+      "  about  ({:.3f}) mm of the registered frame instead of the isocenter: lateral {:+.2f}, longitudinal {:+.2f}, "
+      "vertical {:+.2f} mm, and the same angles\n",
+      fmt::join(point_patient_mm, ", "), shift_mm.x(), shift_mm.y(), shift_mm.z());
+  return {{"point_mm", json_of(point_patient_mm)},
+          {"lateral_mm", shift_mm.x()},
+          {"longitudinal_mm", shift_mm.y()},
+          {"vertical_mm", shift_mm.z()}};
+}
+
+// For machines; the same for people is added to `text`. `about_mm`: a point of the registered frame, or nothing.
 Json describe(const CheckedRegistration& checked, const RegistrationMeaning& meaning,
-              const std::optional<PlannedSetup>& setup, std::string& text) {
+              const std::optional<PlannedSetup>& setup, const std::optional<Eigen::Vector3d>& about_mm,
+              std::string& text) {
   const char* outcome = checked.has_errors() ? "ERRORS" : "passes";
   text += fmt::format("{}: {}\n", checked.path.string(), outcome);
   Json json = {{"file", checked.path.string()}, {"passes", !checked.has_errors()}, {"findings", Json::array()}};
@@ -133,6 +167,7 @@ Json describe(const CheckedRegistration& checked, const RegistrationMeaning& mea
         shift->translation_mm.x(), shift->translation_mm.y(), shift->translation_mm.z(),
         deg_from_rad(shift->change.z_rad), deg_from_rad(shift->change.x_rad), deg_from_rad(shift->change.y_rad));
     json["couch_at_imaging"] = json_of_couch(*setup);
+    if (about_mm) json["couch_shift_about"] = describe_about(*about_mm, *meaning.setup_error, *setup, text);
   }
   return json;
 }
@@ -173,15 +208,18 @@ int run_check(const CheckOptions& options, Console& console) {
     source_isocenter_mm = Eigen::Vector3d(options.source_isocenter.data());
     refuse_contradicting_isocenter(all, *source_isocenter_mm);
   }
+  std::optional<Eigen::Vector3d> about_mm;
+  if (!options.about.empty()) about_mm = Eigen::Vector3d(options.about.data());
   std::vector<RegistrationMeaning> meanings;
   Json json = {{"registrations", Json::array()}};
   std::string text;
   bool has_errors = false;
   for (CheckedRegistration& checked : all) {
     meanings.push_back(meaning_of(checked, setup, source_isocenter_mm));
-    json["registrations"].push_back(describe(checked, meanings.back(), setup, text));
+    json["registrations"].push_back(describe(checked, meanings.back(), setup, about_mm, text));
     has_errors = has_errors || checked.has_errors();
   }
+  if (!options.transform.empty()) write_transform(all.front(), options.transform);
   if (all.size() == 2) {
     const RegistrationComparison comparison = compare(all[0], meanings[0], all[1], meanings[1]);
     json["difference"] = describe(comparison, all[0].source_frame_uid == all[1].source_frame_uid, text);
@@ -228,9 +266,14 @@ void add_check_command(CLI::App& app, Console& console, int& exit_status) {
       ->add_option("--couch-roll", options->couch_roll_deg,
                    "Table top roll angle at imaging, IEC 61217; without this flag the angle is taken as 0, with a note")
       ->type_name("DEG");
+  add_source_isocenter_option(*command, options->source_isocenter);
   command
-      ->add_option("--source-isocenter", options->source_isocenter,
-                   "Machine's isocenter in the source frame of an object of another program, mm")
+      ->add_option("--tfm", options->transform,
+                   "Also write the matrix in ITK's format, for ITK, 3D Slicer and plastimatch; the file must not exist")
+      ->type_name("FILE");
+  command
+      ->add_option("--about", options->about,
+                   "Also print the couch shift of a system that turns about this point of the registered frame, mm")
       ->expected(3)
       ->delimiter(',')
       ->type_name("X,Y,Z");

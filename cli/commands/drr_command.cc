@@ -11,7 +11,7 @@
 #include "io/objects/drr_image.h"
 #include "io/objects/image_files.h"
 #include "io/report/view_picture.h"
-#include "workflow/register/truth.h"
+#include "workflow/register/start_pose.h"
 
 namespace isoshift {
 namespace {
@@ -20,7 +20,8 @@ struct DrrOptions {
   StudyOptions study;
   RenderingOptions rendering;
   std::filesystem::path output;
-  std::filesystem::path setup_error;  // empty: the planned pose
+  std::filesystem::path setup_error;     // empty: the planned pose
+  std::vector<double> source_isocenter;  // of a Spatial Registration in it
   bool dicom = false;
   bool overwrite = false;
 };
@@ -33,12 +34,13 @@ std::array<double, 2> pixel_size_mm(const XrayView& view) {
 
 void run_drr(const DrrOptions& options, Console& console) {
   OutputFolder output(options.output, options.overwrite);
-  const Eigen::Isometry3d setup_error =
-      options.setup_error.empty() ? Eigen::Isometry3d::Identity() : read_setup_error(options.setup_error);
   Notes notes;
   options.rendering.check();
   ConsoleObserver observer(console);
   const Study study = load(options.study, notes, observer);
+  const Eigen::Isometry3d setup_error =
+      options.setup_error.empty() ? Eigen::Isometry3d::Identity()
+                                  : read_start(options.setup_error, study, options.source_isocenter, notes).setup_error;
   const auto renderer = make_renderer(options.rendering.kind(), study.ct->hu, options.rendering.model(),
                                       beams_of(study), options.rendering.options());
   const std::array pose = {setup_error * study.planned_room_from_patient};
@@ -79,8 +81,12 @@ void add_drr_command(CLI::App& app, Console& console, int&) {
       "too.");
   add_study_options(*command, options->study);
   command->add_option("-o,--output", options->output, "Folder for the images")->required()->type_name("FOLDER");
-  command->add_option("--setup-error", options->setup_error, "result.json or truth.json: how the patient lies")
+  command
+      ->add_option("--setup-error", options->setup_error,
+                   "result.json, truth.json, a Spatial Registration of any program or an ITK transform (.tfm): how the "
+                   "patient lies")
       ->type_name("FILE");
+  add_source_isocenter_option(*command, options->source_isocenter);
   command->add_flag("--dicom", options->dicom, "Write DICOM RT Images (image type DRR), too");
   command->add_flag("--overwrite", options->overwrite, "Replace an earlier output in that folder");
   add_rendering_options(*command, options->rendering);

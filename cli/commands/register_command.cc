@@ -40,6 +40,8 @@ Eigen::Vector3d planned_target_patient_mm(const SetupResult& report) {
          report.target->center_room_mm;
 }
 
+}  // namespace
+
 int run_register(RegisterOptions options, const std::filesystem::path& truth_file, bool as_json, Console& console) {
   options.registration.settle();
   std::optional<Eigen::Isometry3d> truth;
@@ -63,8 +65,6 @@ int run_register(RegisterOptions options, const std::filesystem::path& truth_fil
   }
   return exit_status_of(report.verdict);
 }
-
-}  // namespace
 
 void add_result_options(CLI::App& command, RegisterOptions& options) {
   command
@@ -98,9 +98,10 @@ void add_result_options(CLI::App& command, RegisterOptions& options) {
 void add_start_option(CLI::App& command, RegisterOptions& options) {
   command
       .add_option("--start", options.start,
-                  "Begin at the setup error in this file instead of the planned pose: a result.json, truth.json, or a "
-                  "pose set by hand")
+                  "Begin at the setup error in this file instead of the planned pose: a result.json, truth.json, a "
+                  "pose set by hand, a Spatial Registration of any program, or an ITK transform (.tfm)")
       ->type_name("FILE");
+  add_source_isocenter_option(command, options.source_isocenter);
 }
 
 RegisterOptions register_options_from(const std::vector<std::string>& flags) {

@@ -7,6 +7,8 @@
 #include "base/error.h"
 #include "base/output_folder.h"
 #include "cli/commands/commands.h"
+#include "cli/commands/register_command.h"
+#include "cli/switches/study_switches.h"
 #include "io/report/formats.h"
 #include "io/report/result_folder.h"
 #include "workflow/register/setup_result_of.h"
@@ -15,8 +17,9 @@ namespace isoshift {
 namespace {
 
 struct ReportOptions {
-  std::filesystem::path result, output, site;
+  std::filesystem::path result, output, site, registration;
   std::string anatomy;
+  std::vector<double> source_isocenter;  // of the registration object
   bool overwrite = false;
 };
 
@@ -46,16 +49,44 @@ void run_report(const ReportOptions& options, Console& console) {
   console.out << text_report(report_page(report)) << fmt::format("\nWritten to {}\n", output.destination().string());
 }
 
+// A registration object over the X-rays of a study: the pose is judged and searched no further.
+int run_report_of_object(const ReportOptions& options, Console& console) {
+  if (options.output.empty()) throw UsageError("a report of a registration object needs a folder: -o FOLDER");
+  RegisterOptions request;
+  request.study.parts.study = options.result;
+  request.start = options.registration;
+  request.source_isocenter = options.source_isocenter;
+  request.registration.search.is_searched = false;
+  request.site = options.site;
+  request.anatomy = options.anatomy;
+  request.output = options.output;
+  request.overwrite = options.overwrite;
+  return run_register(request, {}, false, console);
+}
+
 }  // namespace
 
-void add_report_command(CLI::App& app, Console& console, int&) {
+void add_report_command(CLI::App& app, Console& console, int& exit_status) {
   auto options = std::make_shared<ReportOptions>();
-  CLI::App* command = app.add_subcommand("report", "Write the report of a stored result again, in all formats");
+  CLI::App* command = app.add_subcommand(
+      "report",
+      "Write the report of a stored result again, or of a registration object of any program, in all formats");
   command->footer(
       "\nExample:\n  isoshift report result/ --overwrite\n  isoshift report result/ --site linac3.json -o "
-      "result_linac3\n\n"
-      "Reads result.json and the pictures, and writes what register writes. Nothing is registered again.");
-  command->add_option("result", options->result, "Folder of a result")->required()->type_name("FOLDER");
+      "result_linac3\n"
+      "  isoshift report exported/ --reg theirs.dcm -o compared\n\n"
+      "Reads result.json and the pictures, and writes what register writes. Nothing is registered again.\n"
+      "With --reg the folder is that of a study, and the report shows the object's pose over the X-rays: what "
+      "register\n"
+      "--start FILE --no-search writes, which takes all flags of a study.");
+  command->add_option("result", options->result, "Folder of a result, with --reg that of a study")
+      ->required()
+      ->type_name("FOLDER");
+  auto* registration = command
+                           ->add_option("--reg", options->registration,
+                                        "Registration object of any program, whose pose is shown over the X-rays")
+                           ->type_name("FILE");
+  add_source_isocenter_option(*command, options->source_isocenter)->needs(registration);
   command->add_option("-o,--output", options->output, "Folder to write to [the folder of the result]")
       ->type_name("FOLDER");
   command->add_option("--site", options->site, "Site file to apply [the one that was applied before]")
@@ -65,7 +96,12 @@ void add_report_command(CLI::App& app, Console& console, int&) {
                    "Anatomy of the site file whose action level applies [the one that was applied before]")
       ->type_name("NAME");
   command->add_flag("--overwrite", options->overwrite, "Replace an earlier output in that folder");
-  command->callback([options, &console] { run_report(*options, console); });
+  command->callback([options, &console, &exit_status] {
+    if (options->registration.empty())
+      run_report(*options, console);
+    else
+      exit_status = run_report_of_object(*options, console);
+  });
 }
 
 }  // namespace isoshift

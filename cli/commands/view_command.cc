@@ -24,17 +24,20 @@ namespace isoshift {
 namespace {
 
 // The options that say what is shown, not how it is registered.
-const std::set<std::string> kOfTheView = {"study",  "ct",   "image", "plan", "structures",
-                                          "output", "port", "start", "help"};
+const std::set<std::string> kOfTheView = {
+    "study", "ct", "image", "plan", "structures", "output", "port", "start", "source-isocenter", "help"};
 
 void run_view(const RegisterOptions& options, std::uint16_t port, const std::vector<std::string>& typed,
               Console& console) {
   ConsoleObserver observer(console);
   const LiveStudy study(options.study, observer);
+  Notes notes;
   ManualRegistration registration({.parts = options.study.parts, .flags = typed}, options.output);
-  ManualScreen manual(
-      study, registration,
-      options.start.empty() ? Eigen::Isometry3d::Identity() : read_start(options.start, study.study()).setup_error);
+  ManualScreen manual(study, registration,
+                      options.start.empty()
+                          ? Eigen::Isometry3d::Identity()
+                          : read_start(options.start, study.study(), options.source_isocenter, notes).setup_error);
+  print_warnings(notes.warnings, console);
 
   const std::string user = system_user().name;
   ServeFile serve;

@@ -74,7 +74,7 @@ bool plan_fits(CheckedRegistration& checked, const RtPlan& plan) {
       "--patient-position HFS instead of --plan";
   bool fits = true;
   for (const Finding& finding :
-       patient_findings(checked.identity, plan.identity, plan.path.string(), checked.path.string())) {
+       patient_findings({&checked.identity, checked.path.string()}, {&plan.identity, plan.path.string()})) {
     checked.error(fmt::format("the couch shift is not known: {}. {}", finding.message, next));
     fits = false;
   }
@@ -220,6 +220,7 @@ RegistrationMeaning meaning_of(CheckedRegistration& checked, const std::optional
         deg_from_rad(turn_rad)));
     return meaning;
   }
+  meaning.setup_error = setup_error;
   meaning.couch_shift = couch_shift_for(setup_error, setup->table());
   return meaning;
 }
@@ -253,7 +254,8 @@ RegistrationComparison compare(const CheckedRegistration& first, const Registrat
   Identity patient = first.identity, other_patient = second.identity;
   const bool has_ids = !patient.patient_id.empty() && !other_patient.patient_id.empty();
   if (!has_ids) patient.patient_id = other_patient.patient_id = "not compared";
-  for (const Finding& finding : patient_findings(patient, other_patient, second.path.string(), first.path.string()))
+  for (const Finding& finding :
+       patient_findings({&patient, first.path.string()}, {&other_patient, second.path.string()}))
     return cannot(finding.message + ". Compare registrations of one patient only");
   const std::array meanings = {&first_meaning, &second_meaning};
   for (std::size_t n = 0; n < both.size(); ++n)

@@ -42,7 +42,9 @@ struct RegistrationMeaning {
   // The same if the matrix had been written the wrong way around.
   std::optional<Eigen::Isometry3d> inverse_from_isocenter;
   bool in_room_axes = false;  // that frame has the axes of the room, else those of the patient as set up on the couch
-  std::optional<CouchShift> couch_shift;  // where `setup` was given and nothing stands in the way
+  // Where `setup` was given and nothing stands in the way.
+  std::optional<Eigen::Isometry3d> setup_error;
+  std::optional<CouchShift> couch_shift;
 };
 
 // Adds findings: notes on what was assumed and on what prevents a number. If `setup` asks for the couch shift, what

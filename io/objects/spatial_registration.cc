@@ -208,7 +208,7 @@ std::string write_spatial_registration(const Study& study, const Eigen::Isometry
 
 DicomFile open_spatial_registration(const std::filesystem::path& path) {
   DicomFile file = DicomFile::read(path, DicomFile::Extent::kWhole);
-  const std::string sop_class = file.dataset().required_text(DCM_SOPClassUID);
+  const std::string sop_class = file.dataset().required_uid(DCM_SOPClassUID);
   if (sop_class == UID_DeformableSpatialRegistrationStorage)
     throw Error(
         fmt::format("{}: is a Deformable Spatial Registration, which maps the other way (PS3.3 C.20.3). Expected "
@@ -224,10 +224,10 @@ SpatialRegistration read_spatial_registration(const std::filesystem::path& path)
   const DicomFile file = open_spatial_registration(path);
   const DicomItem dataset = file.dataset();
   SpatialRegistration registration;
-  registration.sop_instance_uid = dataset.required_text(DCM_SOPInstanceUID);
-  registration.frame_of_reference_uid = dataset.required_text(DCM_FrameOfReferenceUID);
+  registration.sop_instance_uid = dataset.required_uid(DCM_SOPInstanceUID);
+  registration.frame_of_reference_uid = dataset.required_uid(DCM_FrameOfReferenceUID);
   for (const DicomItem& item : dataset.items(DCM_RegistrationSequence))
-    registration.items.push_back({.frame_of_reference_uid = item.required_text(DCM_FrameOfReferenceUID),
+    registration.items.push_back({.frame_of_reference_uid = item.required_uid(DCM_FrameOfReferenceUID),
                                   .registered_from_source = composed_matrix(item)});
   return registration;
 }

@@ -5,9 +5,12 @@
 #include <Eigen/Geometry>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <regex>
+#include <vector>
 
 #include "io/dicom/rt_plan.h"
 #include "tests/support/couch_by_hand.h"
+#include "tests/support/pose_near.h"
 #include "tests/support/small_study.h"
 #include "tests/support/testdata.h"
 
@@ -171,6 +174,45 @@ TEST_F(CheckCommandTest, CouchPitchAndRollAtImagingEnterTheShift) {
                shift_by_hand(set_up * treatment_from_ct.linear() * set_up.transpose(),
                              set_up * (treatment_from_ct * isocenter_), 10, 2, -1.5),
                1e-6);
+}
+
+// docs/console-shifts.md, whose tables are made without any code of isoshift: the shift about each of its points, and
+// by it anatomy that lay there comes back to where it was planned.
+TEST_F(CheckCommandTest, TheShiftAboutAnyPointIsThatOfTheDocument) {
+  std::ifstream page(ISOSHIFT_SOURCE_DIR "/docs/console-shifts.md");
+  const std::string text{std::istreambuf_iterator<char>(page), {}};
+  const std::string number = " *([-+.0-9]+) *";
+  const auto rows = [&](const std::string& pattern) {
+    const std::regex row(pattern);
+    return std::vector<std::smatch>(std::sregex_iterator(text.begin(), text.end(), row), std::sregex_iterator());
+  };
+  Eigen::Matrix4d matrix = Eigen::Matrix4d::Identity();
+  const auto of_matrix = rows("\n\\| +\\|" + number + "\\|" + number + "\\|" + number + "\\|" + number + "\\|");
+  ASSERT_EQ(of_matrix.size(), 3U);
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 4; ++j) matrix(i, j) = std::stod(of_matrix[i][j + 1]);
+
+  const Eigen::Vector3d isocenter(-12.5, 38.0, -410.0);
+  const std::string object = ours_from("1.2.3.4", matrix, "of_page.dcm", "isoshift");
+  const auto points = rows("\n\\| [^|]+\\| \\(" + number + "," + number + "," + number + "\\) \\|" + number + "\\|" +
+                           number + "\\|" + number + "\\|");
+  ASSERT_EQ(points.size(), 5U);
+  for (const std::smatch& point : points) {
+    const auto value = [&](int n) { return std::stod(point[n]); };
+    const Eigen::Vector3d place(value(1), value(2), value(3)), shift(value(4), value(5), value(6));
+    const CommandOutcome outcome =
+        run_command({"check", object, "--isocenter", "-12.5,38,-410", "--patient-position", "HFS", "--about",
+                     fmt::format("{},{},{}", place.x(), place.y(), place.z()), "--json"});
+    ASSERT_EQ(outcome.exit_status, 0) << outcome.err << outcome.out;
+    const auto about = checked(outcome)["couch_shift_about"];
+    EXPECT_NEAR(about["lateral_mm"].get<double>(), shift.x(), 0.06) << point[0];
+    EXPECT_NEAR(about["longitudinal_mm"].get<double>(), shift.y(), 0.06) << point[0];
+    EXPECT_NEAR(about["vertical_mm"].get<double>(), shift.z(), 0.06) << point[0];
+    const Eigen::Vector3d lies =
+        fixed_from_patient() * (Eigen::Affine3d(matrix).inverse() * place);  // in the room, from the isocenter
+    EXPECT_THAT(Eigen::Vector3d(lies + shift), VectorNear(fixed_from_patient() * (place - isocenter), 0.06))
+        << point[0];
+  }
 }
 
 TEST_F(CheckCommandTest, AnglesThatNobodySaidAreToldToBe0) {

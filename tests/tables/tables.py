@@ -11,6 +11,7 @@ import pathlib
 import sys
 
 import commission
+import console_shifts
 import evaluation
 import founding_paper
 import markdown
@@ -22,6 +23,7 @@ import scout
 # words is declared by its header.
 PAGES = {"docs/commands/commission.md": commission.TABLES,
          "docs/commands/scout.md": scout.TABLES,
+         "docs/console-shifts.md": console_shifts.TABLES,
          "docs/evaluation.md": evaluation.TABLES,
          "docs/founding-paper.md": founding_paper.TABLES,
          "docs/motion.md": motion.TABLES,

@@ -61,7 +61,7 @@ SetupResult register_study(const RegisterOptions& options, SharedWork& shared, O
     notes.warnings.push_back(fmt::format("{}; rendered on the CPU instead", *failure));
   const Study study = load(named, notes, observer, shared.cts);
   std::optional<Start> start;
-  if (!options.start.empty()) start = read_start(options.start, study);
+  if (!options.start.empty()) start = read_start(options.start, study, options.source_isocenter, notes);
   TargetChoice choice = target_of(study, {options.target, site ? site->target : ""});
   const Surrogate surrogate = surrogate_of(study, choice.target, site ? site->surrogate : "", shared.bodies);
   choice.target.surrogate = surrogate.words;

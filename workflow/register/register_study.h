@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "io/objects/spatial_registration.h"
 #include "setup/setup_result.h"
@@ -20,7 +21,8 @@ struct RegisterOptions {
   std::filesystem::path output;
   std::filesystem::path site;  // empty: no site file
   std::string anatomy;
-  std::filesystem::path start;  // a pose (start_pose.h); empty: the planned one
+  std::filesystem::path start;           // a pose (start_pose.h); empty: the planned one
+  std::vector<double> source_isocenter;  // of a Spatial Registration in it; empty: as it or the X-rays tell
   std::string target;  // the structure that the setup must bring right, or "isocenter"; empty: as target_of() finds it
   bool overwrite = false;
   bool write_reg_for_review = false;

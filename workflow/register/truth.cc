@@ -10,6 +10,7 @@
 
 #include "base/error.h"
 #include "base/json_file.h"
+#include "base/text_file.h"
 #include "geometry/rotation.h"
 #include "geometry/target_error.h"
 #include "workflow/register/setup_error_json.h"
@@ -19,6 +20,7 @@ namespace isoshift {
 namespace {
 
 nlohmann::json parsed(const std::filesystem::path& path) {
+  expect_no_pipe(path);
   std::ifstream file(path);
   if (!file) throw Error("cannot be opened");
   return nlohmann::json::parse(file);
