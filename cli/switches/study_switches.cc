@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <regex>
+
 namespace isoshift {
 namespace {
 
@@ -11,10 +13,24 @@ std::string allow_keys_help() {
   return help;
 }
 
+std::string is_date(const std::string& text) {
+  const bool is_one = std::regex_match(text, std::regex("[0-9]{4}-[0-9]{2}-[0-9]{2}"));
+  return is_one ? "" : fmt::format("{} is no date, expected one as 2026-03-01", text);
+}
+
 }  // namespace
 
 CLI::Option* add_allow_option(CLI::App& command, std::vector<std::string>& allow) {
   return command.add_option("--allow", allow, allow_keys_help())->type_name("KEY=REASON");
+}
+
+CLI::Option* add_source_isocenter_option(CLI::App& command, std::vector<double>& source_isocenter) {
+  return command
+      .add_option("--source-isocenter", source_isocenter,
+                  "Machine's isocenter in the source frame of a Spatial Registration of another program, mm")
+      ->expected(3)
+      ->delimiter(',')
+      ->type_name("X,Y,Z");
 }
 
 void add_study_options(CLI::App& command, StudyOptions& options) {
@@ -34,6 +50,21 @@ void add_study_options(CLI::App& command, StudyOptions& options) {
                   "RT Structure Set [the one that the plan refers to, or the only one drawn on the CT]")
       ->type_name("FILE")
       ->group(group);
+  const char* sessions = "Which session, where the folder holds several (isoshift inspect lists them)";
+  SessionChoice& session = options.parts.session;
+  command.add_option("--session", session.name, "The session with this name, or one that begins so")
+      ->type_name("NAME")
+      ->group(sessions);
+  command.add_option("--date", session.date, "The session of this day")
+      ->check(is_date)
+      ->type_name("YYYY-MM-DD")
+      ->group(sessions);
+  command.add_option("--fraction", session.fraction, "The session of this fraction, as the X-rays number it")
+      ->type_name("N")
+      ->group(sessions);
+  command.add_flag("--latest", session.is_latest, "The last session, or the last of those that fit")->group(sessions);
+  for (const char* choice : {"--session", "--date", "--fraction", "--latest"})
+    command.get_option(choice)->excludes("--image");
   add_study_switches(command, options);
 }
 

@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
+#include <cctype>
 #include <cmath>
 #include <iterator>
 #include <optional>
@@ -13,10 +15,17 @@
 namespace isoshift {
 namespace {
 
-// Empty components at the end of a name may be written or not (PS3.5 6.2.1.1).
-std::string without_trailing_carets(std::string name) {
+// Systems differ in capital letters, and in empty components at the end of a name (PS3.5 6.2.1.1).
+std::string comparable_name(std::string name) {
   name.erase(name.find_last_not_of("^ ") + 1);
+  std::ranges::transform(name, name.begin(), [](unsigned char c) { return std::toupper(c); });
   return name;
+}
+
+// Old systems write dots (PS3.5 6.2).
+std::string comparable_date(std::string date) {
+  std::erase(date, '.');
+  return date;
 }
 
 // What a table read-out says of two images; nothing where it is the same, or missing in one of them.
@@ -110,25 +119,39 @@ std::optional<Finding> time_span_doubt(std::span<const RtImage> images, double m
 
 }  // namespace
 
-std::vector<Finding> patient_findings(const Identity& reference, const Identity& other, const std::string& where,
-                                      const std::string& reference_name) {
-  std::vector<Finding> findings;
-  const auto differ = [&](const std::string Identity::* member, const DcmTagKey& tag, bool may_be_empty) {
-    const bool is_empty = (other.*member).empty() || (reference.*member).empty();
-    if (without_trailing_carets(other.*member) == without_trailing_carets(reference.*member) &&
-        (may_be_empty || !is_empty))
-      return;
-    if (may_be_empty && is_empty) return;
-    findings.push_back({"patient-mismatch",
-                        is_empty ? fmt::format("{}: {} is empty in this file or in {}: whose they are is unknown",
-                                               where, described(tag), reference_name)
-                                 : fmt::format("{}: {} differs from that of {}: the inputs are of different patients",
-                                               where, described(tag), reference_name)});
+std::vector<Finding> patient_findings(std::span<const PatientInput> inputs) {
+  struct Attribute {
+    std::string Identity::* member;
+    DcmTagKey tag;
+    std::string (*comparable)(std::string);
   };
-  differ(&Identity::patient_id, DCM_PatientID, false);
-  differ(&Identity::patient_id_issuer, DCM_IssuerOfPatientID, true);
-  differ(&Identity::patient_name, DCM_PatientName, true);
-  differ(&Identity::patient_birth_date, DCM_PatientBirthDate, true);
+  const auto as_it_is = [](std::string text) { return text; };
+  const std::array<Attribute, 4> attributes = {
+      {{&Identity::patient_id, DCM_PatientID, as_it_is},
+       {&Identity::patient_id_issuer, DCM_IssuerOfPatientID, as_it_is},
+       {&Identity::patient_name, DCM_PatientName, comparable_name},
+       {&Identity::patient_birth_date, DCM_PatientBirthDate, comparable_date}}};
+  std::vector<Finding> findings;
+  for (const Attribute& attribute : attributes) {
+    const auto value_of = [&](const PatientInput& input) {
+      return attribute.comparable(input.identity->*attribute.member);
+    };
+    const PatientInput* reference = nullptr;
+    for (const PatientInput& input : inputs) {
+      const std::string value = value_of(input);
+      if (value.empty()) {
+        if (attribute.tag == DCM_PatientID)
+          findings.push_back({"patient-mismatch", fmt::format("{}: {} is empty: whose it is is unknown", input.name,
+                                                              described(attribute.tag))});
+        continue;
+      }
+      if (reference == nullptr) reference = &input;
+      if (value != value_of(*reference))
+        findings.push_back(
+            {"patient-mismatch", fmt::format("{}: {} differs from that of {}: the inputs are of different patients",
+                                             input.name, described(attribute.tag), reference->name)});
+    }
+  }
   return findings;
 }
 
@@ -153,7 +176,7 @@ std::vector<Finding> session_findings(std::span<const RtImage> images, Notes& no
             if (apart_s <= kMaxTimeSpanS) return std::nullopt;
             return Finding{"time-span", fmt::format("{}: taken {:.0f} minutes from {}, expected at most 10 ({})\n"
                                                     "       Of several sessions isoshift batch registers each, and "
-                                                    "--image names the X-rays of one.",
+                                                    "--latest, --date, --fraction or --session chooses one.",
                                                     image.path.string(), apart_s / 60.0, first.path.string(),
                                                     described(DCM_AcquisitionTime))};
           });

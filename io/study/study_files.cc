@@ -12,8 +12,10 @@
 
 #include "base/error.h"
 #include "base/parallel.h"
+#include "base/sha256.h"
 #include "io/dicom/dicom_dataset.h"
 #include "io/dicom/rt_image.h"
+#include "io/study/session_choice.h"
 
 namespace isoshift {
 namespace {
@@ -21,7 +23,7 @@ namespace {
 namespace fs = std::filesystem;
 
 std::string first_reference(const DicomItem& dataset, const DcmTagKey& sequence) {
-  for (const DicomItem& item : dataset.items(sequence)) return item.text(DCM_ReferencedSOPInstanceUID).value_or("");
+  for (const DicomItem& item : dataset.items(sequence)) return item.uid(DCM_ReferencedSOPInstanceUID).value_or("");
   return "";
 }
 
@@ -34,9 +36,9 @@ DrawnOn drawn_on(const DicomItem& structures) {
   for (const DicomItem& frame : structures.items(DCM_ReferencedFrameOfReferenceSequence))
     for (const DicomItem& study : frame.items(DCM_RTReferencedStudySequence))
       for (const DicomItem& series : study.items(DCM_RTReferencedSeriesSequence)) {
-        if (const auto uid = series.text(DCM_SeriesInstanceUID)) drawn.series_uids.insert(*uid);
+        if (const auto uid = series.uid(DCM_SeriesInstanceUID)) drawn.series_uids.insert(*uid);
         for (const DicomItem& image : series.items(DCM_ContourImageSequence))
-          if (const auto uid = image.text(DCM_ReferencedSOPInstanceUID)) drawn.image_uids.insert(*uid);
+          if (const auto uid = image.uid(DCM_ReferencedSOPInstanceUID)) drawn.image_uids.insert(*uid);
       }
   return drawn;
 }
@@ -45,7 +47,7 @@ DrawnOn drawn_on(const DicomItem& structures) {
 std::set<std::string> drawn_in(const DicomItem& structures) {
   std::set<std::string> frame_uids;
   for (const DicomItem& roi : structures.items(DCM_StructureSetROISequence))
-    if (const auto uid = roi.text(DCM_ReferencedFrameOfReferenceUID)) frame_uids.insert(*uid);
+    if (const auto uid = roi.uid(DCM_ReferencedFrameOfReferenceUID)) frame_uids.insert(*uid);
   return frame_uids;
 }
 
@@ -72,16 +74,18 @@ std::optional<double> read_out(const DicomItem& dataset, const DcmTagKey& tag) {
 StudyFiles::Image xray(const fs::path& path, const DicomItem& dataset) {
   RtImage timed;
   read_acquisition_time(dataset, timed);
+  const std::optional<double> fraction = dataset.number(DCM_FractionNumber);
   return {.file = path,
           .patient = patient_of(dataset),
-          .sop_instance_uid = dataset.required_text(DCM_SOPInstanceUID),
+          .sop_instance_uid = dataset.required_uid(DCM_SOPInstanceUID),
           .plan_uid = first_reference(dataset, DCM_ReferencedRTPlanSequence),
           .label = dataset.text(DCM_RTImageLabel).value_or(""),
           .machine = dataset.text(DCM_RadiationMachineName).value_or(""),
           .at_s = acquisition_seconds(timed),
           .has_utc_offset = timed.utc_offset_min.has_value(),
           .acquired = acquired(timed),
-          .table = read_table_read_outs([&](const DcmTagKey& tag) { return read_out(dataset, tag); },
+          .fraction = fraction ? std::optional(static_cast<int>(*fraction)) : std::nullopt,
+          .table = read_table_read_outs([&](const TableReadOut& one) { return read_out(dataset, one.tag); },
                                         dataset.text(DCM_ReportedValuesOrigin))};
 }
 
@@ -92,11 +96,11 @@ void add_ct_slice(const fs::path& path, const DicomItem& dataset, StudyFiles& fi
     return;
   }
   files.cts.push_back({.patient = patient_of(dataset),
-                       .series_instance_uid = dataset.required_text(DCM_SeriesInstanceUID),
+                       .series_instance_uid = dataset.required_uid(DCM_SeriesInstanceUID),
                        .label = label_of(dataset, DCM_SeriesDescription, DCM_SeriesDate),
-                       .frame_of_reference_uid = dataset.text(DCM_FrameOfReferenceUID).value_or(""),
+                       .frame_of_reference_uid = dataset.uid(DCM_FrameOfReferenceUID).value_or(""),
                        .files = {path},
-                       .sop_instance_uids = {dataset.required_text(DCM_SOPInstanceUID)}});
+                       .sop_instance_uids = {dataset.required_uid(DCM_SOPInstanceUID)}});
 }
 
 bool is_other_xray(const std::string& sop_class) {
@@ -116,6 +120,24 @@ StudyFiles scan_readable(const std::vector<fs::path>& paths) {
   StudyFiles files = scan_study(paths);
   if (!files.unreadable.empty()) throw Error(files.unreadable.front());
   return files;
+}
+
+// Of copies of a plan the first is kept. Two plans of one UID that differ say two things of one patient.
+void drop_copies(std::vector<StudyFiles::Plan>& plans, Notes& notes) {
+  for (auto plan = plans.begin(); plan != plans.end();) {
+    const auto first = std::find_if(plans.begin(), plan, [&](const StudyFiles::Plan& other) {
+      return other.sop_instance_uid == plan->sop_instance_uid;
+    });
+    if (first == plan) {
+      ++plan;
+      continue;
+    }
+    if (sha256_of_file(first->file) != sha256_of_file(plan->file))
+      throw Error(fmt::format("{}: has the {} of {}, but other contents.\n       Name the plan: --plan FILE",
+                              plan->file.string(), described(DCM_SOPInstanceUID), first->file.string()));
+    notes.left_aside.push_back(fmt::format("{}: the same RT Plan as {}", plan->file.string(), first->file.string()));
+    plan = plans.erase(plan);
+  }
 }
 
 // The plan that all images with a reference refer to, or the only one there is; nothing if there is none.
@@ -233,6 +255,9 @@ StudyParts chosen(StudyFiles files, std::vector<StudyFiles::Plan> other_plans, c
 
   StudyParts parts;
   notes.left_aside = files.left_aside;
+  for (const fs::path& registration : files.registrations)
+    notes.left_aside.push_back(fmt::format("{}: a registration object", registration.string()));
+  drop_copies(files.plans, notes);
   const StudyFiles::Plan* plan = choose_plan(files, !named.plan.empty());
   const StudyFiles::Ct& ct = choose_ct(files, plan);
   parts.ct = ct.files;
@@ -255,13 +280,19 @@ StudyParts chosen(StudyFiles files, std::vector<StudyFiles::Plan> other_plans, c
     take_named_structures(named.structures, files.structures, parts, notes);
   else
     choose_structures(files.structures, plan, ct, parts, notes);
-  // An image of another plan that lies here too belongs to that one; an image of an unknown plan is a matter for
-  // checks.
+  // An image of another plan that lies here too belongs to that one. So may one of a plan that is not here, where two
+  // or more images are of the plan; else it is a matter for checks.
+  const auto of_plan =
+      plan == nullptr ? 0 : std::ranges::count(files.images, plan->sop_instance_uid, &StudyFiles::Image::plan_uid);
   for (const StudyFiles::Image& image : files.images) {
-    const bool of_other =
+    const bool is_of_other =
         std::ranges::find(other_plans, image.plan_uid, &StudyFiles::Plan::sop_instance_uid) != other_plans.end();
-    if (of_other && named.images.empty())
+    const bool is_stray = of_plan >= 2 && !image.plan_uid.empty() && image.plan_uid != plan->sop_instance_uid;
+    if (is_of_other && named.images.empty())
       notes.left_aside.push_back(fmt::format("{}: an X-ray of another plan", image.file.string()));
+    else if (is_stray && named.images.empty())
+      notes.left_aside.push_back(
+          fmt::format("{}: an X-ray of a plan that is not here ({})", image.file.string(), image.plan_uid));
     else
       parts.images.push_back(image.file);
   }
@@ -269,6 +300,22 @@ StudyParts chosen(StudyFiles files, std::vector<StudyFiles::Plan> other_plans, c
     throw Error(fmt::format("no X-ray found refers to {} ({}).\n       Name the X-rays: --image FILE",
                             parts.plan.string(), searched(named.images, named.study)));
   return parts;
+}
+
+// The X-rays of one session, and all other files of its patient.
+StudyFiles files_of_session(const SessionChoice& choice, StudyFiles files, bool takes_other_xrays,
+                            std::vector<std::string>& doubts) {
+  compare_copies(files);
+  const SessionFiles session = chosen_session(choice, sessions_of(files, takes_other_xrays));
+  doubts = session.doubts;
+  StudyFiles own = files_for(session, files);
+  own.registrations = files.registrations;
+  own.left_aside = files.left_aside;
+  for (const auto& images : {files.images, files.other_xrays})
+    for (const StudyFiles::Image& image : images)
+      if (std::ranges::find(session.images, image.file, &StudyFiles::Image::file) == session.images.end())
+        own.left_aside.push_back(fmt::format("{}: an X-ray of another session", image.file.string()));
+  return own;
 }
 
 }  // namespace
@@ -347,18 +394,20 @@ StudyFiles scan_file(const fs::path& path) {
   } else if (sop_class == UID_RTPlanStorage || sop_class == UID_RTIonPlanStorage) {
     files.plans.push_back({.file = path,
                            .patient = patient_of(dataset),
-                           .sop_instance_uid = dataset.required_text(DCM_SOPInstanceUID),
-                           .frame_of_reference_uid = dataset.text(DCM_FrameOfReferenceUID).value_or(""),
+                           .sop_instance_uid = dataset.required_uid(DCM_SOPInstanceUID),
+                           .frame_of_reference_uid = dataset.uid(DCM_FrameOfReferenceUID).value_or(""),
                            .structure_set_uid = first_reference(dataset, DCM_ReferencedStructureSetSequence),
                            .label = label_of(dataset, DCM_RTPlanLabel, DCM_RTPlanDate)});
   } else if (sop_class == UID_RTStructureSetStorage) {
     DrawnOn drawn = drawn_on(dataset);
     files.structures.push_back({.file = path,
                                 .patient = patient_of(dataset),
-                                .sop_instance_uid = dataset.required_text(DCM_SOPInstanceUID),
+                                .sop_instance_uid = dataset.required_uid(DCM_SOPInstanceUID),
                                 .ct_series_uids = std::move(drawn.series_uids),
                                 .ct_sop_instance_uids = std::move(drawn.image_uids),
                                 .frame_of_reference_uids = drawn_in(dataset)});
+  } else if (sop_class == UID_SpatialRegistrationStorage || sop_class == UID_DeformableSpatialRegistrationStorage) {
+    files.registrations.push_back(path);
   } else {
     files.left_aside.push_back(
         fmt::format("{}: {}", path.string(), dcmFindNameOfUID(sop_class.c_str(), "an object of unknown class")));
@@ -381,6 +430,7 @@ void merge(StudyFiles from, StudyFiles& files) {
   append(&StudyFiles::images);
   append(&StudyFiles::other_xrays);
   append(&StudyFiles::structures);
+  append(&StudyFiles::registrations);
   append(&StudyFiles::left_aside);
   append(&StudyFiles::unreadable);
 }
@@ -411,7 +461,11 @@ StudyParts find_parts(const StudyParts& named, bool takes_other_xrays, Notes& no
     std::swap(files.other_xrays, images.other_xrays);
   }
   if (!named.plan.empty()) std::swap(other_plans, files.plans), files.plans = scan_readable({named.plan}).plans;
-  return chosen(std::move(files), std::move(other_plans), named, takes_other_xrays, notes);
+  std::vector<std::string> doubts;
+  if (named.session.is_made()) files = files_of_session(named.session, std::move(files), takes_other_xrays, doubts);
+  StudyParts parts = chosen(std::move(files), std::move(other_plans), named, takes_other_xrays, notes);
+  parts.doubts = std::move(doubts);
+  return parts;
 }
 
 StudyParts choose_parts(const StudyFiles& files) {

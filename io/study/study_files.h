@@ -43,6 +43,7 @@ struct StudyFiles {
     std::optional<double> at_s;   // when it was acquired, since an epoch
     bool has_utc_offset = false;  // of at_s; else the time is local, and up to kLargestUtcOffsetS off
     std::string acquired;         // the same for people, "2026-03-01 10:15:00"; empty: unknown
+    std::optional<int> fraction;  // FractionNumber
     TableReadOuts table;
     std::filesystem::path other = {};  // a file with this SOPInstanceUID and other contents; empty: none
   };
@@ -60,8 +61,9 @@ struct StudyFiles {
   std::vector<Image> images;       // RT Images
   std::vector<Image> other_xrays;  // DX, CR, XA: their files do not contain the geometry
   std::vector<Structures> structures;
-  std::vector<std::string> left_aside;  // "FILE: reason"
-  std::vector<std::string> unreadable;  // messages on files that look like DICOM, or cannot be opened
+  std::vector<std::filesystem::path> registrations;  // Spatial Registration objects, also deformable ones
+  std::vector<std::string> left_aside;               // "FILE: reason"
+  std::vector<std::string> unreadable;               // messages on files that look like DICOM, or cannot be opened
 };
 
 // The PatientID, without the issuer, of a `patient` of StudyFiles.
@@ -86,10 +88,23 @@ StudyFiles scan_file(const std::filesystem::path& path);
 // Adds the files of `from` to `files`.
 void merge(StudyFiles from, StudyFiles& files);
 
+// Which session of X-rays is meant, where a folder holds several: that which has all that is told here. No value at
+// all: the folder holds one.
+struct SessionChoice {
+  std::string name;             // as SessionFiles has it, or its beginning
+  std::string date;             // "2026-03-01"
+  std::optional<int> fraction;  // FractionNumber of its X-rays
+  bool is_latest = false;       // of those that fit
+
+  bool is_made() const { return !name.empty() || !date.empty() || fraction || is_latest; }
+  bool operator==(const SessionChoice&) const = default;
+};
+
 // The files of one registration: the parts that a person or a manifest names, or the parts that were found. A path or a
 // list that is empty names nothing.
 struct StudyParts {
   std::filesystem::path study;  // folder in which the parts that are not named are searched for
+  SessionChoice session;        // among the X-rays of that folder
   std::vector<std::filesystem::path> ct, images;
   std::filesystem::path plan, structures;
   std::vector<std::string> doubts;  // why the images may not show one setup: then the result needs a person's review
@@ -101,7 +116,7 @@ struct StudyParts {
 // - the plan to which the images refer;
 // - the CT in the plan's frame of reference, and of several such CTs the one on which the plan's structure set was
 // drawn;
-// - the images of that plan;
+// - the images of that plan, and of the session that `named` chooses;
 // - the structure set to which the plan refers, or else the only structure set that was drawn on that CT.
 // All other files are left aside in the notes, with the reason. `takes_other_xrays`: a machine profile supplies the
 // geometry of X-rays that are not RT Images. Throws Error if there is no CT or no image, or if the files do not tell

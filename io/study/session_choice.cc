@@ -1,0 +1,80 @@
+#include "io/study/session_choice.h"
+
+#include <dcmtk/dcmdata/dcdeftag.h>
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <ranges>
+
+#include "base/error.h"
+#include "io/dicom/dicom_dataset.h"
+
+namespace isoshift {
+namespace {
+
+std::string date_of(const SessionFiles& session) {
+  constexpr std::size_t kDate = 10;  // 2026-03-01
+  return session.images.back().acquired.substr(0, kDate);
+}
+
+// Of all its X-rays; nothing where they differ or do not say.
+std::optional<int> fraction_of(const SessionFiles& session) {
+  const auto fraction = session.images.front().fraction;
+  const bool is_common =
+      std::ranges::all_of(session.images, [&](const auto& image) { return image.fraction == fraction; });
+  return is_common ? fraction : std::nullopt;
+}
+
+std::string as_asked(const SessionChoice& choice) {
+  std::vector<std::string> words;
+  if (!choice.name.empty()) words.push_back("named " + choice.name);
+  if (!choice.date.empty()) words.push_back("of " + choice.date);
+  if (choice.fraction) words.push_back(fmt::format("of fraction {}", *choice.fraction));
+  return fmt::format("{}", fmt::join(words, ", "));
+}
+
+}  // namespace
+
+std::vector<std::string> described(std::span<const SessionFiles> sessions) {
+  std::vector<std::string> lines;
+  for (const SessionFiles& session : sessions) {
+    const auto labels = session.images | std::views::transform([](const auto& image) {
+                          return image.label.empty() ? image.file.filename().string() : image.label;
+                        });
+    const std::string& acquired = session.images.front().acquired;
+    const auto fraction = fraction_of(session);
+    lines.push_back(fmt::format("session {}: {}{}, {}", session.name, acquired.empty() ? "time unknown" : acquired,
+                                fraction ? fmt::format(", fraction {}", *fraction) : "", fmt::join(labels, ", ")));
+  }
+  return lines;
+}
+
+SessionFiles chosen_session(const SessionChoice& choice, const std::vector<SessionFiles>& sessions) {
+  const auto fail = [&](const std::string& what) {
+    throw Error(fmt::format("{}. The sessions are:\n       {}", what, fmt::join(described(sessions), "\n       ")));
+  };
+  std::vector<SessionFiles> fitting;
+  for (const SessionFiles& session : sessions) {
+    if (!session.name.starts_with(choice.name)) continue;
+    if (!choice.date.empty() && date_of(session) != choice.date) continue;
+    if (choice.fraction && !fraction_of(session))
+      fail(fmt::format("{}: {} is missing or differs within the session, so that its fraction is not known",
+                       session.images.front().file.string(), isoshift::described(DCM_FractionNumber)));
+    if (choice.fraction && fraction_of(session) != choice.fraction) continue;
+    fitting.push_back(session);
+  }
+  if (fitting.empty()) fail(fmt::format("there is no session {}", as_asked(choice)));
+  if (!choice.is_latest && fitting.size() > 1)
+    fail(fmt::format("{} sessions are {}", fitting.size(), as_asked(choice)));
+  // The order of sessions is that of time within a patient.
+  const auto time_of = [](const SessionFiles& session) { return session.images.back().at_s; };
+  if (choice.is_latest && fitting.size() > 1)
+    for (const SessionFiles& session : fitting)
+      if (!time_of(session))
+        fail(fmt::format("{}: does not say when it was taken, so that the latest session is not known",
+                         session.images.front().file.string()));
+  return *std::ranges::max_element(fitting, {}, time_of);
+}
+
+}  // namespace isoshift

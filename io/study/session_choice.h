@@ -1,0 +1,20 @@
+#pragma once
+// Which of several sessions of X-rays in one folder a person means.
+
+#include <span>
+#include <string>
+#include <vector>
+
+#include "io/study/session_files.h"
+#include "io/study/study_files.h"
+
+namespace isoshift {
+
+// A line for each session: its name, when it was taken, its fraction where the X-rays say it, and their labels.
+std::vector<std::string> described(std::span<const SessionFiles> sessions);
+
+// The session that is meant. Throws Error that lists the sessions if none or several fit, and if a fraction is asked
+// for and X-rays that would fit otherwise do not tell theirs.
+SessionFiles chosen_session(const SessionChoice& choice, const std::vector<SessionFiles>& sessions);
+
+}  // namespace isoshift
