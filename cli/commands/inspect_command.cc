@@ -1,13 +1,19 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <functional>
 #include <memory>
 
 #include "base/error.h"
 #include "base/output_folder.h"
 #include "cli/commands/commands.h"
+#include "cli/commands/description.h"
 #include "cli/commands/inspect_bodies.h"
 #include "drr/gl/context.h"
+#include "geometry/rotation.h"
+#include "io/objects/registration_check.h"
+#include "io/objects/registration_meaning.h"
+#include "io/study/session_choice.h"
 #include "io/study/study.h"
 #include "registration/gpu_check.h"
 #include "workflow/register/rendering_options.h"
@@ -17,143 +23,170 @@
 namespace isoshift {
 namespace {
 
-std::string or_missing(const std::optional<double>& value, std::string_view unit) {
-  return value ? fmt::format("{:.6g} {}", *value, unit) : "missing";
+using Json = Description::Json;
+using Remark = Description::Remark;
+
+void remark_all(const std::vector<std::string>& texts, Remark remark, Description& description) {
+  for (const std::string& text : texts) description.remark(remark, text);
 }
-
-template <class Vector>
-std::string or_missing(const std::optional<Vector>& value, std::string_view unit) {
-  return value ? fmt::format("({:.6g}) {}", fmt::join(*value, ", "), unit) : "missing";
-}
-
-std::string or_missing(const std::optional<std::string>& value) { return value ? *value : "missing"; }
-
-// An angle that registration takes as 0 where no X-ray of the session has it.
-std::string or_taken_as_0(const std::optional<double>& angle_deg, std::string_view flag) {
-  return angle_deg ? or_missing(angle_deg, "deg") : fmt::format("missing, taken as 0 without {} DEG", flag);
-}
-
-std::string line(std::string_view name, std::string_view value) { return fmt::format("  {:<24} {}\n", name, value); }
 
 // The source and the panel's center in the room: what the angles and distances mean once put together.
-std::string geometry_as_understood(const RtImage& image) {
+void add_geometry_as_understood(const RtImage& image, Description& description) {
   Notes notes;
   const XrayView view = xray_view(image, Beam::kKilovoltage, notes);
-  const Ray center = view.ray(0.5 * (view.columns - 1), 0.5 * (view.rows - 1));
-  std::string text =
-      line("source, IEC fixed", fmt::format("({:.2f}) mm", fmt::join(view.source_room_mm, ", "))) +
-      line("panel center, IEC fixed", fmt::format("({:.2f}) mm", fmt::join(center.pixel_room_mm, ", "))) +
-      line("isocenter at pixel", fmt::format("({:.2f}) column, row; counted from 0",
-                                             fmt::join(view.project(Eigen::Vector3d::Zero()).value(), ", ")));
-  for (const std::string& warning : notes.warnings) text += line("note", warning);
-  return text;
+  const auto add = [&](std::string_view name, std::string_view key, const auto& point, std::string_view unit) {
+    description.show(name, key, json_value(point), fmt::format("({:.2f}) {}", fmt::join(point, ", "), unit));
+  };
+  add("source, IEC fixed", "source_room_mm", view.source_room_mm, "mm");
+  add("panel center, IEC fixed", "panel_center_room_mm",
+      view.ray(0.5 * (view.columns - 1), 0.5 * (view.rows - 1)).pixel_room_mm, "mm");
+  add("isocenter at pixel", "isocenter_column_row", view.project(Eigen::Vector3d::Zero()).value(),
+      "column, row; counted from 0");
+  remark_all(notes.warnings, Remark::kNote, description);
 }
 
-std::string describe_rt_image(RtImage image, const std::optional<std::string>& planned_position,
+// An angle that registration takes as 0 where no X-ray of the session has it.
+std::string taken_as_0(std::string_view flag) { return fmt::format("missing, taken as 0 without {} DEG", flag); }
+
+void add_attributes(const RtImage& image, Description& description) {
+  description.show("image type", "image_type", image.image_type, image.image_type);
+  description.show("pixels", "pixels", {image.columns, image.rows}, fmt::format("{} x {}", image.columns, image.rows));
+  description.add("values origin", "reported_values_origin", image.reported_values_origin);
+  description.add("SAD", "sad_mm", image.sad_mm, "mm");
+  description.add("SID", "sid_mm", image.sid_mm, "mm");
+  description.add("gantry angle", "gantry_angle_deg", image.gantry_angle_deg, "deg");
+  description.add("couch angle", "couch_angle_deg", image.table.support_angle_deg, "deg");
+  description.add("couch pitch", "couch_pitch_deg", image.table.pitch_deg, "deg", taken_as_0("--couch-pitch"));
+  description.add("couch roll", "couch_roll_deg", image.table.roll_deg, "deg", taken_as_0("--couch-roll"));
+  description.add("receptor translation", "receptor_translation_mm", image.receptor_translation_mm, "mm");
+  description.add("receptor angle", "receptor_angle_deg", image.receptor_angle_deg, "deg");
+  description.add("pixel spacing", "pixel_spacing_mm", image.pixel_spacing_mm, "mm, rows then columns");
+  description.add("RT Image Position", "rt_image_position_mm", image.position_mm, "mm");
+  description.add("collimator angle", "collimator_angle_deg", image.collimator_angle_deg, "deg");
+  description.show("jaws and leaves", "jaws_and_leaves", described(image.jaws), described(image.jaws));
+  description.add("patient position", "patient_position", image.patient_position);
+  description.add("intensity", "intensity_relationship", image.intensity_relationship);
+  description.show("intensity sign", "intensity_sign", image.intensity_sign ? Json(*image.intensity_sign) : Json(),
+                   image.intensity_sign ? fmt::format("{:+}", *image.intensity_sign) : "missing");
+  description.add("KVP", "kvp", image.kvp, "kV");
+  description.add("frame of reference", "frame_of_reference_uid", image.frame_of_reference_uid);
+  description.add("isocenter in that frame", "isocenter_mm", image.isocenter_mm, "mm");
+  description.add("acquisition date", "acquisition_date", image.acquisition_date);
+  description.add("acquisition time", "acquisition_time", image.acquisition_time);
+}
+
+Description describe_rt_image(RtImage image, const std::optional<std::string>& planned_position,
                               const std::optional<MachineProfile>& machine) {
   Notes applied;
   if (machine) image = with_machine(image, *machine, {}, applied);
   if (!image.patient_position) image.patient_position = planned_position;
-  std::string text =
-      fmt::format("{} \"{}\", {}\n", image.is_rt_image() ? "RT Image" : "X-ray", image.label, image.path.string());
-  text +=
-      line("image type", image.image_type) + line("pixels", fmt::format("{} x {}", image.columns, image.rows)) +
-      line("values origin", or_missing(image.reported_values_origin)) +
-      line("SAD, SID", or_missing(image.sad_mm, "mm") + ", " + or_missing(image.sid_mm, "mm")) +
-      line("gantry angle", or_missing(image.gantry_angle_deg, "deg")) +
-      line("couch angle", or_missing(image.table.support_angle_deg, "deg")) +
-      line("couch pitch", or_taken_as_0(image.table.pitch_deg, "--couch-pitch")) +
-      line("couch roll", or_taken_as_0(image.table.roll_deg, "--couch-roll")) +
-      line("receptor translation", or_missing(image.receptor_translation_mm, "mm")) +
-      line("receptor angle", or_missing(image.receptor_angle_deg, "deg")) +
-      line("pixel spacing", or_missing(image.pixel_spacing_mm, "mm, rows then columns")) +
-      line("RT Image Position", or_missing(image.position_mm, "mm")) +
-      line("collimator angle", or_missing(image.collimator_angle_deg, "deg")) +
-      line("jaws and leaves", described(image.jaws)) + line("patient position", or_missing(image.patient_position)) +
-      line("intensity",
-           or_missing(image.intensity_relationship) + ", sign " +
-               (image.intensity_sign ? fmt::format("{:+}", *image.intensity_sign) : std::string("missing"))) +
-      line("KVP", or_missing(image.kvp, "kV")) + line("frame of reference", or_missing(image.frame_of_reference_uid)) +
-      line("isocenter in that frame", or_missing(image.isocenter_mm, "mm")) +
-      line("acquired", or_missing(image.acquisition_date) + " " + or_missing(image.acquisition_time));
-  for (const std::string& applied_override : applied.overrides) text += line("profile", applied_override);
+  Description description(image.is_rt_image() ? "RT Image" : "X-ray", image.label, image.path.string());
+  add_attributes(image, description);
+  remark_all(applied.overrides, Remark::kProfile, description);
   if (image.imager && !image.imager->is_corrected)
-    text += line("profile", "the imager's errors are not corrected; they widen the uncertainty of every registration");
-  for (const std::string& problem : image.jaws.problems) text += line("note", problem);
-  const auto missing = missing_attributes(image);
-  for (const MissingAttribute& attribute : missing)
-    text += line("MISSING", fmt::format("{}; {}", described(attribute.tag),
-                                        attribute.supplied_by.empty() ? "no switch supplies it"
-                                                                      : "supplied by " + attribute.supplied_by));
+    description.remark(Remark::kProfile,
+                       "the imager's errors are not corrected; they widen the uncertainty of every registration");
+  remark_all(image.jaws.problems, Remark::kNote, description);
+  for (const MissingAttribute& attribute : missing_attributes(image))
+    description.remark(
+        Remark::kMissing,
+        fmt::format("{}{}; {}", described(attribute.tag), attribute.found.empty() ? "" : " " + attribute.problem(),
+                    attribute.supplied_by.empty() ? "no switch supplies it" : "supplied by " + attribute.supplied_by));
   // What stands in the way is told, not thrown: inspecting is for files that registration refuses, too.
   try {
     for (const Finding& finding : rt_image_findings(image))
-      text += line("CHECK", fmt::format("{}; allowed by --allow {}=REASON", finding.message, finding.key));
+      description.remark(Remark::kCheck, fmt::format("{}; allowed by --allow {}=REASON", finding.message, finding.key));
     const bool has_geometry = image.pixel_from_room || (image.plane && image.pixel_spacing_mm && image.position_mm &&
                                                         image.sad_mm && image.sid_mm && image.gantry_angle_deg);
-    if (has_geometry) text += geometry_as_understood(image);
+    if (has_geometry) add_geometry_as_understood(image, description);
   } catch (const Error& error) {
-    text += line("REFUSED", error.what());
+    description.remark(Remark::kRefused, error.what());
   }
-  return text + "\n";
+  return description;
 }
 
-std::string describe_plan(const std::filesystem::path& path) {
-  const RtPlan plan = read_rt_plan(path);
-  std::string text = fmt::format("RT Plan \"{}\", {}\n", plan.label, path.string()) +
-                     line("approval", plan.approval_status.empty() ? "missing" : plan.approval_status) +
-                     line("frame of reference", or_missing(plan.frame_of_reference_uid));
+Description describe_plan(const RtPlan& plan) {
+  Description description("RT Plan", plan.label, plan.path.string());
+  description.show("approval", "approval_status", plan.approval_status,
+                   plan.approval_status.empty() ? "missing" : plan.approval_status);
+  description.add("frame of reference", "frame_of_reference_uid", plan.frame_of_reference_uid);
   for (const RtPlan::Beam& beam : plan.beams)
-    text += line(fmt::format("beam {} \"{}\"", beam.number, beam.name),
-                 fmt::format("isocenter {}, {}, couch {}; jaws and leaves {}",
-                             or_missing(beam.isocenter_patient_mm, "mm"), or_missing(beam.patient_position),
-                             or_missing(beam.support_angle_deg, "deg"), described(beam.jaws)));
-  for (const RtPlan::Beam& beam : plan.beams)
-    for (const std::string& problem : beam.jaws.problems) text += line("note", problem);
-  return text + "\n";
+    description.append(fmt::format("beam {} \"{}\"", beam.number, beam.name), "beams",
+                       {{"number", beam.number},
+                        {"name", beam.name},
+                        {"isocenter_mm", json_value(beam.isocenter_patient_mm)},
+                        {"patient_position", json_value(beam.patient_position)},
+                        {"couch_angle_deg", json_value(beam.support_angle_deg)},
+                        {"jaws_and_leaves", described(beam.jaws)}},
+                       fmt::format("isocenter {}, {}, couch {}; jaws and leaves {}",
+                                   or_missing(beam.isocenter_patient_mm, "mm"), or_missing(beam.patient_position),
+                                   or_missing(beam.support_angle_deg, "deg"), described(beam.jaws)));
+  for (const RtPlan::Beam& beam : plan.beams) remark_all(beam.jaws.problems, Remark::kNote, description);
+  return description;
 }
 
-std::string describe_structures(const std::filesystem::path& path) {
-  try {
-    const RtStructures read = read_rt_structures(path);
-    std::string text = fmt::format("RT Structure Set \"{}\", {}\n", read.label, path.string());
-    for (const Structure& structure : read.structures)
-      text += line(fmt::format("structure {} \"{}\"", structure.number, structure.name),
-                   fmt::format("{}, {} closed contours{}",
-                               structure.interpreted_type.empty() ? "type missing" : structure.interpreted_type,
-                               structure.contours.size(),
-                               structure.ignored_contours == 0
-                                   ? ""
-                                   : fmt::format(", {} that {} nothing", structure.ignored_contours,
-                                                 structure.ignored_contours == 1 ? "encloses" : "enclose")));
-    return text + "\n";
-  } catch (const Error& error) {
-    return fmt::format("RT Structure Set, {}\n", path.string()) + line("REFUSED", error.what()) + "\n";
+Description describe_structures(const std::filesystem::path& path) {
+  const RtStructures read = read_rt_structures(path);
+  Description description("RT Structure Set", read.label, path.string());
+  for (const Structure& structure : read.structures) {
+    const std::string ignored = structure.ignored_contours == 0
+                                    ? ""
+                                    : fmt::format(", {} that {} nothing", structure.ignored_contours,
+                                                  structure.ignored_contours == 1 ? "encloses" : "enclose");
+    description.append(fmt::format("structure {} \"{}\"", structure.number, structure.name), "structures",
+                       {{"number", structure.number},
+                        {"name", structure.name},
+                        {"interpreted_type", structure.interpreted_type},
+                        {"closed_contours", structure.contours.size()},
+                        {"ignored_contours", structure.ignored_contours}},
+                       fmt::format("{}, {} closed contours{}",
+                                   structure.interpreted_type.empty() ? "type missing" : structure.interpreted_type,
+                                   structure.contours.size(), ignored));
   }
+  return description;
 }
 
-std::string describe_ct(const std::string& series_uid, const std::vector<std::filesystem::path>& files,
-                        Console& console) {
-  std::string text = fmt::format("CT series {}\n", series_uid) +
-                     line("slices", fmt::format("{}, from {}", files.size(), files.front().parent_path().string()));
+Description describe_ct(const StudyFiles::Ct& found, Console& console) {
+  const std::string folder = found.files.front().parent_path().string();
+  Description description("CT series", "", found.series_instance_uid);
+  description.show("slices", "slices", found.files.size(), fmt::format("{}, from {}", found.files.size(), folder));
   Notes notes;
   try {
     ProgressBar bar(console, "Reading CT");
-    const CtSeries ct = read_ct_series(files, {{"gaps", "inspection"}}, notes,
+    const CtSeries ct = read_ct_series(found.files, {{"gaps", "inspection"}}, notes,
                                        [&](std::size_t done, std::size_t total) { bar.update(done, total); });
     const Eigen::Vector3d first = ct.hu.patient_from_voxel.translation();
     const Eigen::Vector3d last = ct.hu.patient_from_voxel * Eigen::Vector3d((ct.hu.size.array() - 1).cast<double>());
-    text += line("voxels", fmt::format("{}, spacing ({:.4g}) mm", fmt::join(ct.hu.size, " x "),
-                                       fmt::join(ct.hu.spacing_mm(), ", "))) +
-            line("first voxel, patient", fmt::format("({:.2f}) mm", fmt::join(first, ", "))) +
-            line("last voxel, patient", fmt::format("({:.2f}) mm", fmt::join(last, ", "))) +
-            line("frame of reference", ct.frame_of_reference_uid);
+    description.show(
+        "voxels", "voxels", std::vector<int>(ct.hu.size.begin(), ct.hu.size.end()),
+        fmt::format("{}, spacing ({:.4g}) mm", fmt::join(ct.hu.size, " x "), fmt::join(ct.hu.spacing_mm(), ", ")));
+    description.show("first voxel, patient", "first_voxel_mm", json_value(first),
+                     fmt::format("({:.2f}) mm", fmt::join(first, ", ")));
+    description.show("last voxel, patient", "last_voxel_mm", json_value(last),
+                     fmt::format("({:.2f}) mm", fmt::join(last, ", ")));
+    description.show("frame of reference", "frame_of_reference_uid", ct.frame_of_reference_uid,
+                     ct.frame_of_reference_uid);
   } catch (const Error& error) {
-    text += line("REFUSED", error.what());
+    description.remark(Remark::kRefused, error.what());
   }
-  for (const std::string& note : notes.overrides) text += line("CHECK", note);
-  for (const std::string& note : notes.warnings) text += line("note", note);
-  return text + "\n";
+  remark_all(notes.overrides, Remark::kCheck, description);
+  remark_all(notes.warnings, Remark::kNote, description);
+  return description;
+}
+
+Description describe_registration(const std::filesystem::path& path) {
+  const CheckedRegistration checked = check_registration(path);
+  Description description("Spatial Registration", "", path.string());
+  description.show("takes the frame", "source_frame_uid", checked.source_frame_uid, checked.source_frame_uid);
+  description.show("to the frame", "registered_frame_uid", checked.registered_frame_uid, checked.registered_frame_uid);
+  if (const auto matrix = rigid_of(checked)) {
+    const double angle_deg = deg_from_rad(Eigen::AngleAxisd(matrix->linear()).angle());
+    description.add("with its origin at", "origin_mm", std::optional<Eigen::Vector3d>(matrix->translation()), "mm");
+    description.add("turned by", "rotation_deg", std::optional(angle_deg), "deg");
+  }
+  for (const RegistrationFinding& finding : checked.findings)
+    description.remark(finding.is_error ? Remark::kCheck : Remark::kNote, finding.text);
+  return description;
 }
 
 // The bodies of every CT: a picture each, and a table.
@@ -185,30 +218,95 @@ void run_inspect_bodies(const std::vector<std::filesystem::path>& paths, const s
   console.out << listing;
 }
 
-void run_inspect(const std::vector<std::filesystem::path>& paths, const std::optional<MachineProfile>& machine,
-                 Console& console) {
-  const StudyFiles files = scan_study(paths);
-  std::optional<std::string> planned_position;
-  for (const StudyFiles::Plan& found : files.plans) {
-    console.out << describe_plan(found.file);
-    const RtPlan plan = read_rt_plan(found.file);
-    planned_position = common_patient_position(plan, plan.beams);
+// What is said of each file: at once to people, in the end to programs.
+class Inspection {
+ public:
+  Inspection(bool as_json, Console& console) : as_json_(as_json), console_(console) {}
+
+  void tell(const Description& description) {
+    refused_ += description.is_refused() ? 1 : 0;
+    if (as_json_)
+      files_.push_back(description.json());
+    else
+      console_.out << description.text() << "\n";
   }
-  for (const StudyFiles::Ct& ct : files.cts) console.out << describe_ct(ct.series_instance_uid, ct.files, console);
-  for (const auto& images : {files.images, files.other_xrays})
-    for (const StudyFiles::Image& file : images) {
-      Notes notes;
-      for (const RtImage& image : read_rt_images(file.file, notes))
-        console.out << describe_rt_image(image, planned_position, machine);
-      for (const std::string& warning : notes.warnings) console.out << "note: " << warning << "\n";
+
+  // What cannot be read is refused, and the next file is looked at.
+  void tell(std::string_view kind, const std::filesystem::path& file,
+            const std::function<std::vector<Description>()>& describe) {
+    try {
+      for (const Description& description : describe()) tell(description);
+    } catch (const Error& error) {
+      Description description(kind, "", file.string());
+      description.remark(Remark::kRefused, error.what());
+      tell(description);
     }
-  for (const auto& structures : files.structures) console.out << describe_structures(structures.file);
-  for (const std::string& file : files.left_aside) console.out << "left aside: " << file << "\n";
-  for (const std::string& reason : files.unreadable) console.out << "unreadable: " << reason << "\n";
-  if (!files.unreadable.empty())
-    throw Error(fmt::format("{} of the files cannot be read; see above", files.unreadable.size()));
+  }
+
+  // And how the X-rays are grouped, so that a person can choose.
+  void tell_others(const StudyFiles& files, bool takes_other_xrays) {
+    const std::vector<SessionFiles> sessions = sessions_of(files, takes_other_xrays);
+    const std::vector<std::string> lines = described(sessions);
+    if (!as_json_ && lines.size() > 1) console_.out << fmt::format("{}\n\n", fmt::join(lines, "\n"));
+    for (const std::string& file : files.left_aside)
+      if (!as_json_) console_.out << "left aside: " << file << "\n";
+    for (const std::string& reason : files.unreadable)
+      if (!as_json_) console_.out << "unreadable: " << reason << "\n";
+    if (as_json_)
+      console_.out << Json{{"files", files_},
+                           {"sessions", lines},
+                           {"left_aside", files.left_aside},
+                           {"unreadable", files.unreadable}}
+                          .dump(2, ' ', false, Json::error_handler_t::replace)
+                   << "\n";
+  }
+
+  std::size_t refused() const { return refused_; }
+
+ private:
+  bool as_json_;
+  Console& console_;
+  Json files_ = Json::array();
+  std::size_t refused_ = 0;
+};
+
+std::vector<Description> describe_rt_images(const std::filesystem::path& file,
+                                            const std::optional<std::string>& planned_position,
+                                            const std::optional<MachineProfile>& machine) {
+  Notes notes;
+  std::vector<Description> frames;
+  for (const RtImage& image : read_rt_images(file, notes))
+    frames.push_back(describe_rt_image(image, planned_position, machine));
+  for (Description& frame : frames) remark_all(notes.warnings, Remark::kNote, frame);
+  return frames;
+}
+
+void run_inspect(const std::vector<std::filesystem::path>& paths, const std::optional<MachineProfile>& machine,
+                 bool as_json, Console& console) {
+  const StudyFiles files = scan_study(paths);
+  Inspection inspection(as_json, console);
+  std::optional<std::string> planned_position;
+  for (const StudyFiles::Plan& found : files.plans)
+    inspection.tell("RT Plan", found.file, [&]() -> std::vector<Description> {
+      const RtPlan plan = read_rt_plan(found.file);
+      planned_position = common_patient_position(plan, plan.beams);
+      return {describe_plan(plan)};
+    });
+  for (const StudyFiles::Ct& ct : files.cts) inspection.tell(describe_ct(ct, console));
+  for (const auto& images : {files.images, files.other_xrays})
+    for (const StudyFiles::Image& image : images)
+      inspection.tell("X-ray", image.file, [&] { return describe_rt_images(image.file, planned_position, machine); });
+  for (const StudyFiles::Structures& structures : files.structures)
+    inspection.tell("RT Structure Set", structures.file,
+                    [&]() -> std::vector<Description> { return {describe_structures(structures.file)}; });
+  for (const std::filesystem::path& registration : files.registrations)
+    inspection.tell("Spatial Registration", registration,
+                    [&]() -> std::vector<Description> { return {describe_registration(registration)}; });
+  inspection.tell_others(files, machine.has_value());
+  if (const std::size_t refused = inspection.refused() + files.unreadable.size(); refused > 0)
+    throw Error(fmt::format("{} of the files cannot be read or used; see above", refused));
   if (files.cts.empty() && files.images.empty() && files.other_xrays.empty() && files.plans.empty() &&
-      files.structures.empty())
+      files.structures.empty() && files.registrations.empty())
     throw Error(fmt::format("{}: holds nothing that isoshift can read", paths.front().string()));
 }
 
@@ -248,13 +346,14 @@ void add_inspect_command(CLI::App& app, Console& console, int&) {
   struct Options {
     std::vector<std::filesystem::path> paths;
     std::filesystem::path machine, machine_key, bodies;
-    bool devices = false, overwrite = false;
+    bool devices = false, overwrite = false, as_json = false;
   };
   auto options = std::make_shared<Options>();
   CLI::App* command = app.add_subcommand(
       "inspect", "Show what files contain, how their geometry is understood, and every missing attribute");
   command->footer(
-      "\nExample:\n  isoshift inspect exported/\n  isoshift inspect RTIMAGE/KV_AP.dcm\n  isoshift inspect exported/ "
+      "\nExample:\n  isoshift inspect exported/\n  isoshift inspect RTIMAGE/KV_AP.dcm --json\n  isoshift inspect "
+      "exported/ "
       "--bodies "
       "bodies\n  isoshift inspect --devices");
   auto* paths = command->add_option("path", options->paths, "Files or folders")->type_name("PATH");
@@ -266,16 +365,19 @@ void add_inspect_command(CLI::App& app, Console& console, int&) {
                      ->add_option("--bodies", options->bodies,
                                   "Find the rigid bodies that the CT shows, draw and list them in this folder")
                      ->type_name("FOLDER");
+  auto* json = command->add_flag("--json", options->as_json, "Print JSON instead of text");
   command->add_flag("--overwrite", options->overwrite, "Replace an earlier output in that folder")->needs(bodies);
   auto* devices = command->add_flag("--devices", options->devices, "List the devices that can render");
   command->require_option(1, 0);
   paths->excludes(devices);
   bodies->needs(paths);
+  json->needs(paths)->excludes(bodies);
   command->callback([options, &console] {
     if (!options->bodies.empty())
       return run_inspect_bodies(options->paths, options->bodies, options->overwrite, console);
     if (!options->devices)
-      return run_inspect(options->paths, named_machine(options->machine, options->machine_key), console);
+      return run_inspect(options->paths, named_machine(options->machine, options->machine_key), options->as_json,
+                         console);
     run_inspect_devices(console);
   });
 }

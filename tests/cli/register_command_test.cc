@@ -471,7 +471,7 @@ TEST_F(RegisterCommandTest, InspectSaysWhyStructuresAreRefused) {
   draw(study_, {{"Spine", {rectangle({0, 40, -400}, 20, 20)}}});
   edit(study_.structures(), [](DicomItem d) { d.erase(DCM_StructureSetROISequence); });
   const CommandOutcome outcome = run_command({"inspect", study_.structures().string()});
-  EXPECT_EQ(outcome.exit_status, 0) << outcome.err;
+  EXPECT_EQ(outcome.exit_status, 1);
   EXPECT_THAT(outcome.out, HasSubstr("  REFUSED                  " + study_.structures().string() +
                                      ": ROIContourSequence (3006,0039) item 1: ReferencedROINumber (3006,0084) is 1"));
 }
