@@ -1,5 +1,8 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <poll.h>
+#include <signal.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <exception>
@@ -90,6 +93,20 @@ void check_command(const CLI::App& app, std::span<const char* const> words) {
     throw UsageError(fmt::format("{} belongs behind the command: isoshift {} ... {}", first, *command, first));
 }
 
+// Whoever read the output has had enough of it (isoshift ... | head).
+bool is_reader_gone() {
+  pollfd output{.fd = STDOUT_FILENO, .events = POLLOUT, .revents = 0};
+  return ::poll(&output, 1, 0) > 0 && (output.revents & POLLERR) != 0;
+}
+
+int after_printing(int exit_status, Console& console) {
+  if (console.out.flush()) return exit_status;
+  if (is_reader_gone()) return 128 + SIGPIPE;
+  console.err
+      << "error: standard output cannot be written to (is the disk full?): not all that was printed is there\n";
+  return kExitFailed;
+}
+
 }  // namespace
 
 void write_manual(const std::filesystem::path& folder) {
@@ -109,7 +126,10 @@ int run_isoshift(int argc, const char* const* argv, Console& console) {
     check_command(app, std::span(argv, static_cast<std::size_t>(argc)).subspan(1));
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
-    if (error.get_exit_code() == 0) return app.exit(error, console.out, console.err);
+    if (error.get_exit_code() == 0) {  // the help, or the version
+      app.exit(error, console.out, console.err);
+      return after_printing(kExitAccepted, console);
+    }
     console.err << "error: " << printable_lines(error.what())
                 << "\n       isoshift COMMAND --help explains the flags\n";
     return kExitUsage;
@@ -121,12 +141,7 @@ int run_isoshift(int argc, const char* const* argv, Console& console) {
   } catch (const std::exception& error) {
     return say(console, error, kExitFailed);
   }
-  if (!console.out.flush()) {
-    console.err
-        << "error: standard output cannot be written to (is the disk full?): not all that was printed is there\n";
-    return kExitFailed;
-  }
-  return exit_status;
+  return after_printing(exit_status, console);
 }
 
 }  // namespace isoshift

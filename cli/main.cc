@@ -1,4 +1,5 @@
 #include <signal.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <iostream>
@@ -27,6 +28,7 @@ void end_cleanly_on_signals() {
   sigaction(SIGHUP, nullptr, &hang_up);
   if (hang_up.sa_handler != SIG_IGN) sigaddset(&signals, SIGHUP);
   pthread_sigmask(SIG_BLOCK, &signals, nullptr);  // inherited by every thread made later
+  ::signal(SIGPIPE, SIG_IGN);  // who writes to a pipe, or to a peer that went away, reports that
   std::thread([] {
     int signal = 0;
     do {
@@ -37,9 +39,16 @@ void end_cleanly_on_signals() {
   }).detach();
 }
 
+// Whatever is written is of patients: at most its owner's group may read it, however it is written.
+void keep_from_strangers() {
+  constexpr mode_t kWithheld = S_IWGRP | S_IRWXO;
+  ::umask(::umask(kWithheld) | kWithheld);
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
+  keep_from_strangers();
   // Not commands for people: what this program runs as its child, and the manual that the build makes.
   const std::string_view hidden = argc == 3 ? argv[1] : "", role = argc == 3 ? argv[2] : "";
   if (hidden == "__manual") return isoshift::write_manual(argv[2]), 0;

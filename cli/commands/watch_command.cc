@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <csignal>
 #include <memory>
 
 #include "base/error.h"
@@ -44,7 +43,6 @@ void run_watch(const std::filesystem::path& file, Console& console) {
   const WatchFile watch = read_watch_file(file);
   const RegisterOptions flags = checked_registration_flags(watch);
   const GracefulEnd end;
-  std::signal(SIGPIPE, SIG_IGN);  // if a peer or a server closes a connection, the function that uses it reports that
   SystemClock clock;
   const auto server = watch.orthanc ? std::make_unique<RestOrthanc>(*watch.orthanc) : nullptr;
   const auto source = source_of(watch, server.get(), clock);

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include "drr/gl/context.h"
 #include "io/objects/spatial_registration.h"
@@ -95,10 +96,21 @@ TEST_F(SilentFailures, TheRegistrationObjectGivesThePoseOnTheWayBackAndNotItsInv
 }
 
 TEST_F(SilentFailures, WhatCannotBePrintedIsAnError) {
+  for (const std::string& words :
+       {"inspect '" + study_.path().string() + "'", std::string("--version"), std::string("drr --help")}) {
+    const CommandOutcome outcome = run_shell(fmt::format("({} {} >/dev/full)", ISOSHIFT_PROGRAM, words));
+    EXPECT_EQ(outcome.exit_status, 1) << words;
+    EXPECT_THAT(outcome.out, HasSubstr("error: standard output cannot be written to"));
+  }
+}
+
+// Whoever reads may have enough of it, which is no error, and stop nothing that is being written.
+TEST_F(SilentFailures, WhoClosesAPipeGetsAWholeResult) {
   const CommandOutcome outcome =
-      run_shell(fmt::format("({} inspect '{}' >/dev/full)", ISOSHIFT_PROGRAM, study_.path().string()));
-  EXPECT_EQ(outcome.exit_status, 1);
-  EXPECT_THAT(outcome.out, HasSubstr("error: standard output cannot be written to"));
+      run_shell(fmt::format("bash -c \"set -o pipefail; {} register '{}' -o '{}' 2>&1 | head -c 1\"", ISOSHIFT_PROGRAM,
+                            study_.path().string(), study_.output().string()));
+  EXPECT_EQ(outcome.exit_status, 141);
+  EXPECT_TRUE(std::filesystem::exists(study_.output() / "result.json"));
 }
 
 TEST_F(SilentFailures, AClosedTerminalLeavesNoHalfResultBehind) {
@@ -110,6 +122,43 @@ TEST_F(SilentFailures, AClosedTerminalLeavesNoHalfResultBehind) {
                             ISOSHIFT_PROGRAM, study_.path().string(), study_.output().string(),
                             study_.output().string(), study_.output().parent_path().string()));
   EXPECT_EQ(outcome.out, "status 129\nstudy\n");
+}
+
+// Of the owner and of the group, however a library writes them; of fewer people where the user says so.
+TEST_F(SilentFailures, AllThatIsWrittenHasOneMode) {
+  const auto modes = [&](const std::string& mask) {
+    return run_shell(
+               fmt::format("umask {} && {} register '{}' -o '{}' --overwrite >/dev/null && find '{}' -printf '%m\\n' | "
+                           "sort -u",
+                           mask, ISOSHIFT_PROGRAM, study_.path().string(), study_.output().string(),
+                           study_.output().string()))
+        .out;
+  };
+  EXPECT_EQ(modes("022"), "640\n750\n");
+  EXPECT_EQ(modes("077"), "600\n700\n");
+}
+
+TEST_F(SilentFailures, TwoDashesEndTheFlags) {
+  std::filesystem::rename(study_.path(), study_.path().parent_path() / "-study");
+  const CommandOutcome outcome = run_shell(
+      fmt::format("cd '{}' && {} register -o out -- -study", study_.path().parent_path().string(), ISOSHIFT_PROGRAM));
+  EXPECT_EQ(outcome.exit_status, 0) << outcome.out;
+}
+
+TEST_F(SilentFailures, PipesAndDevicesThatAreNamedAreRefused) {
+  const std::filesystem::path pipe = study_.path().parent_path() / "pipe";
+  ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
+  for (const std::string& path : {pipe.string(), std::string("/dev/zero")})
+    for (const std::vector<std::string>& words : std::vector<std::vector<std::string>>{
+             {"inspect", path},
+             {"register", study_.path().string(), "--start", path, "-o", study_.output().string()},
+             {"register", study_.path().string(), "--machine", path, "-o", study_.output().string()},
+             {"check", path}}) {
+      const CommandOutcome outcome = run_command(words);
+      EXPECT_EQ(outcome.exit_status, 1) << words[0];
+      EXPECT_THAT(outcome.out + outcome.err, HasSubstr(path + ": is a pipe, a socket or a device, expected a file"))
+          << words[0];
+    }
 }
 
 TEST_F(SilentFailures, ADeviceThatCanBeNoneIsRefused) {
