@@ -6,8 +6,24 @@
 #include <sys/mman.h>
 #include <unistd.h>
 
+#include <algorithm>
+
 #include "base/error.h"
+#include "tests/fuzz/dicom_mutator.h"
 #include "tests/fuzz/readers.h"
+
+extern "C" std::size_t LLVMFuzzerMutate(std::uint8_t* data, std::size_t size, std::size_t max_size);
+
+// Half of all changes are of elements, items and sequences; the fuzzer's own know bytes only.
+extern "C" std::size_t LLVMFuzzerCustomMutator(std::uint8_t* data, std::size_t size, std::size_t max_size,
+                                               unsigned seed) {
+  if (seed % 2 == 0) return LLVMFuzzerMutate(data, size, max_size);
+  const std::string changed =
+      isoshift::DicomMutator(seed).with_mutated_elements({reinterpret_cast<const char*>(data), size});
+  if (changed.size() > max_size) return LLVMFuzzerMutate(data, size, max_size);
+  std::ranges::copy(changed, data);
+  return changed.size();
+}
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   static const int memory = ::memfd_create("fuzzed", 0);

@@ -1,21 +1,21 @@
-// Reads damaged copies of every kind of file isoshift reads: cut short, with bytes changed, lengths made huge, parts
-// doubled or left out. Every one must be read or refused with Error, within 10 s. Prints what came of them; exits with
-// 1 at the first that did anything else.
+// Reads damaged copies of every kind of file isoshift reads (DicomMutator). Every one must be read or refused with
+// Error, within 10 s. Prints what came of them; exits with 1 at the first that did anything else.
 //
 //   mutations [count=12000] [first seed=1]
 
 #include <fmt/format.h>
+#include <sys/resource.h>
 
 #include <algorithm>
 #include <chrono>
 #include <cstdlib>
 #include <fstream>
 #include <iostream>
-#include <random>
 #include <string_view>
 
 #include "base/error.h"
 #include "io/dicom/decoder_process.h"
+#include "tests/fuzz/dicom_mutator.h"
 #include "tests/fuzz/readers.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/support/testdata.h"
@@ -50,60 +50,21 @@ std::vector<Original> originals() {
   return list;
 }
 
-class Mutator {
- public:
-  explicit Mutator(std::uint64_t seed) : random_(seed) {}
-
-  std::string mutated(std::string bytes) {
-    const int changes = 1 + static_cast<int>(below(3));
-    for (int n = 0; n < changes; ++n) change(bytes);
-    return bytes;
-  }
-
- private:
-  std::size_t below(std::size_t count) { return std::uniform_int_distribution<std::size_t>(0, count - 1)(random_); }
-
-  // Half of all changes hit the header, where every byte means something.
-  std::size_t place(const std::string& bytes) {
-    const std::size_t header = std::min<std::size_t>(bytes.size(), 3000);
-    return below(2) == 0 ? below(header) : below(bytes.size());
-  }
-
-  void change(std::string& bytes) {
-    if (bytes.size() < 16) return;
-    const std::size_t at = place(bytes), left = bytes.size() - at;
-    switch (below(7)) {
-      case 0: bytes.resize(at); break;
-      case 1:
-        for (std::size_t n = 0, count = 1 + below(16); n < count; ++n)
-          bytes[place(bytes)] = static_cast<char>(below(256));
-        break;
-      case 2: bytes[at] = static_cast<char>(bytes[at] ^ (1 << below(8))); break;
-      case 3: bytes.replace(at, std::min<std::size_t>(left, 4), std::min<std::size_t>(left, 4), '\xFF'); break;
-      case 4: bytes.erase(at, std::min(left, 1 + below(64))); break;
-      case 5: bytes.insert(at, bytes.substr(place(bytes), 1 + below(64))); break;
-      case 6: {  // a number of text becomes another
-        static const std::vector<std::string> numbers = {"-1",          "0",    "1e308",  "nan",
-                                                         "99999999999", "-0.0", "1e-320", "\\"};
-        const std::string& number = numbers[below(numbers.size())];
-        bytes.replace(at, std::min(left, number.size()), number.substr(0, left));
-        break;
-      }
-    }
-  }
-
-  std::mt19937_64 random_;
-};
+double used_mb() {
+  rusage used{};
+  ::getrusage(RUSAGE_SELF, &used);
+  return static_cast<double>(used.ru_maxrss) / 1024.0;
+}
 
 int run(std::uint64_t count, std::uint64_t first_seed) {
-  const TemporaryFolder folder;
+  const TemporaryFolder folder(memory_folder());
   const std::filesystem::path path = folder / "mutated.dcm";
   std::uint64_t read = 0, refused = 0, died = 0, stalled = 0;
   double slowest_s = 0.0;
   const std::vector<Original> list = originals();
   for (std::uint64_t seed = first_seed; seed < first_seed + count; ++seed) {
     const Original& original = list[seed % list.size()];
-    std::ofstream(path, std::ios::binary) << Mutator(seed).mutated(original.bytes);
+    std::ofstream(path, std::ios::binary) << DicomMutator(seed).mutated(original.bytes);
     const auto start = std::chrono::steady_clock::now();
     try {
       kReaders.at(original.reader)(path);
@@ -126,8 +87,8 @@ int run(std::uint64_t count, std::uint64_t first_seed) {
   }
   std::cout << fmt::format(
       "{} files, seeds {} to {}: {} read, {} refused, of these {} by a decoder that died and {} by one that was ended; "
-      "the slowest took {:.2f} s\n",
-      count, first_seed, first_seed + count - 1, read, refused, died, stalled, slowest_s);
+      "the slowest took {:.2f} s; at most {:.0f} MB of memory\n",
+      count, first_seed, first_seed + count - 1, read, refused, died, stalled, slowest_s, used_mb());
   return 0;
 }
 
