@@ -66,7 +66,6 @@ void Description::remark(Remark remark, std::string_view text) {
   const RemarkNames& names = kRemarkNames.at(static_cast<std::size_t>(remark));
   text_ += line(names.in_text, text);
   json_["remarks"].push_back({{"kind", names.in_json}, {"text", text}});
-  is_refused_ = is_refused_ || remark == Remark::kRefused;
 }
 
 }  // namespace isoshift

@@ -32,14 +32,12 @@ class Description {
   void append(std::string_view name, std::string_view list, Json value, std::string_view text);
   void remark(Remark remark, std::string_view text);
 
-  bool is_refused() const { return is_refused_; }
   const std::string& text() const { return text_; }
   const Json& json() const { return json_; }
 
  private:
   std::string text_;
   Json json_;
-  bool is_refused_ = false;
 };
 
 // As lines show them: "1000 mm", "(1, 2, 3) mm", "missing"; and as JSON has them.

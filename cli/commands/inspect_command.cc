@@ -224,7 +224,6 @@ class Inspection {
   Inspection(bool as_json, Console& console) : as_json_(as_json), console_(console) {}
 
   void tell(const Description& description) {
-    refused_ += description.is_refused() ? 1 : 0;
     if (as_json_)
       files_.push_back(description.json());
     else
@@ -240,6 +239,7 @@ class Inspection {
       Description description(kind, "", file.string());
       description.remark(Remark::kRefused, error.what());
       tell(description);
+      ++unreadable_;
     }
   }
 
@@ -261,13 +261,13 @@ class Inspection {
                    << "\n";
   }
 
-  std::size_t refused() const { return refused_; }
+  std::size_t unreadable() const { return unreadable_; }
 
  private:
   bool as_json_;
   Console& console_;
   Json files_ = Json::array();
-  std::size_t refused_ = 0;
+  std::size_t unreadable_ = 0;
 };
 
 std::vector<Description> describe_rt_images(const std::filesystem::path& file,
@@ -303,8 +303,8 @@ void run_inspect(const std::vector<std::filesystem::path>& paths, const std::opt
     inspection.tell("Spatial Registration", registration,
                     [&]() -> std::vector<Description> { return {describe_registration(registration)}; });
   inspection.tell_others(files, machine.has_value());
-  if (const std::size_t refused = inspection.refused() + files.unreadable.size(); refused > 0)
-    throw Error(fmt::format("{} of the files cannot be read or used; see above", refused));
+  if (const std::size_t unreadable = inspection.unreadable() + files.unreadable.size(); unreadable > 0)
+    throw Error(fmt::format("{} of the files cannot be read; see above", unreadable));
   if (files.cts.empty() && files.images.empty() && files.other_xrays.empty() && files.plans.empty() &&
       files.structures.empty() && files.registrations.empty())
     throw Error(fmt::format("{}: holds nothing that isoshift can read", paths.front().string()));
