@@ -15,6 +15,7 @@
 #include <string>
 
 #include "base/error.h"
+#include "base/option_name.h"
 #include "base/random_word.h"
 
 namespace isoshift {
@@ -57,14 +58,14 @@ void check_replaceable(const fs::path& destination, bool overwrite) {
   if (fs::is_empty(destination)) return;
   if (!overwrite)
     throw Error(
-        fmt::format("{}: the output folder is not empty.\n       Name another one, or replace what it holds: "
-                    "--overwrite",
-                    destination.string()));
+        fmt::format("{}: the output folder is not empty.\n"
+                    "       Name another one, or replace what it holds: {}",
+                    destination.string(), option("overwrite")));
   if (const fs::path foreign = foreign_file(destination); !foreign.empty())
     throw Error(
-        fmt::format("{}: was not written by isoshift, so --overwrite does not replace its folder.\n"
+        fmt::format("{}: was not written by isoshift, so {} does not replace its folder.\n"
                     "       Move it away, or name another output folder",
-                    (destination / foreign).string()));
+                    (destination / foreign).string(), option("overwrite")));
 }
 
 }  // namespace
@@ -179,6 +180,7 @@ void write_text(const fs::path& path, std::string_view text) {
     if (written < 0) {
       const int reason = errno;
       ::close(descriptor);
+      ::unlink(path.c_str());
       fail(path, std::strerror(reason));
     }
     text.remove_prefix(static_cast<std::size_t>(written));

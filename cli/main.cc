@@ -7,6 +7,7 @@
 #include <thread>
 
 #include "base/graceful_end.h"
+#include "base/option_name.h"
 #include "base/output_folder.h"
 #include "base/process.h"
 #include "cli/commands/commands.h"
@@ -28,7 +29,7 @@ void end_cleanly_on_signals() {
   sigaction(SIGHUP, nullptr, &hang_up);
   if (hang_up.sa_handler != SIG_IGN) sigaddset(&signals, SIGHUP);
   pthread_sigmask(SIG_BLOCK, &signals, nullptr);  // inherited by every thread made later
-  ::signal(SIGPIPE, SIG_IGN);  // who writes to a pipe, or to a peer that went away, reports that
+  ::signal(SIGPIPE, SIG_IGN);                     // who writes to a pipe, or to a peer that went away, reports that
   std::thread([] {
     int signal = 0;
     do {
@@ -49,6 +50,7 @@ void keep_from_strangers() {
 
 int main(int argc, char** argv) {
   keep_from_strangers();
+  isoshift::name_options(isoshift::OptionStyle::kFlags);
   // Not commands for people: what this program runs as its child, and the manual that the build makes.
   const std::string_view hidden = argc == 3 ? argv[1] : "", role = argc == 3 ? argv[2] : "";
   if (hidden == "__manual") return isoshift::write_manual(argv[2]), 0;

@@ -3,15 +3,16 @@
 #include <cmath>
 
 #include "base/error.h"
+#include "base/option_name.h"
 #include "base/parallel.h"
 #include "drr/attenuation_curve.h"
 
 namespace isoshift {
 
 void AttenuationModel::check() const {
-  if (!std::isfinite(threshold_hu)) throw UsageError("--threshold-hu must be a finite number");
+  if (!std::isfinite(threshold_hu)) throw UsageError(option("threshold-hu") + " must be a finite number");
   if (!(std::isfinite(window_low_hu) && std::isfinite(window_high_hu) && window_low_hu < window_high_hu))
-    throw UsageError("--window LOW,HIGH needs two finite HU values, LOW below HIGH");
+    throw UsageError(option("window", "LOW,HIGH") + " needs two finite HU values, LOW below HIGH");
 }
 
 float AttenuationModel::attenuation_per_mm(float hu, Beam beam) const { return AttenuationCurve(*this, beam)(hu); }

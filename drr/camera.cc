@@ -6,6 +6,7 @@
 #include <stdexcept>
 
 #include "base/error.h"
+#include "base/option_name.h"
 
 namespace isoshift {
 
@@ -40,7 +41,8 @@ Camera make_camera(const XrayView& view, const Eigen::Isometry3d& room_from_pati
 
 void refuse_line_scans(std::span<const XrayView> views, RendererKind kind) {
   if (std::ranges::any_of(views, &XrayView::is_line_scan))
-    throw UsageError(fmt::format("--renderer {} cannot render line scans; cpu and raycast can", to_string(kind)));
+    throw UsageError(
+        fmt::format("{} cannot render line scans; cpu and raycast can", option("renderer", to_string(kind))));
 }
 
 std::vector<std::size_t> checked_view_begins(std::span<const XrayView> views,

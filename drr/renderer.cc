@@ -9,6 +9,7 @@
 #include <stdexcept>
 
 #include "base/error.h"
+#include "base/option_name.h"
 #include "drr/cpu/raycast.h"
 #include "drr/cpu/siddon.h"
 #include "drr/cpu/trilinear.h"
@@ -59,19 +60,20 @@ double default_sigma_mm(SplatOptions::Wobble wobble, double largest_spacing_mm, 
   if (!(sad_by_sid > 0.0 && sad_by_sid < 1.0))
     throw Error(
         "the receptor does not lie behind the isocenter, so the focal spot's wobble has no default.\n"
-        "       Give it with --wobble-sigma, or use --wobble voxel");
+        "       Give it with " +
+        option("wobble-sigma") + ", or use " + option("wobble", "voxel"));
   return blur_mm / (1.0 - sad_by_sid);
 }
 
 void RendererOptions::check(RendererKind kind) const {
   if (is_oracle(kind) && precision.value_or(VolumePrecision::kF32) != VolumePrecision::kF32)
-    throw UsageError(fmt::format("--renderer {} is a reference and keeps the volume in f32: leave --precision {} out",
-                                 to_string(kind), to_string(*precision)));
+    throw UsageError(fmt::format("{} is a reference and keeps the volume in f32: leave {} out",
+                                 option("renderer", to_string(kind)), option("precision", to_string(*precision))));
   if (kind == RendererKind::kRaycastCuberille && block_edge != 1 && block_edge != 2 && block_edge != 4 &&
       block_edge != 8)
-    throw UsageError(fmt::format("--block-edge {}: expected 1, 2, 4 or 8 voxels", block_edge));
+    throw UsageError(fmt::format("{}: expected 1, 2, 4 or 8 voxels", option("block-edge", fmt::to_string(block_edge))));
   if (splat.sigma_mm && !(std::isfinite(*splat.sigma_mm) && *splat.sigma_mm >= 0.0))
-    throw UsageError(fmt::format("--wobble-sigma {}: expected 0 mm or more", *splat.sigma_mm));
+    throw UsageError(fmt::format("{}: expected 0 mm or more", option("wobble-sigma", fmt::to_string(*splat.sigma_mm))));
 }
 
 std::size_t PixelSet::count(std::span<const XrayView> views, std::size_t view) const {

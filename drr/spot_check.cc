@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "base/option_name.h"
 #include "drr/cpu/trilinear.h"
 
 namespace isoshift {
@@ -43,8 +44,8 @@ SpotCheck check_rays(Renderer& renderer, const Volume<float>& ct_hu, const Atten
   if (!(check.rms <= kMostRms))
     check.failure = fmt::format(
         "{} rays of the DRRs differ from those of the CPU by {:.2g} % (rms), expected at most {:.1f} %: the GPU or its "
-        "driver computes something else, or the voxels are stored too coarsely (--precision)",
-        check.rays, 100.0 * check.rms, 100.0 * kMostRms);
+        "driver computes something else, or the voxels are stored too coarsely ({})",
+        check.rays, 100.0 * check.rms, 100.0 * kMostRms, option("precision"));
   return check;
 }
 

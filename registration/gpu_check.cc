@@ -6,6 +6,7 @@
 #include <map>
 
 #include "base/error.h"
+#include "base/option_name.h"
 #include "drr/gl/context.h"
 #include "drr/raycast/raycast.h"
 
@@ -49,7 +50,10 @@ const GpuCheck& gpu_check(const GlChoice& choice) {
 
 void require_gpu_check(const GlChoice& choice) {
   if (const auto& failure = gpu_check(choice).failure)
-    throw Error(fmt::format("{}.\n       Use --renderer cpu, and tell the maker of the driver", *failure));
+    throw Error(
+        fmt::format("{}.\n"
+                    "       Use {}, and tell the maker of the driver",
+                    *failure, option("renderer", "cpu")));
 }
 
 }  // namespace isoshift

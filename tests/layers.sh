@@ -71,4 +71,10 @@ only_in '(cairo|pango)' io/report/ io/objects/image_files.cc
 while IFS=: read -r file included; do
   [[ ! $included =~ ^(geometry/xray_view|setup/couch) ]] || complain "$file must not include $included"
 done < <(includes phantom)
+
+# The libraries name options as option() spells them: only a program knows that its users type flags.
+while IFS= read -r found; do
+  complain "$found names a flag: option() of base/option_name.h does, as the program wants it"
+done < <(grep -rnoE '"[^"]*--[a-z][^"]*"' --include=*.cc --include=*.h base geometry bodies setup drr registration io |
+  grep -v 'gdcmconv --raw' | grep -v '^setup/target.h' || true)
 exit $status

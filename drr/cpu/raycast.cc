@@ -7,6 +7,7 @@
 
 #include "base/error.h"
 #include "base/large_vector.h"
+#include "base/option_name.h"
 #include "base/parallel.h"
 #include "drr/cpu/march.h"
 
@@ -197,9 +198,9 @@ RaycastCpuRenderer::PackedVolume RaycastCpuRenderer::pack(QuantizedVolume attenu
   const auto voxels_kept = (box.size().array() + 3).cast<std::size_t>().prod();
   if (voxels_kept > kMaxVoxels)
     throw Error(
-        fmt::format("what the CT holds above the threshold fills a box of {} voxels; --renderer cpu can take {}.\n"
-                    "       Crop the CT, or use --renderer raycast",
-                    voxels_kept, kMaxVoxels));
+        fmt::format("what the CT holds above the threshold fills a box of {} voxels; {} can take {}.\n"
+                    "       Crop the CT, or use {}",
+                    voxels_kept, option("renderer", "cpu"), kMaxVoxels, option("renderer", "raycast")));
   PackedVolume packed{.origin = box.first.cast<double>().array() - 1.0,
                       .size = box.size().array() + 3,
                       .unit_per_mm = attenuation.unit_per_mm};

@@ -8,12 +8,13 @@
 #include <mutex>
 
 #include "base/error.h"
+#include "base/option_name.h"
 #include "drr/gl/egl.h"
 
 namespace isoshift {
 namespace {
 
-constexpr const char* kInstead = "\n       Use --renderer cpu, which needs no OpenGL";
+std::string instead() { return "\n       Use " + option("renderer", "cpu") + ", which needs no OpenGL"; }
 
 bool names_software(const std::string& renderer) {
   return std::ranges::any_of(std::array{"llvmpipe", "softpipe", "swrast", "SwiftShader"},
@@ -103,10 +104,11 @@ struct GlContext::Handles {
 GlContext::GlContext(const GlChoice& choice) {
   const char* kind = choice.kind == GlDevice::kHardware ? "hardware" : "software";
   const auto fail = [&](const std::string& why) {
-    throw Error(fmt::format("no {} OpenGL: {}.{}{}", kind, why, kInstead,
-                            choice.kind == GlDevice::kHardware ? ", or --gl software to run this one on the CPU" : ""));
+    throw Error(fmt::format(
+        "no {} OpenGL: {}.{}{}", kind, why, instead(),
+        choice.kind == GlDevice::kHardware ? ", or " + option("gl", "software") + " to run this one on the CPU" : ""));
   };
-  if (const auto missing = missing_gl_library()) throw Error(fmt::format("no OpenGL: {}.{}", *missing, kInstead));
+  if (const auto missing = missing_gl_library()) throw Error(fmt::format("no OpenGL: {}.{}", *missing, instead()));
   const std::vector<EglDevice> devices = candidates(choice);
   if (devices.empty())
     fail(choice.kind == GlDevice::kHardware ? "there is no GPU that EGL knows"
@@ -140,10 +142,10 @@ std::optional<std::string> GlContext::open(const GlChoice& choice, void* device)
 }
 
 void GlContext::make_current() const {
-  if (is_lost_) throw Error(fmt::format("OpenGL on {} was lost.{}", renderer_, kInstead));
+  if (is_lost_) throw Error(fmt::format("OpenGL on {} was lost.{}", renderer_, instead()));
   if (eglGetCurrentContext() == handles_->context) return;
   if (!eglMakeCurrent(handles_->display, EGL_NO_SURFACE, EGL_NO_SURFACE, handles_->context))
-    throw Error(fmt::format("OpenGL on {} cannot be used: {}.{}", renderer_, egl_error(), kInstead));
+    throw Error(fmt::format("OpenGL on {} cannot be used: {}.{}", renderer_, egl_error(), instead()));
 }
 
 void GlContext::try_make_current() const noexcept {
@@ -174,12 +176,12 @@ const Program& GlContext::program(const ShaderSource& vertex, const ShaderSource
 void GlContext::check(const char* doing) const {
   if (const GLenum status = glGetGraphicsResetStatus(); status != GL_NO_ERROR) {
     is_lost_ = true;
-    throw Error(fmt::format("{}: {}: the GPU was reset, {}.{}", renderer_, doing, why_lost(status), kInstead));
+    throw Error(fmt::format("{}: {}: the GPU was reset, {}.{}", renderer_, doing, why_lost(status), instead()));
   }
   if (const GLenum error = glGetError(); error != GL_NO_ERROR)
     throw Error(fmt::format(
         "{}: {}{}.{}", renderer_, doing,
-        error == GL_OUT_OF_MEMORY ? ": out of its memory" : fmt::format(": OpenGL error {:#x}", error), kInstead));
+        error == GL_OUT_OF_MEMORY ? ": out of its memory" : fmt::format(": OpenGL error {:#x}", error), instead()));
 }
 
 GlContext& gl_context(const GlChoice& choice) {

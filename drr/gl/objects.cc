@@ -9,6 +9,7 @@
 #include <memory>
 
 #include "base/error.h"
+#include "base/option_name.h"
 
 namespace isoshift {
 namespace {
@@ -133,8 +134,8 @@ Texture3d::Texture3d(const Eigen::Vector3i& size, const void* voxels, const Form
   if (size.maxCoeff() > limit)
     throw Error(
         fmt::format("a CT of {} x {} x {} voxels is too large for this OpenGL, whose limit is {} along each edge.\n"
-                    "       Use --renderer cpu, which has no such limit",
-                    size.x(), size.y(), size.z(), limit));
+                    "       Use {}, which has no such limit",
+                    size.x(), size.y(), size.z(), limit, option("renderer", "cpu")));
   glTextureStorage3D(name_.get(), 1, format.stored, size.x(), size.y(), size.z());
   for (const GLenum filter : {GL_TEXTURE_MIN_FILTER, GL_TEXTURE_MAG_FILTER})
     glTextureParameteri(name_.get(), filter, GL_LINEAR);
@@ -162,8 +163,8 @@ void RenderTarget::resize_and_use(int columns, int rows) {
     if (std::max(columns, rows) > limit)
       throw Error(
           fmt::format("an image of {} x {} pixels is too large for this OpenGL, whose limit is {} along each edge.\n"
-                      "       Use --renderer cpu, which has no such limit",
-                      columns, rows, limit));
+                      "       Use {}, which has no such limit",
+                      columns, rows, limit, option("renderer", "cpu")));
     color_ = new_texture(GL_TEXTURE_2D);
     glTextureStorage2D(color_.get(), 1, pixel_ == Pixel::kOneFloat ? GL_R32F : GL_RGBA32F, columns, rows);
     glNamedFramebufferTexture(framebuffer_.get(), GL_COLOR_ATTACHMENT0, color_.get(), 0);

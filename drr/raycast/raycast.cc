@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "base/error.h"
+#include "base/option_name.h"
 #include "drr/camera.h"
 #include "drr/occupied_blocks.h"
 #include "drr/raycast/raycast.comp.h"
@@ -164,7 +165,10 @@ std::size_t RaycastGlRenderer::poses_at_once(std::size_t pixels_per_pose, bool w
       std::max<std::size_t>(1, pixels_per_pose * (with_derivatives ? sizeof(MotionDerivatives) : sizeof(float)));
   const std::size_t count = static_cast<std::size_t>(context_.largest_buffer_bytes()) / pose_bytes;
   if (count == 0)
-    throw Error("images of this size exceed the storage buffers of this OpenGL.\n       Use --renderer cpu");
+    throw Error(
+        "images of this size exceed the storage buffers of this OpenGL.\n"
+        "       Use " +
+        option("renderer", "cpu"));
   return count;
 }
 

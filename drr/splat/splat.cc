@@ -8,6 +8,7 @@
 #include <type_traits>
 
 #include "base/error.h"
+#include "base/option_name.h"
 #include "drr/camera.h"
 #include "drr/splat/splat.frag.h"
 #include "drr/splat/splat.vert.h"
@@ -80,7 +81,10 @@ SplatRenderer::SplatRenderer(RendererKind kind, const Volume<float>& ct_hu, cons
       voxel_from_patient_(ct_hu.patient_from_voxel.inverse()),
       size_(ct_hu.size) {
   if (ct_hu.voxels.size() > std::numeric_limits<std::uint32_t>::max())
-    throw Error("a CT of more than 4294967295 voxels cannot be splatted.\n       Use --renderer cpu");
+    throw Error(
+        "a CT of more than 4294967295 voxels cannot be splatted.\n"
+        "       Use " +
+        option("renderer", "cpu"));
   for (const Beam beam : beams) {
     const QuantizedVolume volume =
         quantized_attenuation(ct_hu, model, beam, options.precision.value_or(kDefaultPrecision));
