@@ -34,15 +34,17 @@ if [ -z "$package" ]; then
   git clone -q . "$root/src"
   inside bash -c 'cd /src && time ./dev demo && apt-get install -y -qq --no-install-recommends dpkg-dev file && cd build/demo && cpack'
   mkdir -p "build/debian-$release"
-  cp "$root"/src/build/demo/isoshift_*.deb "build/debian-$release"
+  cp "$root"/src/build/demo/*.deb "build/debian-$release"
   package=$(ls -t "build/debian-$release"/isoshift_*.deb | head -n 1)
 fi
 
 fresh_debian
 cp "$package" "$root/isoshift.deb"
+cp "$(dirname "$package")"/python3-isoshift_*.deb "$root/python3-isoshift.deb"
 inside apt-get update -qq
-inside apt-get install -y -qq --no-install-recommends man-db /isoshift.deb >/dev/null 2>&1
+inside apt-get install -y -qq --no-install-recommends man-db /isoshift.deb /python3-isoshift.deb >/dev/null 2>&1
 inside isoshift --version
 inside man isoshift-register | head -n 4
 inside isoshift phantom -o /demo/study
 inside isoshift register /demo/study -o /demo/result --truth /demo/study/truth.json
+inside python3 /usr/share/doc/python3-isoshift/examples/register.py /demo/study
