@@ -48,11 +48,35 @@ SpatialRegistrationOptions registration_options(RegistrationSource source, const
 
 }  // namespace
 
+std::string write_registration(const RegisterOptions& options, const Study& study, const SetupResult& result,
+                               const std::filesystem::path& path, Notes& notes) {
+  if (!may_write_registration(options, result)) return "";
+  return write_spatial_registration(study, written_pose(study, result, notes),
+                                    registration_options(options.source, result), path, notes);
+}
+
+SetupResult register_loaded(const Study& study, const RegisterOptions& options, const std::optional<SiteRules>& site,
+                            std::optional<Start> start, SharedWork& shared, Observer& observer) {
+  TargetChoice choice = target_of(study, {options.target, site ? site->target : ""});
+  const Surrogate surrogate = surrogate_of(study, choice.target, site ? site->surrogate : "", shared.bodies);
+  choice.target.surrogate = surrogate.words;
+  const RegistrationSetup setup(options.registration, study, beams_of(study), shared.renderers);
+  const std::vector<FixedImage> images = prepared(study.xrays);
+  const TargetRegistration registration(study, options.registration, setup, choice, surrogate, shared.bodies);
+  const Eigen::Isometry3d setup_error = start ? start->setup_error : Eigen::Isometry3d::Identity();
+  RegistrationResult found = registration.from(setup_error * study.planned_room_from_patient, images, observer);
+
+  SetupResult result = setup_result_of(study, images, options.registration, setup, choice.target, std::move(found));
+  result.site = site;
+  result.start = std::move(start);
+  return result;
+}
+
 SetupResult register_study(const RegisterOptions& options, SharedWork& shared, Observer& observer) {
   const Stopwatch total;
   OutputFolder output(options.output, options.overwrite);
   const std::optional<SiteFile> site_file = named_site(options.site);
-  std::optional<SiteRules> site = chosen_site(site_file, options.anatomy);
+  const std::optional<SiteRules> site = chosen_site(site_file, options.anatomy);
 
   Notes notes;
   StudyOptions named = options.study;
@@ -62,23 +86,10 @@ SetupResult register_study(const RegisterOptions& options, SharedWork& shared, O
   const Study study = load(named, notes, observer, shared.cts);
   std::optional<Start> start;
   if (!options.start.empty()) start = read_start(options.start, study, options.source_isocenter, notes);
-  TargetChoice choice = target_of(study, {options.target, site ? site->target : ""});
-  const Surrogate surrogate = surrogate_of(study, choice.target, site ? site->surrogate : "", shared.bodies);
-  choice.target.surrogate = surrogate.words;
-  const RegistrationSetup setup(options.registration, study, beams_of(study), shared.renderers);
-  const std::vector<FixedImage> images = prepared(study.xrays);
   const double seconds_load = total.seconds();
-  const TargetRegistration registration(study, options.registration, setup, choice, surrogate, shared.bodies);
-  const Eigen::Isometry3d setup_error = start ? start->setup_error : Eigen::Isometry3d::Identity();
-  RegistrationResult found = registration.from(setup_error * study.planned_room_from_patient, images, observer);
-
-  SetupResult result = setup_result_of(study, images, options.registration, setup, choice.target, std::move(found));
-  result.site = std::move(site);
-  result.start = std::move(start);
-  if (may_write_registration(options, result))
-    result.spatial_registration_uid = write_spatial_registration(study, written_pose(study, result, notes),
-                                                                 registration_options(options.source, result),
-                                                                 output.path() / kRegistrationFile, notes);
+  SetupResult result = register_loaded(study, options, site, std::move(start), shared, observer);
+  result.spatial_registration_uid =
+      write_registration(options, study, result, output.path() / kRegistrationFile, notes);
   result.overrides = notes.overrides;
   result.left_aside = notes.left_aside;
   result.warnings = notes.warnings;

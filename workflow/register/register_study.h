@@ -37,6 +37,16 @@ struct SharedWork {
   BodyStore bodies;
 };
 
+// Registers a study that is loaded, and writes nothing. `options` say how; the study and the site are those given here.
+// Precondition: as of register_study().
+SetupResult register_loaded(const Study& study, const RegisterOptions& options, const std::optional<SiteRules>& site,
+                            std::optional<Start> start, SharedWork& shared, Observer& observer);
+
+// Writes the registration object of a result, as accepted or, where that is asked for, as one for review, and returns
+// its SOP Instance UID; empty where the result may not be written. A direction that was not measured is an override.
+std::string write_registration(const RegisterOptions& options, const Study& study, const SetupResult& result,
+                               const std::filesystem::path& path, Notes& notes);
+
 // Registers a study and writes the folder of its result, whole or not at all. Precondition:
 // `options.registration.settle()` has been called.
 SetupResult register_study(const RegisterOptions& options, SharedWork& shared, Observer& observer);

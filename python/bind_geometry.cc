@@ -1,0 +1,83 @@
+#include <fmt/format.h>
+
+#include "geometry/rotation.h"
+#include "geometry/xray_view.h"
+#include "python/bindings.h"
+
+namespace isoshift::python {
+
+std::vector<Eigen::Isometry3d> poses_from(const Poses& array) {
+  const bool is_one = array.ndim() == 2;
+  if ((!is_one && array.ndim() != 3) || array.shape(array.ndim() - 1) != 4 || array.shape(array.ndim() - 2) != 4)
+    throw py::value_error("a pose has the shape (4, 4), several poses (P, 4, 4)");
+  const auto count = static_cast<std::size_t>(is_one ? 1 : array.shape(0));
+  std::vector<Eigen::Isometry3d> poses;
+  for (std::size_t n = 0; n < count; ++n) {
+    Eigen::Affine3d affine;
+    affine.matrix() = Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(array.data() + 16 * n);
+    const bool is_affine = affine.matrix().row(3) == Eigen::RowVector4d(0, 0, 0, 1);
+    const auto rigid = is_affine ? as_rigid(affine) : std::nullopt;
+    if (!rigid) throw py::value_error(fmt::format("pose {} is not a rigid motion", n));
+    poses.push_back(*rigid);
+  }
+  return poses;
+}
+
+Eigen::Isometry3d pose_from(const Poses& array) {
+  if (array.ndim() != 2) throw py::value_error("a pose has the shape (4, 4)");
+  return poses_from(array).front();
+}
+
+namespace {
+
+XrayView view_of_carm(double gantry_deg, double sad_mm, double sid_mm, int columns, int rows, double pixel_mm,
+                      bool is_megavoltage) {
+  const CarmGeometry geometry{.sad_mm = sad_mm,
+                              .gantry_angle_rad = rad_from_deg(gantry_deg),
+                              .receptor_translation_mm = Eigen::Vector3d(0.0, 0.0, sad_mm - sid_mm),
+                              .column_spacing_mm = pixel_mm,
+                              .row_spacing_mm = pixel_mm,
+                              .position_mm = Eigen::Vector2d(-0.5 * (columns - 1), 0.5 * (rows - 1)) * pixel_mm,
+                              .columns = columns,
+                              .rows = rows};
+  return make_xray_view(geometry, is_megavoltage ? Beam::kMegavoltage : Beam::kKilovoltage);
+}
+
+}  // namespace
+
+void bind_geometry(py::module_& module) {
+  py::class_<XrayView>(
+      module, "XrayView",
+      "The camera of an X-ray in the room (IEC 61217 fixed, mm, origin at the isocenter). Pixel centers "
+      "lie at integer (column, row).")
+      .def_readonly("columns", &XrayView::columns)
+      .def_readonly("rows", &XrayView::rows)
+      .def_property_readonly(
+          "pixel_from_room", [](const XrayView& view) { return view.pixel_from_room; },
+          "The projection, shape (3, 4): homogeneous (column, row, 1) of a room point.")
+      .def_property_readonly(
+          "source_room_mm", [](const XrayView& view) { return view.source_room_mm; }, "The focal spot, shape (3,).")
+      .def_property_readonly("is_megavoltage", [](const XrayView& view) { return view.beam == Beam::kMegavoltage; })
+      .def(
+          "project", [](const XrayView& view, const Eigen::Vector3d& room_mm) { return view.project(room_mm); },
+          py::arg("room_mm"), "(column, row) of a room point, or None at or behind the source.")
+      .def("downscaled", &XrayView::downscaled, py::arg("factor"),
+           "The same receptor, read out in blocks of factor x factor pixels.");
+  module.def("carm_view", &view_of_carm, py::arg("gantry_deg"), py::kw_only(), py::arg("sad_mm") = 1000.0,
+             py::arg("sid_mm") = 1500.0, py::arg("columns") = 512, py::arg("rows") = 512, py::arg("pixel_mm") = 0.8,
+             py::arg("is_megavoltage") = false,
+             "The view of a linac's imager whose receptor is centered on the central ray; pixel_mm on the receptor.");
+  module.def(
+      "view_from_matrix",
+      [](const Eigen::Matrix<double, 3, 4>& pixel_from_room, double sid_mm, int columns, int rows,
+         bool is_megavoltage) {
+        return xray_view_from_matrix(pixel_from_room, sid_mm, columns, rows,
+                                     is_megavoltage ? Beam::kMegavoltage : Beam::kKilovoltage);
+      },
+      py::arg("pixel_from_room"), py::kw_only(), py::arg("sid_mm"), py::arg("columns"), py::arg("rows"),
+      py::arg("is_megavoltage") = false,
+      "The view of any imager by its projection, shape (3, 4), up to scale, and the distance of its receptor's plane "
+      "from the source.");
+}
+
+}  // namespace isoshift::python

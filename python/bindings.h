@@ -1,0 +1,53 @@
+#pragma once
+// The parts of the Python module, and how arrays of numpy and our types become each other. Matrices are 4 x 4, in mm.
+
+#include <pybind11/eigen.h>
+#include <pybind11/numpy.h>
+#include <pybind11/pybind11.h>
+#include <pybind11/stl.h>
+#include <pybind11/stl/filesystem.h>
+
+#include <Eigen/Geometry>
+#include <vector>
+
+#include "geometry/image.h"
+#include "io/study/study.h"
+
+namespace isoshift::python {
+
+namespace py = pybind11;
+
+// A study, and what was noted when it was read.
+struct LoadedStudy {
+  Study study;
+  Notes notes;
+};
+
+void bind_geometry(py::module_& module);
+void bind_study(py::module_& module);
+void bind_drr(py::module_& module);
+void bind_registration(py::module_& module);
+
+using Poses = py::array_t<double, py::array::c_style | py::array::forcecast>;
+
+// A pose, shape (4, 4), or a batch of them, shape (P, 4, 4). Throws ValueError for another shape, or where a matrix is
+// not a rigid motion within 1e-4.
+std::vector<Eigen::Isometry3d> poses_from(const Poses& array);
+Eigen::Isometry3d pose_from(const Poses& array);
+inline Eigen::Matrix4d matrix_of(const Eigen::Isometry3d& pose) { return pose.matrix(); }
+
+// What is read from files stays as it was read.
+template <class T>
+py::array_t<T> read_only(py::array_t<T> array) {
+  array.attr("setflags")(py::arg("write") = false);
+  return array;
+}
+
+// The image as an array of shape (rows, columns), without a copy: `owner` keeps it.
+template <class T>
+py::array_t<T> array_of(const Image<T>& image, const py::handle& owner) {
+  return read_only(py::array_t<T>({static_cast<py::ssize_t>(image.rows), static_cast<py::ssize_t>(image.columns)},
+                                  image.pixels.data(), owner));
+}
+
+}  // namespace isoshift::python
