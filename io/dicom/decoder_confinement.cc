@@ -6,6 +6,7 @@
 #include <sys/prctl.h>
 #include <sys/resource.h>
 
+#include <cerrno>
 #include <csignal>
 #include <cstring>
 #include <memory>
@@ -21,7 +22,8 @@ constexpr rlim_t kMaxMemoryBytes = rlim_t{4} << 30;
 void limit_resources() {
   const auto limit = [](auto resource, rlim_t most) {
     const rlimit value{.rlim_cur = most, .rlim_max = most};
-    ::setrlimit(resource, &value);
+    if (::setrlimit(resource, &value) != 0)
+      throw Error(fmt::format("the decoder of compressed pixels cannot be confined: {}", std::strerror(errno)));
   };
   limit(RLIMIT_AS, kMaxMemoryBytes);
   limit(RLIMIT_FSIZE, 0);

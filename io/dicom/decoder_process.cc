@@ -103,6 +103,7 @@ class IdleDecoders {
  public:
   std::unique_ptr<DecoderProcess> take() {
     const std::lock_guard lock(mutex_);
+    forget_those_of_the_parent();
     if (idle_.empty()) return nullptr;
     auto process = std::move(idle_.back());
     idle_.pop_back();
@@ -110,20 +111,32 @@ class IdleDecoders {
   }
   void put(std::unique_ptr<DecoderProcess> process) {
     const std::lock_guard lock(mutex_);
+    forget_those_of_the_parent();
     idle_.push_back(std::move(process));
   }
   void end_all() {
     const std::lock_guard lock(mutex_);
+    forget_those_of_the_parent();
     idle_.clear();
   }
 
  private:
+  // A process that was forked may neither use nor end the children of its parent.
+  void forget_those_of_the_parent() {
+    if (owner_ == ::getpid()) return;
+    for (std::unique_ptr<DecoderProcess>& process : idle_) (void)process.release();
+    idle_.clear();
+    owner_ = ::getpid();
+  }
+
   std::mutex mutex_;
   std::vector<std::unique_ptr<DecoderProcess>> idle_;
+  pid_t owner_ = ::getpid();
 };
 
+// Never destroyed: the children end when the other end of their socket is gone.
 IdleDecoders& idle_decoders() {
-  static IdleDecoders decoders;
+  static auto& decoders = *new IdleDecoders;
   return decoders;
 }
 

@@ -6,6 +6,7 @@
 #include <zlib.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdlib>
 #include <memory>
 #include <new>
@@ -24,6 +25,7 @@ constexpr std::size_t kMaxElements = 600'000;
 constexpr std::uint64_t kMaxHeaderBytes = std::uint64_t{128} << 20;
 constexpr std::uint64_t kMaxInflatedBytes = std::uint64_t{64} << 20;
 constexpr std::uint32_t kUndefinedLength = 0xFFFFFFFF;
+constexpr double kMaxEdge = 8192, kMaxFrames = 20000;  // as readers allow (decode.cc)
 constexpr std::uint64_t kUntilClosed = ~std::uint64_t{0};
 
 // Value representations with lengths of two bytes, and of four behind two that are reserved (PS3.5 7.1.2).
@@ -68,18 +70,32 @@ class Walk {
     open(Level::Kind::kDataset, file.size(), guessed());
   }
 
-  // Past the file meta information, which need not be there. Its transfer syntax, empty where it names none.
+  // Past the file meta information, which need not be there. Its transfer syntax, empty where it names none. DCMTK
+  // takes the first of two, and believes the group's length.
   std::string transfer_syntax() {
     std::string uid;
+    std::uint64_t end = 0;
+    DcmTagKey last(0, 0);
     while (number(file_.piece(at_, 2), true) == DCM_TransferSyntaxUID.getGroup()) {
       const Element element = next_element();
+      if (element.tag <= last) fail(fmt::format("{} stands where a larger tag is expected", named(element)));
+      last = element.tag;
       skip(element);
+      if (element.tag == DCM_FileMetaInformationGroupLength && element.length == 4)
+        end = at_ + number(bytes(element.value_at, 4), true);
       constexpr std::size_t kLongest = 64;
       if (element.tag == DCM_TransferSyntaxUID)
         uid = bytes(element.value_at, std::min<std::size_t>(element.length, kLongest));
     }
+    if (end != 0 && end != at_)
+      fail(fmt::format("{} says that the file meta information ends at byte {}, and it ends at byte {}",
+                       described(DCM_FileMetaInformationGroupLength), end, at_));
     uid.resize(std::min(uid.find_last_not_of(std::string_view(" \0", 2)) + 1, uid.size()));
     levels_.front().encoding = guessed();
+    // DCMTK guesses, too, and could take the bytes of other first elements for big endian.
+    const std::string_view group = file_.piece(at_, 2);
+    if (uid.empty() && !group.empty() && group != std::string_view("\x08\0", 2))
+      fail("names no transfer syntax, and does not begin with group 0008 in little endian");
     return uid;
   }
   void set_encoding(Encoding encoding) { levels_.front().encoding = encoding; }
@@ -171,7 +187,7 @@ class Walk {
         element.value_at += 4;
       } else {
         if (levels_.size() == 1 && element.tag.getGroup() == 0) fail_as_no_part(element);
-        fail(fmt::format("at byte {} stands no DICOM element, but the bytes {:02X}", at_,
+        fail(fmt::format("at byte {} no DICOM element begins: found {:02X}", at_,
                          fmt::join(std::vector<unsigned char>(head.begin(), head.end()), " ")));
       }
     }
@@ -180,11 +196,14 @@ class Walk {
   }
 
   [[noreturn]] void fail_at_end_of(const Level& level) const {
+    const std::string_view left = file_.piece(at_, 8);
+    if (levels_.size() == 1 && left.find_first_not_of('\0') == std::string_view::npos)
+      fail(fmt::format("{} bytes from byte {} on are not part of its dataset", left.size(), at_));
     if (level.limit == file_.size()) fail_as_cut_off();
     fail(fmt::format("at byte {} an element is longer than the item around it", at_));
   }
 
-  // Behind a value that is not looked at.
+  // Skips a value.
   void skip(const Element& element) {
     const Level& level = levels_.back();
     if (element.length > level.limit - element.value_at) {
@@ -195,7 +214,7 @@ class Walk {
   }
 
   void close(const Level& level, const Element& element) {
-    if (level.end != kUntilClosed) fail(fmt::format("{} closes what has a length", named(element)));
+    if (level.end != kUntilClosed) fail(fmt::format("{} ends an item or a sequence of defined length", named(element)));
     levels_.pop_back();
   }
 
@@ -207,7 +226,10 @@ class Walk {
       fail(fmt::format("{} stands where an item of a sequence is expected", named(element)));
     } else if (level.kind == Level::Kind::kFragments) {
       skip(element);
-      if (levels_.size() == 2) check_pixel_bytes(fragment_bytes_ += element.length, 2.0);
+      if (levels_.size() == 2)
+        check_pixel_bytes(fragment_bytes_ += element.length, 2.0);
+      else
+        count_bytes(element);
     } else if (element.length == kUndefinedLength) {
       open(Level::Kind::kItem, kUntilClosed, level.encoding);
     } else {
@@ -231,12 +253,19 @@ class Walk {
     skip(element);
     if (is_top && element.tag == DCM_PixelData) check_pixel_bytes(element.length, 1.0);
     if (is_top) note_size(level, element);
-    if (is_top && element.tag != DCM_PixelData) header_bytes_ += element.length;
-    if (header_bytes_ > kMaxHeaderBytes)
-      fail(fmt::format("has more than {} MiB besides its pixels", kMaxHeaderBytes >> 20));
-    if (!is_sequence(level, element)) return;
+    if (!is_sequence(element)) {
+      if (!is_top || element.tag != DCM_PixelData) count_bytes(element);
+      return;
+    }
     at_ = element.value_at;
     open(Level::Kind::kSequence, element.value_at + element.length, encoding_in(level, element));
+  }
+
+  // A value at any depth, but for the pixels.
+  void count_bytes(const Element& element) {
+    header_bytes_ += element.length;
+    if (header_bytes_ > kMaxHeaderBytes)
+      fail(fmt::format("has more than {} MiB besides its pixels", kMaxHeaderBytes >> 20));
   }
 
   // PS3.5 6.2.2: what is in an element of unknown VR is implicit little endian.
@@ -244,14 +273,10 @@ class Walk {
     return element.vr == "UN" ? Encoding{.is_explicit = false, .is_little_endian = true} : level.encoding;
   }
 
-  // Without a VR the dictionary tells; of a private element what its value begins with.
-  bool is_sequence(const Level& level, const Element& element) const {
+  // Without a VR the dictionary tells; values of private elements are not looked into, by DCMTK neither.
+  static bool is_sequence(const Element& element) {
     if (!element.vr.empty() && element.vr != "UN") return element.vr == "SQ";
-    if (element.length < 8) return false;
-    if (DcmTag(element.tag).getEVR() == EVR_SQ) return true;
-    return element.tag.getGroup() % 2 == 1 &&
-           number(bytes(element.value_at, 2), encoding_in(level, element).is_little_endian) == 0xFFFE &&
-           number(bytes(element.value_at + 2, 2), encoding_in(level, element).is_little_endian) == 0xE000;
+    return element.length >= 8 && DcmTag(element.tag).getEVR() == EVR_SQ;
   }
 
   void note_size(const Level& level, const Element& element) {
@@ -260,17 +285,20 @@ class Walk {
     };
     if (element.tag == DCM_Rows) short_number(image_.rows);
     if (element.tag == DCM_Columns) short_number(image_.columns);
+    image_.rows = std::min(image_.rows, kMaxEdge);
+    image_.columns = std::min(image_.columns, kMaxEdge);
     if (element.tag == DCM_BitsAllocated) short_number(image_.bits);
     if (element.tag == DCM_SamplesPerPixel) short_number(image_.samples);
     if (element.tag == DCM_NumberOfFrames && element.length <= 12)
-      image_.frames = std::strtod(std::string(bytes(element.value_at, element.length)).c_str(), nullptr);
+      image_.frames = std::clamp(std::strtod(std::string(bytes(element.value_at, element.length)).c_str(), nullptr),
+                                 0.0, kMaxFrames);
   }
 
   // Native pixels take what the header says, and a byte that makes their number even; compressed ones may take more,
   // with the headers of their streams. Where the header does not say, a reader will; until then the bound is another.
   void check_pixel_bytes(std::uint64_t found, double share) const {
     constexpr double kStreamHeaders = 1 << 20;
-    const double needed = share * image_.bytes() + (share > 1.0 ? kStreamHeaders : 1.0);
+    const double needed = share > 1.0 ? share * image_.bytes() + kStreamHeaders : 2.0 * std::ceil(image_.bytes() / 2.0);
     if (image_.bytes() > 0.0 && static_cast<double>(found) > needed)
       fail(fmt::format("{} holds {} bytes, more than its {} x {} pixels take", described(DCM_PixelData), found,
                        image_.columns, image_.rows));
@@ -340,7 +368,9 @@ FileStructure structure_of(FileBytes& file) {
       const std::string bytes =
           inflated(std::string_view(file.whole(kMaxInflatedBytes)).substr(walk.at()), file.path());
       FileBytes dataset(bytes, file.path());
-      Walk(dataset, 0).pixels_at();
+      Walk inside(dataset, 0);
+      inside.set_encoding({.is_explicit = true, .is_little_endian = true});
+      inside.pixels_at();
       return {.is_deflated = true, .header_end = file.size()};
     }
     walk.set_encoding({.is_explicit = syntax.isExplicitVR(), .is_little_endian = syntax.isLittleEndian()});

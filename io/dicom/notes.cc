@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include "base/error.h"
+#include "base/option_name.h"
 
 namespace isoshift {
 
@@ -20,8 +21,10 @@ std::vector<Finding> not_allowed(const std::vector<Finding>& findings, const All
 void settle(const std::vector<Finding>& findings, const Allowances& allowed, Notes& notes) {
   std::string refused;
   for (const Finding& finding : not_allowed(findings, allowed, notes))
-    refused += fmt::format("{}{}\n       If that is known to be right, allow it: --allow {}=REASON",
-                           refused.empty() ? "" : "\n", finding.message, finding.key);
+    refused += fmt::format(
+        "{}{}\n"
+        "       If that is known to be right, allow it: {}",
+        refused.empty() ? "" : "\n", finding.message, option("allow", fmt::format("{}=REASON", finding.key)));
   if (!refused.empty()) throw Error(refused);
 }
 

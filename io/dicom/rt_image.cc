@@ -167,7 +167,8 @@ RtImage read_frame(const std::filesystem::path& path, const DicomItem& d, const 
   image.columns = format.columns;
   image.rows = format.rows;
   image.intensity_relationship = d.text(DCM_PixelIntensityRelationship);
-  if (const auto sign = d.number(DCM_PixelIntensityRelationshipSign)) image.intensity_sign = static_cast<int>(*sign);
+  if (const auto sign = d.number(DCM_PixelIntensityRelationshipSign))
+    image.intensity_sign = *sign == 1.0 || *sign == -1.0 ? static_cast<int>(*sign) : 0;
   image.photometric_interpretation = d.text(DCM_PhotometricInterpretation).value_or("");
   image.is_lossy = d.text(DCM_LossyImageCompression) == "01";
   image.has_modality_lut = !d.items(DCM_ModalityLUTSequence).empty();

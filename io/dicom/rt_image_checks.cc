@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "base/error.h"
+#include "base/option_name.h"
 #include "io/dicom/rt_image.h"
 
 namespace isoshift {
@@ -40,48 +41,48 @@ RtImage with_switches(RtImage image, const RtImageSwitches& switches, Notes& not
   const bool by_matrix = image.pixel_from_room.has_value();  // says all of the geometry but the couch's
   if (const auto angle = switches.gantry_angle_deg.find(image.label);
       angle != switches.gantry_angle_deg.end() && by_matrix)
-    throw UsageError(fmt::format("--gantry-angle {}={}: the machine profile gives this image a projection matrix",
-                                 image.label, angle->second));
+    throw UsageError(fmt::format("{}: the machine profile gives this image a projection matrix",
+                                 option("gantry-angle", fmt::format("{}={}", image.label, angle->second))));
   else if (angle != switches.gantry_angle_deg.end())
     replace(image.gantry_angle_deg, angle->second, named(DCM_GantryAngle),
-            by(fmt::format("--gantry-angle {}={}", image.label, angle->second)), notes);
+            by(option("gantry-angle", fmt::format("{}={}", image.label, angle->second))), notes);
   if (switches.couch_angle_deg)
     replace(image.table.support_angle_deg, *switches.couch_angle_deg, named(DCM_PatientSupportAngle),
-            by(fmt::format("--couch-angle {}", *switches.couch_angle_deg)), notes);
+            by(option("couch-angle", fmt::to_string(*switches.couch_angle_deg))), notes);
   if (switches.couch_pitch_deg)
     replace(image.table.pitch_deg, *switches.couch_pitch_deg, named(DCM_TableTopPitchAngle),
-            by(fmt::format("--couch-pitch {}", *switches.couch_pitch_deg)), notes);
+            by(option("couch-pitch", fmt::to_string(*switches.couch_pitch_deg))), notes);
   if (switches.couch_roll_deg)
     replace(image.table.roll_deg, *switches.couch_roll_deg, named(DCM_TableTopRollAngle),
-            by(fmt::format("--couch-roll {}", *switches.couch_roll_deg)), notes);
+            by(option("couch-roll", fmt::to_string(*switches.couch_roll_deg))), notes);
   if (switches.sad_mm && !by_matrix)
     replace(image.sad_mm, *switches.sad_mm, named(DCM_RadiationMachineSAD),
-            by(fmt::format("--sad {}", *switches.sad_mm)), notes);
+            by(option("sad", fmt::to_string(*switches.sad_mm))), notes);
   if (switches.sid_mm && !by_matrix)
-    replace(image.sid_mm, *switches.sid_mm, named(DCM_RTImageSID), by(fmt::format("--sid {}", *switches.sid_mm)),
+    replace(image.sid_mm, *switches.sid_mm, named(DCM_RTImageSID), by(option("sid", fmt::to_string(*switches.sid_mm))),
             notes);
   if (switches.position_mm && !by_matrix)
     replace(image.position_mm, *switches.position_mm, named(DCM_RTImagePosition),
-            by(fmt::format("--rt-image-position {},{}", switches.position_mm->x(), switches.position_mm->y())), notes);
+            by(option("rt-image-position", fmt::format("{},{}", switches.position_mm->x(), switches.position_mm->y()))),
+            notes);
   if (switches.assume_centered && !image.position_mm && image.pixel_spacing_mm && !by_matrix)
     replace(image.position_mm,
             Eigen::Vector2d(-0.5 * (image.columns - 1) * image.pixel_spacing_mm->y(),
                             0.5 * (image.rows - 1) * image.pixel_spacing_mm->x()),
-            named(DCM_RTImagePosition), by("--assume-centered"), notes);
+            named(DCM_RTImagePosition), by(option("assume-centered")), notes);
   if (switches.intensity) {
     const bool is_linear = switches.intensity->relationship == PixelIntensity::Relationship::kLin;
     replace(image.intensity_relationship, std::string(is_linear ? "LIN" : "LOG"), named(DCM_PixelIntensityRelationship),
-            by(fmt::format("--intensity {}", to_string(*switches.intensity))), notes);
+            by(option("intensity", to_string(*switches.intensity))), notes);
     image.intensity_sign = switches.intensity->sign;
   }
   if (switches.beam) {
     const bool is_kv = *switches.beam == Beam::kKilovoltage;
-    replace(image.kvp, is_kv ? 100.0 : 6000.0, named(DCM_KVP), by(fmt::format("--beam {}", is_kv ? "kv" : "mv")),
-            notes);
+    replace(image.kvp, is_kv ? 100.0 : 6000.0, named(DCM_KVP), by(option("beam", is_kv ? "kv" : "mv")), notes);
   }
   if (switches.patient_position)
     replace(image.patient_position, std::string(to_string(*switches.patient_position)), named(DCM_PatientPosition),
-            by(fmt::format("--patient-position {}", to_string(*switches.patient_position))), notes);
+            by(option("patient-position", to_string(*switches.patient_position))), notes);
   return image;
 }
 
@@ -93,23 +94,25 @@ std::vector<MissingAttribute> missing_attributes(const RtImage& image) {
   need(!image.identity.study_instance_uid.empty(), DCM_StudyInstanceUID, "");
   need(!image.series_instance_uid.empty(), DCM_SeriesInstanceUID, "");
   if (!image.is_rt_image() && !image.pixel_from_room)
-    need(false, DCM_ImagePlanePixelSpacing, "a projection matrix in a machine profile (--machine FILE)");
+    need(false, DCM_ImagePlanePixelSpacing,
+         "a projection matrix in a machine profile (" + option("machine", "FILE") + ")");
   const bool needs_geometry = image.is_rt_image() && !image.pixel_from_room;
   need(!needs_geometry || image.plane.has_value(), DCM_RTImagePlane, "");
   need(!needs_geometry || image.pixel_spacing_mm.has_value(), DCM_ImagePlanePixelSpacing, "");
   need(!needs_geometry || image.position_mm.has_value(), DCM_RTImagePosition,
-       "--rt-image-position X,Y or --assume-centered");
-  need(!needs_geometry || image.sad_mm.has_value(), DCM_RadiationMachineSAD, "--sad MM");
-  need((!needs_geometry && !image.pixel_from_room) || image.sid_mm.has_value(), DCM_RTImageSID, "--sid MM");
+       option("rt-image-position", "X,Y") + " or " + option("assume-centered"));
+  need(!needs_geometry || image.sad_mm.has_value(), DCM_RadiationMachineSAD, option("sad", "MM"));
+  need((!needs_geometry && !image.pixel_from_room) || image.sid_mm.has_value(), DCM_RTImageSID, option("sid", "MM"));
   need(!needs_geometry || image.gantry_angle_deg.has_value(), DCM_GantryAngle,
-       fmt::format("--gantry-angle {}=DEG", image.label));
-  need(image.table.support_angle_deg.has_value(), DCM_PatientSupportAngle, "--couch-angle DEG");
-  need(image.patient_position.has_value(), DCM_PatientPosition, "--patient-position HFS");
+       option("gantry-angle", fmt::format("{}=DEG", image.label)));
+  need(image.table.support_angle_deg.has_value(), DCM_PatientSupportAngle, option("couch-angle", "DEG"));
+  need(image.patient_position.has_value(), DCM_PatientPosition, option("patient-position", "HFS"));
   const bool known = image.intensity_relationship == "LIN" || image.intensity_relationship == "LOG";
-  need(known, DCM_PixelIntensityRelationship, "--intensity LIN+|LIN-|LOG+|LOG-",
+  need(known, DCM_PixelIntensityRelationship, option("intensity", "LIN+|LIN-|LOG+|LOG-"),
        image.intensity_relationship.value_or(""));
   need(!known || image.intensity_sign == 1 || image.intensity_sign == -1, DCM_PixelIntensityRelationshipSign,
-       "--intensity LIN+|LIN-|LOG+|LOG-", image.intensity_sign ? fmt::format("{}", *image.intensity_sign) : "");
+       option("intensity", "LIN+|LIN-|LOG+|LOG-"),
+       image.intensity_sign ? fmt::format("{}", *image.intensity_sign) : "");
   return missing;
 }
 
@@ -144,8 +147,9 @@ std::vector<Finding> rt_image_findings(const RtImage& image) {
 Beam beam_of(const RtImage& image, Notes& notes) {
   if (image.kvp) return *image.kvp > 1000.0 ? Beam::kMegavoltage : Beam::kKilovoltage;
   const bool is_portal = image.image_type == "PORTAL";
-  notes.warnings.push_back(fmt::format("{}: {} is missing; taken as {} from image type {} (--beam kv|mv replaces it)",
-                                       image.label, described(DCM_KVP), is_portal ? "MV" : "kV", image.image_type));
+  notes.warnings.push_back(fmt::format("{}: {} is missing; taken as {} from image type {} ({} replaces it)",
+                                       image.label, described(DCM_KVP), is_portal ? "MV" : "kV", image.image_type,
+                                       option("beam", "kv|mv")));
   return is_portal ? Beam::kMegavoltage : Beam::kKilovoltage;
 }
 

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "base/error.h"
+#include "base/option_name.h"
 #include "io/dicom/rt_image.h"
 
 namespace isoshift {
@@ -25,18 +26,20 @@ TableAngles table_angles(std::span<const RtImage> images, Notes& notes) {
         std::ranges::find_if(images, [&](const RtImage& image) { return (image.table.*angle_deg).has_value(); });
     return says == images.end() ? std::nullopt : says->table.*angle_deg;
   };
-  const auto angle_rad = [&](const std::optional<double>& value_deg, const DcmTagKey& tag, const char* flag) {
+  const auto angle_rad = [&](const std::optional<double>& value_deg, const DcmTagKey& tag, const std::string& flag) {
     if (!value_deg)
       notes.warnings.push_back(
-          fmt::format("{} is missing in all X-rays, taken as 0; {} DEG supplies it", described(tag), flag));
+          fmt::format("{} is missing in all X-rays, taken as 0; {} supplies it", described(tag), flag));
     return wrapped_rad(rad_from_deg(value_deg.value_or(0.0)));
   };
   const double eccentric_deg = first_deg(&TableReadOuts::eccentric_angle_deg).value_or(0.0);
   const TableAngles table{
-      .support_rad = angle_rad(first_deg(&TableReadOuts::support_angle_deg), DCM_PatientSupportAngle, "--couch-angle"),
+      .support_rad = angle_rad(first_deg(&TableReadOuts::support_angle_deg), DCM_PatientSupportAngle,
+                               option("couch-angle", "DEG")),
       .eccentric_rad = wrapped_rad(rad_from_deg(eccentric_deg)),
-      .pitch_rad = angle_rad(first_deg(&TableReadOuts::pitch_deg), DCM_TableTopPitchAngle, "--couch-pitch"),
-      .roll_rad = angle_rad(first_deg(&TableReadOuts::roll_deg), DCM_TableTopRollAngle, "--couch-roll"),
+      .pitch_rad =
+          angle_rad(first_deg(&TableReadOuts::pitch_deg), DCM_TableTopPitchAngle, option("couch-pitch", "DEG")),
+      .roll_rad = angle_rad(first_deg(&TableReadOuts::roll_deg), DCM_TableTopRollAngle, option("couch-roll", "DEG")),
   };
   if (std::abs(table.eccentric_rad) > rad_from_deg(kMaxAngleNoiseDeg))
     notes.warnings.push_back(fmt::format("{} is {} degrees and was added to the couch angle",

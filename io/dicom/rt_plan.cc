@@ -8,6 +8,7 @@
 #include <set>
 
 #include "base/error.h"
+#include "base/option_name.h"
 
 namespace isoshift {
 namespace {
@@ -107,16 +108,16 @@ Eigen::Vector3d common_isocenter(const RtPlan& plan, std::span<const RtPlan::Bea
     if (common && (*beam.isocenter_patient_mm - *common).norm() > 0.01)
       throw Error(
           fmt::format("{}: beams have different isocenters ({}): ({}) and ({}) mm.\n"
-                      "       Say which one the patient was set up to: --isocenter X,Y,Z",
+                      "       Say which one the patient was set up to: {}",
                       plan.path.string(), described(DCM_IsocenterPosition), fmt::join(*common, ", "),
-                      fmt::join(*beam.isocenter_patient_mm, ", ")));
+                      fmt::join(*beam.isocenter_patient_mm, ", "), option("isocenter", "X,Y,Z")));
     common = beam.isocenter_patient_mm;
   }
   if (!common)
     throw Error(
         fmt::format("{}: {} is missing in the first control point of every beam.\n"
-                    "       Supply it: --isocenter X,Y,Z",
-                    plan.path.string(), described(DCM_IsocenterPosition)));
+                    "       Supply it: {}",
+                    plan.path.string(), described(DCM_IsocenterPosition), option("isocenter", "X,Y,Z")));
   return *common;
 }
 

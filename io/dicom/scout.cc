@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "base/error.h"
+#include "base/option_name.h"
 #include "io/dicom/decode.h"
 #include "io/dicom/pixel_padding.h"
 
@@ -32,17 +33,16 @@ Vector3d direction_of(TubeSide side) {
 }
 
 double distance_from(const DicomItem& dataset, const DcmTagKey& tag, const std::optional<double>& given,
-                     std::string_view flag, Notes& notes) {
+                     const std::string& flag, Notes& notes) {
   const std::optional<double> found = dataset.number(tag);
   if (given) {
     if (found != *given)
-      notes.overrides.push_back(fmt::format("{}: {} MM: {:g} mm for {}, {}", dataset.where(), flag, *given,
-                                            described(tag),
+      notes.overrides.push_back(fmt::format("{}: {}: {:g} mm for {}, {}", dataset.where(), flag, *given, described(tag),
                                             found ? fmt::format("which is {:g}", *found) : "which is missing"));
     return *given;
   }
   if (!found)
-    throw Error(fmt::format("{}: {} is missing\n       {} MM supplies it", dataset.where(), described(tag), flag));
+    throw Error(fmt::format("{}: {} is missing\n       {} supplies it", dataset.where(), described(tag), flag));
   return *found;
 }
 
@@ -155,8 +155,8 @@ Scout read_scout(const std::filesystem::path& path, const ScoutSwitches& switche
   scout.frame_of_reference_uid = dataset.required_uid(DCM_FrameOfReferenceUID);
   scout.patient_position = dataset.text(DCM_PatientPosition).value_or("");
   scout.sha256 = file.sha256();
-  scout.sad_mm = distance_from(dataset, DCM_DistanceSourceToPatient, switches.sad_mm, "--sad", notes);
-  scout.sid_mm = distance_from(dataset, DCM_DistanceSourceToDetector, switches.sid_mm, "--sid", notes);
+  scout.sad_mm = distance_from(dataset, DCM_DistanceSourceToPatient, switches.sad_mm, option("sad", "MM"), notes);
+  scout.sid_mm = distance_from(dataset, DCM_DistanceSourceToDetector, switches.sid_mm, option("sid", "MM"), notes);
   if (!(scout.sad_mm >= kLeastSadMm && scout.sad_mm <= kMostSadMm && scout.sid_mm > scout.sad_mm))
     throw Error(fmt::format("{}: {} is {:g} and {} is {:g} mm, expected {:g} to {:g} mm and a larger one",
                             path.string(), described(DCM_DistanceSourceToPatient), scout.sad_mm,

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "base/error.h"
+#include "base/option_name.h"
 
 namespace isoshift {
 namespace {
@@ -120,8 +121,8 @@ Volume<std::uint8_t> mask_of(const Structure& structure, const Eigen::Vector3i& 
   if (std::ranges::find(mask.voxels, std::uint8_t{1}) == mask.voxels.end())
     throw Error(
         fmt::format("{}: no voxel of the CT lies in it ({}): it is drawn outside of the CT, or is smaller than a "
-                    "voxel. Name another structure, or the CT on which this one was drawn (--ct FOLDER)",
-                    name_of(structure), described(DCM_ContourData)));
+                    "voxel. Name another structure, or the CT on which this one was drawn ({})",
+                    name_of(structure), described(DCM_ContourData), option("ct", "FOLDER")));
   return mask;
 }
 
