@@ -9,6 +9,7 @@
 #include <iterator>
 #include <optional>
 
+#include "base/option_name.h"
 #include "geometry/rotation.h"
 #include "io/dicom/dicom_dataset.h"
 
@@ -86,10 +87,10 @@ std::vector<Finding> setting_doubts(std::span<const RtImage> images) {
   return doubts;
 }
 
-// The switch that supplies a table angle.
-const char* flag_of(const TableReadOut& read_out) {
-  if (read_out.tag == DCM_PatientSupportAngle) return "--couch-angle";
-  return read_out.tag == DCM_TableTopPitchAngle ? "--couch-pitch" : "--couch-roll";
+// The option that supplies a table angle.
+std::string_view option_for(const TableReadOut& read_out) {
+  if (read_out.tag == DCM_PatientSupportAngle) return "couch-angle";
+  return read_out.tag == DCM_TableTopPitchAngle ? "couch-pitch" : "couch-roll";
 }
 
 // Views whose distance in time is not known. An unmoved table does not prove that the patient stayed on it.
@@ -170,16 +171,18 @@ std::vector<Finding> session_findings(std::span<const RtImage> images, Notes& no
                                              image.label, described(tag)));
   };
 
-  compare(DCM_AcquisitionTime, acquisition_seconds,
-          [](const RtImage& image, const RtImage& first) -> std::optional<Finding> {
-            const double apart_s = std::abs(*acquisition_seconds(image) - *acquisition_seconds(first));
-            if (apart_s <= kMaxTimeSpanS) return std::nullopt;
-            return Finding{"time-span", fmt::format("{}: taken {:.0f} minutes from {}, expected at most 10 ({})\n"
-                                                    "       Of several sessions isoshift batch registers each, and "
-                                                    "--latest, --date, --fraction or --session chooses one.",
-                                                    image.path.string(), apart_s / 60.0, first.path.string(),
-                                                    described(DCM_AcquisitionTime))};
-          });
+  compare(
+      DCM_AcquisitionTime, acquisition_seconds,
+      [](const RtImage& image, const RtImage& first) -> std::optional<Finding> {
+        const double apart_s = std::abs(*acquisition_seconds(image) - *acquisition_seconds(first));
+        if (apart_s <= kMaxTimeSpanS) return std::nullopt;
+        return Finding{
+            "time-span",
+            fmt::format("{}: taken {:.0f} minutes from {}, expected at most 10 ({})\n"
+                        "       Of several sessions isoshift batch registers each, and {}, {}, {} or {} chooses one.",
+                        image.path.string(), apart_s / 60.0, first.path.string(), described(DCM_AcquisitionTime),
+                        option("latest"), option("date"), option("fraction"), option("session"))};
+      });
   for (const TableReadOut& read_out : table_read_outs()) {
     const auto value_of = [&](const RtImage& image) { return image.table.*read_out.value; };
     if (std::ranges::any_of(images, [&](const RtImage& image) { return value_of(image).has_value(); }))
@@ -197,9 +200,10 @@ std::vector<Finding> switch_doubts(std::span<const RtImage> images, const RtImag
   for (const TableReadOut& read_out : table_read_outs())
     for (const RtImage& image : images)
       if (table_change(read_out, supplied, image.table))
-        doubts.push_back({"table-moved",
-                          fmt::format("{} {} contradicts {}: {} is {}", flag_of(read_out), *(supplied.*read_out.value),
-                                      image.label, described(read_out.tag), *(image.table.*read_out.value))});
+        doubts.push_back(
+            {"table-moved", fmt::format("{} contradicts {}: {} is {}",
+                                        option(option_for(read_out), fmt::to_string(*(supplied.*read_out.value))),
+                                        image.label, described(read_out.tag), *(image.table.*read_out.value))});
   return doubts;
 }
 

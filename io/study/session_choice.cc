@@ -67,14 +67,17 @@ SessionFiles chosen_session(const SessionChoice& choice, const std::vector<Sessi
   if (fitting.empty()) fail(fmt::format("there is no session {}", as_asked(choice)));
   if (!choice.is_latest && fitting.size() > 1)
     fail(fmt::format("{} sessions are {}", fitting.size(), as_asked(choice)));
-  // The order of sessions is that of time within a patient.
-  const auto time_of = [](const SessionFiles& session) { return session.images.back().at_s; };
-  if (choice.is_latest && fitting.size() > 1)
-    for (const SessionFiles& session : fitting)
-      if (!time_of(session))
-        fail(fmt::format("{}: does not say when it was taken, so that the latest session is not known",
-                         session.images.front().file.string()));
-  return *std::ranges::max_element(fitting, {}, time_of);
+  for (const SessionFiles& session : fitting)
+    if (patient_id_of(session.patient) != patient_id_of(fitting.front().patient) ||
+        !may_be_of_one_issuer(session.patient, fitting.front().patient))
+      fail("the sessions that fit are of several patients");
+  const auto newest = [](const SessionFiles& session) -> const StudyFiles::Image& { return session.images.back(); };
+  for (const SessionFiles& session : fitting)
+    for (const SessionFiles& other : fitting)
+      if (&session != &other && !tells_which_is_first(newest(session), newest(other)))
+        fail(fmt::format("{} and {}: their times do not tell which was taken later", newest(session).file.string(),
+                         newest(other).file.string()));
+  return *std::ranges::max_element(fitting, {}, [&](const SessionFiles& session) { return newest(session).at_s; });
 }
 
 }  // namespace isoshift

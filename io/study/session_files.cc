@@ -148,7 +148,7 @@ class Doubts {
     for (const StudyFiles::Image* const one : all) {
       const StudyFiles::Image& other = *one;
       if (is_in(own, other)) continue;
-      if (!is_comparable(own.front(), other)) {
+      if (!tells_which_is_first(own.front(), other)) {
         if (has_label(own, other.label))
           doubts.push_back(fmt::format("{} shows {}, too, and whether it was taken before or after is not known",
                                        other.file.string(), other.label));
@@ -185,15 +185,6 @@ class Doubts {
     return std::ranges::find(own, image.sop_instance_uid, &StudyFiles::Image::sop_instance_uid) != own.end();
   }
 
-  // Whether the times tell which was taken first: not if one of them is unknown, if one has an offset from UTC and the
-  // other none, or if clock and offset contradict each other.
-  static bool is_comparable(const StudyFiles::Image& a, const StudyFiles::Image& b) {
-    if (!a.at_s || !b.at_s) return false;
-    if (a.has_utc_offset != b.has_utc_offset)
-      return std::abs(*a.at_s - *b.at_s) > StudyFiles::kLargestUtcOffsetS + kMaxTimeSpanS;
-    return a.at_s == b.at_s || a.acquired == b.acquired || (*a.at_s < *b.at_s) == (a.acquired < b.acquired);
-  }
-
   // Whether the X-ray may be a copy of one of `own` in another class: it has that time, and no label.
   static bool is_copy_of_one(Images own, const StudyFiles::Image& other) {
     return other.label.empty() && std::ranges::find(own, other.at_s, &StudyFiles::Image::at_s) != own.end() &&
@@ -211,7 +202,7 @@ class Doubts {
   static Neighbors retakes(Images own, std::span<const StudyFiles::Image* const> all) {
     Neighbors neighbors;
     for (const StudyFiles::Image* const other : all)
-      if (!is_in(own, *other) && is_comparable(own.front(), *other) && has_label(own, other->label) &&
+      if (!is_in(own, *other) && tells_which_is_first(own.front(), *other) && has_label(own, other->label) &&
           !has_table_moved(own.front().table, other->table) &&
           (*other->at_s < *own.front().at_s || *other->at_s > *own.back().at_s))
         neighbors.add(own, other);
@@ -326,6 +317,13 @@ void compare_copies(StudyFiles& files) {
       image.other = first->second->file;
       first->second->other = image.file;
     }
+}
+
+bool tells_which_is_first(const StudyFiles::Image& a, const StudyFiles::Image& b) {
+  if (!a.at_s || !b.at_s) return false;
+  if (a.has_utc_offset != b.has_utc_offset)
+    return std::abs(*a.at_s - *b.at_s) > StudyFiles::kLargestUtcOffsetS + kMaxTimeSpanS;
+  return a.at_s == b.at_s || a.acquired == b.acquired || (*a.at_s < *b.at_s) == (a.acquired < b.acquired);
 }
 
 std::string session_name(const std::set<std::string>& sop_instance_uids) {

@@ -43,6 +43,10 @@ std::vector<std::string> doubts_about(const SessionFiles& session, const StudyFi
 // Finds X-rays that have one SOPInstanceUID and different contents, and notes in each the file of the other.
 void compare_copies(StudyFiles& files);
 
+// Whether the times tell which was taken first: not if one of them is unknown, if one has an offset from UTC and the
+// other none, or if clock and offset contradict each other.
+bool tells_which_is_first(const StudyFiles::Image& a, const StudyFiles::Image& b);
+
 // The name of the session of these X-rays.
 std::string session_name(const std::set<std::string>& sop_instance_uids);
 

@@ -11,6 +11,7 @@
 #include <tuple>
 
 #include "base/error.h"
+#include "base/option_name.h"
 #include "io/dicom/decode.h"
 
 namespace isoshift {
@@ -156,8 +157,8 @@ void keep_earliest_of_each_imager(std::vector<RtImage>& images) {
 void check_labels(const RtImageSwitches& switches, const std::vector<RtImage>& images) {
   for (const auto& [label, angle_deg] : switches.gantry_angle_deg)
     if (const auto count = std::ranges::count(images, label, &RtImage::label); count != 1)
-      throw UsageError(
-          fmt::format("--gantry-angle {}={}: {} images have this label, expected one", label, angle_deg, count));
+      throw UsageError(fmt::format("{}: {} images have this label, expected one",
+                                   option("gantry-angle", fmt::format("{}={}", label, angle_deg)), count));
 }
 
 void check_nothing_missing(const std::vector<RtImage>& images, std::string refused) {
@@ -279,7 +280,7 @@ void check_together(const StudyRequest& request, const SaidOfSession& said, Stud
   settle(findings, request.allowed, notes);
   study.doubts = request.parts.doubts;
   for (const Finding& doubt : not_allowed(said.doubts, request.allowed, notes))
-    study.doubts.push_back(fmt::format("{} (--allow {}=REASON)", doubt.message, doubt.key));
+    study.doubts.push_back(fmt::format("{} ({})", doubt.message, option("allow", fmt::format("{}=REASON", doubt.key))));
   check_one_patient_position(study);
 }
 
@@ -304,22 +305,23 @@ void place_patient(const StudyRequest& request, const std::vector<RtPlan::Beam>&
   study.table = table_angles(study.rt_images, notes);
   if (request.isocenter_patient_mm) {
     study.isocenter_patient_mm = *request.isocenter_patient_mm;
-    notes.overrides.push_back(fmt::format("{}: ({}) mm by --isocenter", described(DCM_IsocenterPosition),
-                                          fmt::join(study.isocenter_patient_mm, ", ")));
+    notes.overrides.push_back(fmt::format("{}: ({}) mm by {}", described(DCM_IsocenterPosition),
+                                          fmt::join(study.isocenter_patient_mm, ", "), option("isocenter")));
   } else if (study.plan) {
     study.isocenter_patient_mm = common_isocenter(*study.plan, beams);
     check_isocenter_of_images(study, request.allowed, notes);
   } else {
     throw Error(fmt::format(
         "no RT Plan found ({}), so the planned isocenter is unknown.\n"
-        "       Name the plan (--plan FILE) or supply the isocenter: --isocenter X,Y,Z",
-        request.parts.study.empty() ? "no study folder was given" : "searched " + request.parts.study.string()));
+        "       Name the plan ({}) or supply the isocenter: {}",
+        request.parts.study.empty() ? "no study folder was given" : "searched " + request.parts.study.string(),
+        option("plan", "FILE"), option("isocenter", "X,Y,Z")));
   }
   if (const auto planned = study.plan ? common_patient_position(*study.plan, beams) : std::nullopt;
       planned && *planned != to_string(study.patient_position))
     throw Error(fmt::format(
         "{}: {} is {}, that of {} is {}",
-        request.switches.patient_position ? "--patient-position" : study.rt_images.front().path.string(),
+        request.switches.patient_position ? option("patient-position") : study.rt_images.front().path.string(),
         described(DCM_PatientPosition), to_string(study.patient_position), study.plan->path.string(), *planned));
   if (!study.ct->patient_position.empty() && study.ct->patient_position != to_string(study.patient_position))
     notes.warnings.push_back(fmt::format("the CT was scanned in {}, the patient is treated in {} ({})",

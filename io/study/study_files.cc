@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "base/error.h"
+#include "base/option_name.h"
 #include "base/parallel.h"
 #include "base/sha256.h"
 #include "io/dicom/dicom_dataset.h"
@@ -74,7 +75,8 @@ std::optional<double> read_out(const DicomItem& dataset, const DcmTagKey& tag) {
 StudyFiles::Image xray(const fs::path& path, const DicomItem& dataset) {
   RtImage timed;
   read_acquisition_time(dataset, timed);
-  const std::optional<double> fraction = dataset.number(DCM_FractionNumber);
+  constexpr double kMostFractions = 1e6;
+  const double fraction = dataset.number(DCM_FractionNumber).value_or(0.0);
   return {.file = path,
           .patient = patient_of(dataset),
           .sop_instance_uid = dataset.required_uid(DCM_SOPInstanceUID),
@@ -84,7 +86,8 @@ StudyFiles::Image xray(const fs::path& path, const DicomItem& dataset) {
           .at_s = acquisition_seconds(timed),
           .has_utc_offset = timed.utc_offset_min.has_value(),
           .acquired = acquired(timed),
-          .fraction = fraction ? std::optional(static_cast<int>(*fraction)) : std::nullopt,
+          .fraction =
+              fraction >= 1.0 && fraction < kMostFractions ? std::optional(static_cast<int>(fraction)) : std::nullopt,
           .table = read_table_read_outs([&](const TableReadOut& one) { return read_out(dataset, one.tag); },
                                         dataset.text(DCM_ReportedValuesOrigin))};
 }
@@ -133,8 +136,10 @@ void drop_copies(std::vector<StudyFiles::Plan>& plans, Notes& notes) {
       continue;
     }
     if (sha256_of_file(first->file) != sha256_of_file(plan->file))
-      throw Error(fmt::format("{}: has the {} of {}, but other contents.\n       Name the plan: --plan FILE",
-                              plan->file.string(), described(DCM_SOPInstanceUID), first->file.string()));
+      throw Error(fmt::format(
+          "{}: has the {} of {}, but other contents.\n"
+          "       Name the plan: {}",
+          plan->file.string(), described(DCM_SOPInstanceUID), first->file.string(), option("plan", "FILE")));
     notes.left_aside.push_back(fmt::format("{}: the same RT Plan as {}", plan->file.string(), first->file.string()));
     plan = plans.erase(plan);
   }
@@ -152,8 +157,9 @@ const StudyFiles::Plan* choose_plan(const StudyFiles& files, bool was_named) {
   std::string list;
   for (const StudyFiles::Plan& plan : files.plans) list += "\n       " + plan.file.string();
   throw Error(
-      fmt::format("{} RT Plans {}, and the X-rays do not tell which one is meant:{}\n       Name the plan: --plan FILE",
-                  files.plans.size(), was_named ? "named" : "found", list));
+      fmt::format("{} RT Plans {}, and the X-rays do not tell which one is meant:{}\n"
+                  "       Name the plan: {}",
+                  files.plans.size(), was_named ? "named" : "found", list, option("plan", "FILE")));
 }
 
 // The CT in whose frame of reference the plan was made; of several, the one its structure set was drawn on.
@@ -172,10 +178,13 @@ const StudyFiles::Ct& choose_ct(const StudyFiles& files, const StudyFiles::Plan*
   for (const StudyFiles::Ct& ct : files.cts)
     list += fmt::format("\n       {} slices, series {}, first file {}", ct.files.size(), ct.series_instance_uid,
                         ct.files.front().string());
-  throw Error(fmt::format("{} CT series found, and {}:{}\n       Name the planning CT: --ct FOLDER", files.cts.size(),
-                          candidates.empty() ? "none is in the plan's frame of reference"
-                                             : "the plan does not tell which one it was made on",
-                          list));
+  throw Error(
+      fmt::format("{} CT series found, and {}:{}\n"
+                  "       Name the planning CT: {}",
+                  files.cts.size(),
+                  candidates.empty() ? "none is in the plan's frame of reference"
+                                     : "the plan does not tell which one it was made on",
+                  list, option("ct", "FOLDER")));
 }
 
 // Whether a structure set was drawn on the CT. One that names no images may have been, if it is in the CT's frame.
@@ -213,8 +222,8 @@ void choose_structures(const std::vector<StudyFiles::Structures>& all, const Stu
     else if (candidates.size() == 1 && is_drawn_on(ct, structures))
       reason = "an RT Structure Set that the plan does not refer to";
     else if (is_drawn_on(ct, structures))
-      reason = fmt::format("one of {} RT Structure Sets drawn on the CT; name the one meant: --structures FILE",
-                           candidates.size());
+      reason = fmt::format("one of {} RT Structure Sets drawn on the CT; name the one meant: {}", candidates.size(),
+                           option("structures", "FILE"));
     notes.left_aside.push_back(fmt::format("{}: {}", structures.file.string(), reason));
   }
 }
@@ -224,8 +233,11 @@ void take_named_structures(const fs::path& named, const std::vector<StudyFiles::
                            Notes& notes) {
   const std::vector<StudyFiles::Structures> structures = scan_readable({named}).structures;
   if (structures.size() != 1)
-    throw Error(fmt::format("{}: holds {} RT Structure Sets, expected one.\n       Name the file: --structures FILE",
-                            named.string(), structures.empty() ? "no" : fmt::format("{}", structures.size())));
+    throw Error(
+        fmt::format("{}: holds {} RT Structure Sets, expected one.\n"
+                    "       Name the file: {}",
+                    named.string(), structures.empty() ? "no" : fmt::format("{}", structures.size()),
+                    option("structures", "FILE")));
   parts.structures = structures.front().file;
   for (const StudyFiles::Structures& other : found)
     if (other.sop_instance_uid != structures.front().sop_instance_uid)
@@ -240,17 +252,19 @@ StudyParts chosen(StudyFiles files, std::vector<StudyFiles::Plan> other_plans, c
       files.images.push_back(xray);
     else
       files.left_aside.push_back(
-          fmt::format("{}: an X-ray that is not an RT Image; a machine profile can supply its geometry: --machine FILE",
-                      xray.file.string()));
+          fmt::format("{}: an X-ray that is not an RT Image; a machine profile can supply its geometry: {}",
+                      xray.file.string(), option("machine", "FILE")));
   }
   if (files.cts.empty())
     throw Error(
-        fmt::format("no CT series found ({}).\n       Name its folder: --ct FOLDER", searched(named.ct, named.study)));
+        fmt::format("no CT series found ({}).\n"
+                    "       Name its folder: {}",
+                    searched(named.ct, named.study), option("ct", "FOLDER")));
   if (files.images.empty())
     throw Error(fmt::format("no RT Image found ({}).\n       {}", searched(named.images, named.study),
-                            files.other_xrays.empty() ? "Name the X-rays: --image FILE"
-                                                      : "For X-rays of other classes their geometry is needed: "
-                                                        "--machine FILE"));
+                            files.other_xrays.empty() ? "Name the X-rays: " + option("image", "FILE")
+                                                      : "For X-rays of other classes their geometry is needed: " +
+                                                            option("machine", "FILE")));
   if (!named.plan.empty() && files.plans.empty()) throw Error(fmt::format("{}: holds no RT Plan", named.plan.string()));
 
   StudyParts parts;
@@ -297,8 +311,10 @@ StudyParts chosen(StudyFiles files, std::vector<StudyFiles::Plan> other_plans, c
       parts.images.push_back(image.file);
   }
   if (parts.images.empty())
-    throw Error(fmt::format("no X-ray found refers to {} ({}).\n       Name the X-rays: --image FILE",
-                            parts.plan.string(), searched(named.images, named.study)));
+    throw Error(
+        fmt::format("no X-ray found refers to {} ({}).\n"
+                    "       Name the X-rays: {}",
+                    parts.plan.string(), searched(named.images, named.study), option("image", "FILE")));
   return parts;
 }
 

@@ -109,7 +109,16 @@ TEST_F(SessionChoiceCommandTest, WithoutTimesNoneIsTheLatest) {
   });
   const CommandOutcome outcome = register_with({"--latest"});
   EXPECT_EQ(outcome.exit_status, 1);
-  EXPECT_THAT(outcome.err, HasSubstr("does not say when it was taken, so that the latest session is not known"));
+  EXPECT_THAT(outcome.err, HasSubstr("their times do not tell which was taken later"));
+}
+
+// Whose X-ray is the last in a folder of many is not who is meant.
+TEST_F(SessionChoiceCommandTest, OfSeveralPatientsNoneIsChosen) {
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(study_ / "RTIMAGE/F02"))
+    edit(entry.path(), [](DicomItem d) { d.put(DCM_PatientID, "OTHER"); });
+  const CommandOutcome outcome = register_with({"--latest"});
+  EXPECT_EQ(outcome.exit_status, 1);
+  EXPECT_THAT(outcome.err, HasSubstr("the sessions that fit are of several patients. The sessions are:"));
 }
 
 }  // namespace
