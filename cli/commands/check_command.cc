@@ -63,6 +63,10 @@ void write_transform(const CheckedRegistration& checked, const std::filesystem::
   if (!matrix)
     throw Error(fmt::format("{}: holds no rigid matrix from one frame to another, so that none is written",
                             checked.path.string()));
+  if (checked.source_frame_uid == kIecFixedFrameUid)
+    throw Error(
+        fmt::format("{}: takes the axes of the room to the CT, and such a file is in those of the patient (LPS)",
+                    checked.path.string()));
   write_text(path, itk_transform(*matrix));
 }
 
@@ -219,13 +223,13 @@ int run_check(const CheckOptions& options, Console& console) {
     json["registrations"].push_back(describe(checked, meanings.back(), setup, about_mm, text));
     has_errors = has_errors || checked.has_errors();
   }
-  if (!options.transform.empty()) write_transform(all.front(), options.transform);
   if (all.size() == 2) {
     const RegistrationComparison comparison = compare(all[0], meanings[0], all[1], meanings[1]);
     json["difference"] = describe(comparison, all[0].source_frame_uid == all[1].source_frame_uid, text);
     has_errors = has_errors || !comparison.difference || comparison.difference->other_is_inverted;
   }
   console.out << (options.as_json ? json.dump(2) + "\n" : text);
+  if (!options.transform.empty()) write_transform(all.front(), options.transform);
   return has_errors ? kExitFailed : kExitAccepted;
 }
 

@@ -81,12 +81,12 @@ void add_drr_command(CLI::App& app, Console& console, int&) {
       "too.");
   add_study_options(*command, options->study);
   command->add_option("-o,--output", options->output, "Folder for the images")->required()->type_name("FOLDER");
-  command
-      ->add_option("--setup-error", options->setup_error,
-                   "result.json, truth.json, a Spatial Registration of any program or an ITK transform (.tfm): how the "
-                   "patient lies")
-      ->type_name("FILE");
-  add_source_isocenter_option(*command, options->source_isocenter);
+  auto* setup_error =
+      command->add_option("--setup-error", options->setup_error,
+                          "result.json, truth.json, a Spatial Registration of any program or an ITK transform (.tfm): "
+                          "how the patient lies");
+  setup_error->type_name("FILE");
+  add_source_isocenter_option(*command, options->source_isocenter)->needs(setup_error);
   command->add_flag("--dicom", options->dicom, "Write DICOM RT Images (image type DRR), too");
   command->add_flag("--overwrite", options->overwrite, "Replace an earlier output in that folder");
   add_rendering_options(*command, options->rendering);

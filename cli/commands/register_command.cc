@@ -96,12 +96,13 @@ void add_result_options(CLI::App& command, RegisterOptions& options) {
 }
 
 void add_start_option(CLI::App& command, RegisterOptions& options) {
-  command
-      .add_option("--start", options.start,
-                  "Begin at the setup error in this file instead of the planned pose: a result.json, truth.json, a "
-                  "pose set by hand, a Spatial Registration of any program, or an ITK transform (.tfm)")
-      ->type_name("FILE");
-  add_source_isocenter_option(command, options.source_isocenter);
+  auto* start =
+      command
+          .add_option("--start", options.start,
+                      "Begin at the setup error in this file instead of the planned pose: a result.json, truth.json, a "
+                      "pose set by hand, a Spatial Registration of any program, or an ITK transform (.tfm)")
+          ->type_name("FILE");
+  add_source_isocenter_option(command, options.source_isocenter)->needs(start);
 }
 
 RegisterOptions register_options_from(const std::vector<std::string>& flags) {

@@ -144,7 +144,7 @@ class Checker {
     if (!frame.empty() && frame != result_.registered_frame_uid && differs_from_earlier(frame))
       ambiguous(fmt::format("{}: gives the frame {} another matrix than an earlier item does", name, frame));
     for (const DicomItem& image : item.items(DCM_ReferencedImageSequence)) {
-      const std::string uid = image.uid(DCM_ReferencedSOPInstanceUID).value_or("");
+      const std::string uid = image.text(DCM_ReferencedSOPInstanceUID).value_or("");
       if (uid.empty() || !differs_from_earlier(uid)) continue;
       ambiguous(fmt::format("{}: gives the image {} another matrix than an earlier item does", name, uid));
       break;
@@ -153,7 +153,7 @@ class Checker {
 
   // The frame an item registers.
   std::string frame_of(const DicomItem& item, const std::string& name) {
-    const std::string frame = item.uid(DCM_FrameOfReferenceUID).value_or("");
+    const std::string frame = item.text(DCM_FrameOfReferenceUID).value_or("");
     if (!frame.empty()) return uid_of(item, DCM_FrameOfReferenceUID, name);
     if (item.items(DCM_ReferencedImageSequence).empty())
       error(fmt::format("{}: has neither {} nor {}: it is not known what it registers", name,

@@ -7,6 +7,7 @@
 #include <array>
 
 #include "base/error.h"
+#include "base/option_name.h"
 #include "geometry/rotation.h"
 #include "io/objects/spatial_registration.h"
 #include "io/study/session.h"
@@ -35,11 +36,11 @@ std::string why_origin_is_unknown(const CheckedRegistration& checked) {
         "the item with the matrix names no {}, so the machine's isocenter has no place in its source frame",
         described(DCM_FrameOfReferenceUID));
   return fmt::format(
-      "its source frame {} is {}, which may begin anywhere. Say where the machine's isocenter lies in that frame: "
-      "--source-isocenter X,Y,Z (the IsocenterPosition (300A,012C) of RT Images; 0,0,0 for a cone-beam CT whose frame "
-      "begins at the isocenter)",
+      "its source frame {} is {}, which may begin anywhere. Say where the machine's isocenter lies in that frame: {} "
+      "(the IsocenterPosition (300A,012C) of RT Images; 0,0,0 for a cone-beam CT whose frame begins at the isocenter)",
       checked.source_frame_uid,
-      checked.source_is_that_of_images ? "that of the images it lists" : "one of another program");
+      checked.source_is_that_of_images ? "that of the images it lists" : "one of another program",
+      option("source-isocenter", "X,Y,Z"));
 }
 
 // Where the machine's isocenter lies in the source frame. Nothing, and a finding, where nobody says.
@@ -52,8 +53,8 @@ std::optional<Eigen::Vector3d> source_isocenter(CheckedRegistration& checked, bo
   }
   if (supplied_mm && !checked.source_frame_uid.empty()) {
     checked.note(fmt::format(
-        "the machine's isocenter lies at ({:.3f}) mm of its source frame {}, by --source-isocenter{}",
-        fmt::join(*supplied_mm, ", "), checked.source_frame_uid,
+        "the machine's isocenter lies at ({:.3f}) mm of its source frame {}, by {}{}", fmt::join(*supplied_mm, ", "),
+        checked.source_frame_uid, option("source-isocenter"),
         checked.is_by_isoshift
             ? ""
             : "; the axes of that frame are taken as those of the patient as set up on the couch (HFS: x left, y "
@@ -69,9 +70,9 @@ std::optional<Eigen::Vector3d> source_isocenter(CheckedRegistration& checked, bo
 
 // Whether the plan is of the registration's patient and in its registered frame. Adds an error for each way it is not.
 bool plan_fits(CheckedRegistration& checked, const RtPlan& plan) {
-  const char* next =
-      "Name the plan of this registration, or, if the isocenter is known to be right: --isocenter X,Y,Z and "
-      "--patient-position HFS instead of --plan";
+  const std::string next =
+      "Name the plan of this registration, or, if the isocenter is known to be right: " + option("isocenter", "X,Y,Z") +
+      " and " + option("patient-position", "HFS") + " instead of " + option("plan");
   bool fits = true;
   for (const Finding& finding :
        patient_findings({&checked.identity, checked.path.string()}, {&plan.identity, plan.path.string()})) {
@@ -128,11 +129,11 @@ void note_assumed_angles(CheckedRegistration& checked, const PlannedSetup& setup
   std::vector<std::string> angles, flags;
   if (!setup.couch_pitch_deg) {
     angles.emplace_back("pitch");
-    flags.emplace_back("--couch-pitch DEG");
+    flags.emplace_back(option("couch-pitch", "DEG"));
   }
   if (!setup.couch_roll_deg) {
     angles.emplace_back("roll");
-    flags.emplace_back("--couch-roll DEG");
+    flags.emplace_back(option("couch-roll", "DEG"));
   }
   if (!angles.empty())
     checked.note(fmt::format("couch {} at imaging taken as 0: {} if the couch stood otherwise",
@@ -162,18 +163,19 @@ void refuse_contradicting_isocenter(std::span<const CheckedRegistration> all,
     if (why_it_begins_at_isocenter(checked)) continue;
     if (of_another != nullptr && of_another->source_frame_uid != checked.source_frame_uid)
       throw UsageError(
-          fmt::format("--source-isocenter {}: {} and {} start from different frames, in which the machine's "
-                      "isocenter lies at different places. Check them one after the other",
-                      fmt::join(source_isocenter_mm, ","), of_another->path.string(), checked.path.string()));
+          fmt::format("{}: {} and {} start from different frames, in which the machine's isocenter lies at different "
+                      "places. Check them one after the other",
+                      option("source-isocenter", fmt::format("{}", fmt::join(source_isocenter_mm, ","))),
+                      of_another->path.string(), checked.path.string()));
     of_another = &checked;
   }
   const auto is_known = [](const CheckedRegistration& checked) {
     return why_it_begins_at_isocenter(checked).has_value();
   };
   if (source_isocenter_mm.isZero(0.0) || !std::ranges::all_of(all, is_known)) return;
-  throw UsageError(fmt::format("--source-isocenter {}: {}: {}. Leave the switch out",
-                               fmt::join(source_isocenter_mm, ","), all.front().path.string(),
-                               *why_it_begins_at_isocenter(all.front())));
+  throw UsageError(fmt::format("{}: {}: {}. Leave the switch out",
+                               option("source-isocenter", fmt::format("{}", fmt::join(source_isocenter_mm, ","))),
+                               all.front().path.string(), *why_it_begins_at_isocenter(all.front())));
 }
 
 RegistrationMeaning meaning_of(CheckedRegistration& checked, const std::optional<PlannedSetup>& setup,
@@ -201,8 +203,8 @@ RegistrationMeaning meaning_of(CheckedRegistration& checked, const std::optional
     } else {
       checked.error(
           "the couch shift is not known: its source frame has the axes of the room (IEC 61217 Fixed), and the couch "
-          "angle "
-          "at imaging is not known. Supply it: --couch-angle DEG");
+          "angle at imaging is not known. Supply it: " +
+          option("couch-angle", "DEG"));
     }
   }
   meaning.registered_from_isocenter = matrix;
@@ -263,12 +265,12 @@ RegistrationComparison compare(const CheckedRegistration& first, const Registrat
       return cannot(fmt::format("{}: {}", both[n]->path.string(), why_origin_is_unknown(*both[n])));
   if (first_meaning.in_room_axes != second_meaning.in_room_axes) {
     const bool is_first = first_meaning.in_room_axes;
-    return cannot(fmt::format(
-        "{} starts from the axes of the room (IEC 61217 Fixed), {} from {}, with the axes of the patient as set up. "
-        "Say how the two are turned: --plan FILE, or --isocenter X,Y,Z and --patient-position HFS, and --couch-angle "
-        "DEG",
-        (is_first ? first : second).path.string(), (is_first ? second : first).path.string(),
-        (is_first ? second : first).source_frame_uid));
+    return cannot(
+        fmt::format("{} starts from the axes of the room (IEC 61217 Fixed), {} from {}, with the axes of the patient "
+                    "as set up. Say how the two are turned: {}, or {} and {}, and {}",
+                    (is_first ? first : second).path.string(), (is_first ? second : first).path.string(),
+                    (is_first ? second : first).source_frame_uid, option("plan", "FILE"), option("isocenter", "X,Y,Z"),
+                    option("patient-position", "HFS"), option("couch-angle", "DEG")));
   }
   return {.difference =
               difference_between(*first_meaning.registered_from_isocenter, *second_meaning.registered_from_isocenter,

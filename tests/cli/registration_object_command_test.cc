@@ -96,6 +96,31 @@ TEST_F(RegistrationObjectCommandTest, InspectDescribesOne) {
   EXPECT_EQ(file["origin_mm"].size(), 3U);
 }
 
+TEST_F(RegistrationObjectCommandTest, ItsMatrixComesBackAsAnItkTransform) {
+  write_object();
+  const Strings written = {"check", object_in("set"), "--tfm", path("m.tfm")};
+  ASSERT_EQ(run_command(written).exit_status, 0);
+  EXPECT_EQ(run_command(written).exit_status, 1);  // it is there already
+  const Strings judged = {"register", study_.path().string(), "--no-search", "--start", path("m.tfm")};
+  EXPECT_THAT(run(judged, "none").err, HasSubstr("m.tfm: does not say where the machine's isocenter lies"));
+  Strings with_isocenter = judged;
+  with_isocenter.insert(with_isocenter.end(), {"--source-isocenter", "0,0,0"});
+  ASSERT_EQ(run(with_isocenter, "judged").exit_status, 3);
+  EXPECT_THAT(read_setup_error(path("judged/result.json")), PoseNear(pose_, 1e-6, 1e-6));
+}
+
+TEST_F(RegistrationObjectCommandTest, AnIsocenterThatMeansNothingIsRefused) {
+  write_object();
+  const auto refused = [&](const Strings& start) {
+    Strings words = {"register", study_.path().string(), "--source-isocenter", "10,20,30"};
+    words.insert(words.end(), start.begin(), start.end());
+    return run(words, "refused").exit_status;
+  };
+  EXPECT_EQ(refused({}), 2);
+  EXPECT_EQ(refused({"--start", path("pose.json")}), 2);
+  EXPECT_EQ(refused({"--start", object_in("set")}), 2);  // it begins at the isocenter, and says so
+}
+
 TEST_F(RegistrationObjectCommandTest, OneOfAnotherCtOrPatientIsNoStart) {
   write_object();
   const auto refusal = [&](const std::function<void(DicomItem)>& change) {

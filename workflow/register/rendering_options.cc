@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "base/error.h"
+#include "base/option_name.h"
 #include "drr/gl/context.h"
 #include "registration/gpu_check.h"
 
@@ -22,7 +23,9 @@ std::optional<std::string> RenderingOptions::failed_gpu() const {
 
 RendererKind RenderingOptions::kind() const {
   if (renderer == "auto") return why_cpu() ? RendererKind::kCpu : RendererKind::kRaycast;
-  return renderer_kind_from(renderer).value();
+  const auto known = renderer_kind_from(renderer);
+  if (!known) throw UsageError(fmt::format("{}: there is no such renderer", option("renderer", renderer)));
+  return *known;
 }
 
 std::optional<std::string> RenderingOptions::why_cpu() const {

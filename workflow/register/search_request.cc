@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include "base/error.h"
+#include "base/option_name.h"
 #include "registration/presets.h"
 
 namespace isoshift {
@@ -26,6 +27,8 @@ RegistrationOptions SearchRequest::registration() const {
   if (pixel_mm) stage.pixel_mm = *pixel_mm;
   if (relative_tolerance) stage.relative_tolerance = *relative_tolerance;
   if (searches > 1) options.stages.resize(static_cast<std::size_t>(searches), Stage(stage));
+  if (dof != "rigid" && dof != "translation")
+    throw UsageError(fmt::format("{}: expected rigid or translation", option("dof", dof)));
   options.dof = dof == "rigid" ? Dof::kRigid : Dof::kTranslation;
   options.check_vertebrae = check_vertebrae;
   options.is_searched = is_searched;

@@ -4,6 +4,7 @@
 
 #include "base/error.h"
 #include "base/json_file.h"
+#include "base/option_name.h"
 #include "base/sha256.h"
 #include "geometry/rotation.h"
 #include "io/objects/itk_transform.h"
@@ -90,17 +91,24 @@ Start read_start(const std::filesystem::path& file, const Study& study, std::spa
                  Notes& notes) {
   std::optional<Eigen::Vector3d> isocenter_mm;
   if (!source_isocenter_mm.empty()) isocenter_mm = Eigen::Vector3d(source_isocenter_mm.data());
-  if (beginning_of(file) == Beginning::kDicom)
-    return start_of_object(check_registration(file), study, isocenter_mm, notes);
+  if (beginning_of(file) == Beginning::kDicom) {
+    const CheckedRegistration object = check_registration(file);
+    if (isocenter_mm) refuse_contradicting_isocenter({&object, 1}, *isocenter_mm);
+    return start_of_object(object, study, isocenter_mm, notes);
+  }
   if (is_itk_transform(file)) {
     if (!isocenter_mm)
       throw Error(
           fmt::format("{}: does not say where the machine's isocenter lies in the frame of its fixed image.\n"
-                      "       Supply it: --source-isocenter X,Y,Z",
-                      file.string()));
+                      "       Supply it: {}",
+                      file.string(), option("source-isocenter", "X,Y,Z")));
     return start_of_object(object_of_transform(file, study), study, isocenter_mm, notes);
   }
   const std::string name = file.string();
+  if (isocenter_mm)
+    throw UsageError(
+        fmt::format("{}: is no registration object or ITK transform, and has no source frame: leave {} out", name,
+                    option("source-isocenter")));
   const JsonFile read = read_json_file(file);
   const Json& json = read.json;
   const Eigen::Isometry3d setup_error = setup_error_in(json, name);

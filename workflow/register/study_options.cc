@@ -8,6 +8,7 @@
 #include <cmath>
 
 #include "base/error.h"
+#include "base/option_name.h"
 #include "geometry/rotation.h"
 
 namespace isoshift {
@@ -49,7 +50,27 @@ void check_couch_angles(const std::optional<double>& couch_angle_deg, const std:
           fmt::format("{}: {}, expected degrees from -45 to 45: no table top tilts farther", flag, angle_deg));
 }
 
+namespace {
+
+void check_count(std::string_view name, std::span<const double> values, std::size_t count) {
+  if (!values.empty() && values.size() != count)
+    throw UsageError(fmt::format("{}: {} numbers, expected {}", option(name), values.size(), count));
+}
+
+// What `from` makes of a word; nothing where there is none.
+template <class From>
+auto known(std::string_view name, const std::string& word, From from) -> decltype(from(word)) {
+  if (word.empty()) return std::nullopt;
+  const auto value = from(word);
+  if (!value) throw UsageError(fmt::format("{}: there is no such value", option(name, word)));
+  return value;
+}
+
+}  // namespace
+
 void StudyOptions::check_numbers() const {
+  check_count("isocenter", isocenter, 3);
+  check_count("rt-image-position", rt_image_position, 2);
   check_finite("--isocenter", isocenter);
   check_finite("--rt-image-position", rt_image_position);
   check_couch_angles(couch_angle_deg, couch_pitch_deg, couch_roll_deg);
@@ -94,9 +115,9 @@ StudyRequest StudyOptions::request() const {
   request.switches.sid_mm = sid_mm;
   if (!rt_image_position.empty()) request.switches.position_mm = Eigen::Vector2d(rt_image_position.data());
   request.switches.assume_centered = assume_centered;
-  if (!intensity.empty()) request.switches.intensity = pixel_intensity_from(intensity);
+  request.switches.intensity = known("intensity", intensity, &pixel_intensity_from);
   if (!beam.empty()) request.switches.beam = beam == "kv" ? Beam::kKilovoltage : Beam::kMegavoltage;
-  if (!patient_position.empty()) request.switches.patient_position = patient_position_from(patient_position);
+  request.switches.patient_position = known("patient-position", patient_position, &patient_position_from);
   request.machine = named_machine(machine, machine_key);
   request.allowed = allowances_from(allow);
   return request;
