@@ -8,6 +8,7 @@
 
 #include "base/error.h"
 #include "base/json_file.h"
+#include "base/option_name.h"
 #include "base/text_file.h"
 #include "geometry/rotation.h"
 
@@ -115,13 +116,14 @@ void require_signature(const std::filesystem::path& path, const std::string& tex
   const std::string name = path.string() + ".sig";
   expect_no_pipe(name);
   std::ifstream file(name, std::ios::binary);
-  if (!file) throw Error(fmt::format("{}: cannot be read; --machine-key needs the signature of the profile", name));
+  if (!file)
+    throw Error(fmt::format("{}: cannot be read; {} needs the signature of the profile", name, option("machine-key")));
   const std::string signature{std::istreambuf_iterator<char>(file), {}};
   if (!key.accepts(text, signature))
     throw Error(
-        fmt::format("{}: is not the signature of {} by the key of --machine-key: the profile was changed after "
-                    "it was signed, or somebody else signed it",
-                    name, path.string()));
+        fmt::format("{}: is not the signature of {} by the key of {}: the profile was changed after it was signed, or "
+                    "somebody else signed it",
+                    name, path.string(), option("machine-key")));
 }
 
 bool fits(const MachineProfile::Rule& rule, const RtImage& image) {
@@ -149,8 +151,8 @@ MachineProfile read_machine_profile(const std::filesystem::path& path, const std
     throw Error(
         fmt::format("{0}: correct_imager changes where X-rays are taken to lie: such a profile must be "
                     "signed.\n       Sign it: openssl pkeyutl -sign -rawin -inkey PRIVATE -in {0} -out {0}.sig\n"
-                    "       and name the public key: --machine-key FILE",
-                    path.string()));
+                    "       and name the public key: {1}",
+                    path.string(), option("machine-key", "FILE")));
   if (profile.rules.empty()) throw Error(fmt::format("{}: images is empty, expected a list of rules", path.string()));
   return profile;
 }

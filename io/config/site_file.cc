@@ -8,6 +8,7 @@
 
 #include "base/error.h"
 #include "base/json_file.h"
+#include "base/option_name.h"
 #include "io/config/config_folder.h"
 
 namespace isoshift {
@@ -147,10 +148,9 @@ std::optional<ActionLevel> action_level(const SiteFile& site, std::string_view a
   for (const auto& [name, unused] : site.action_levels) names.insert(name);
   for (const NameByAnatomy* named : {&site.targets, &site.surrogates})
     for (const auto& [name, unused] : *named) names.insert(name);
-  throw UsageError(
-      fmt::format("--anatomy {}: site file \"{}\" has this anatomy neither in action_levels nor in targets "
-                  "or surrogates. It has: {}",
-                  anatomy, site.name, names.empty() ? "none" : fmt::format("{}", fmt::join(names, ", "))));
+  throw UsageError(fmt::format(
+      "{}: site file \"{}\" has this anatomy neither in action_levels nor in targets or surrogates. It has: {}",
+      option("anatomy", anatomy), site.name, names.empty() ? "none" : fmt::format("{}", fmt::join(names, ", "))));
 }
 
 std::string target_named(const SiteFile& site, std::string_view anatomy) { return name_for(site.targets, anatomy); }

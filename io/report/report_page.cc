@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/option_name.h"
 #include "geometry/rotation.h"
 #include "io/report/canvas.h"
 #include "io/report/drawings.h"
@@ -151,7 +152,7 @@ std::string action_words(const SetupResult& report, const ShownShift& shown) {
     case Action::kUnset: break;
   }
   if (shown.withheld) return "No action level applies: the result was rejected";
-  if (!report.site) return "No action level: no site file was given (--site FILE)";
+  if (!report.site) return "No action level: no site file was given (" + option("site", "FILE") + ")";
   return report.site->level ? "The action level cannot be judged: a component was not determined"
                             : "No action level: the site file has none for this anatomy";
 }
