@@ -21,5 +21,8 @@ __all__ = ["CtSeries", "Error", "FixedImage", "Objective", "Renderer", "SetupRes
            "XrayView", "__version__", "carm_view", "load_study", "png", "prepare", "register", "similarity", "use_decoder",
            "view_from_matrix", "write_spatial_registration"]
 
+Error.__doc__ = "Something that cannot be done with the given input: names file, attribute, what was found and what to do."
+UsageError.__doc__ = "An argument that makes no sense."
+
 # Compressed pixels are decoded by the program, in a process of their own.
 use_decoder(os.environ.get("ISOSHIFT_PROGRAM") or shutil.which("isoshift") or "")

@@ -15,7 +15,9 @@ int main(int argc, char** argv) try {
   using namespace isoshift;
   if (argc != 3) return 2;
   Notes notes;
-  const Study study = load_study({.parts = {.study = argv[1]}}, notes, {});
+  StudyRequest request;
+  request.parts.study = argv[1];
+  const Study study = load_study(request, notes, {});
   std::vector<Beam> beams;
   for (const XrayImage& xray : study.xrays) beams.push_back(xray.view.beam);
   const RendererPyramid renderers(RendererKind::kCpu, study.ct->hu, AttenuationModel(), beams);
