@@ -102,8 +102,7 @@ bool is_reader_gone() {
 int after_printing(int exit_status, Console& console) {
   if (console.out.flush()) return exit_status;
   if (is_reader_gone()) return 128 + SIGPIPE;
-  console.err
-      << "error: standard output cannot be written to (is the disk full?): not all that was printed is there\n";
+  console.err << "error: standard output cannot be written to (is the disk full?): not all that was printed is there\n";
   return kExitFailed;
 }
 

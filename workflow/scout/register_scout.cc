@@ -70,8 +70,7 @@ CtSeries read_ct(const ScoutRequest& request, Notes& notes, Observer& observer) 
 }
 
 void check_same_patient(const CtSeries& ct, const Scout& scout, const ScoutRequest& request, Notes& notes) {
-  std::vector<Finding> findings =
-      patient_findings({&ct.identity, "the CT"}, {&scout.identity, request.scout.string()});
+  std::vector<Finding> findings = patient_findings({&ct.identity, "the CT"}, {&scout.identity, request.scout.string()});
   if (scout.frame_of_reference_uid != ct.frame_of_reference_uid)
     findings.push_back(
         {"for-mismatch", fmt::format("{}: {} is not that of the CT, so nothing says where the scout lies",
