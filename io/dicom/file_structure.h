@@ -15,9 +15,10 @@ struct FileStructure {
 };
 
 // Throws Error naming the file, the place and what stands there, if an element ends behind the file or behind the item
-// around it; if anything follows the dataset; if sequences are nested more than 500 deep; if there are more than 600000
-// elements, or more than 128 MiB of them besides the pixels; if there are more pixels than the header announces; if a
-// deflated dataset is larger than 64 MiB; or if the transfer syntax is not known.
+// around it; if anything follows the dataset; if sequences are nested more than 500 deep; if there are more than 1.5
+// million elements, or more than 100000 of them that have less than 16 bytes in the mean, or more than 128 MiB besides
+// the pixels; if there are more pixels than the header announces; if a deflated dataset is larger than 64 MiB; or if
+// the transfer syntax is not known.
 FileStructure structure_of(FileBytes& file);
 
 }  // namespace isoshift
