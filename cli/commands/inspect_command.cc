@@ -247,18 +247,15 @@ class Inspection {
   void tell_others(const StudyFiles& files, bool takes_other_xrays) {
     const std::vector<SessionFiles> sessions = sessions_of(files, takes_other_xrays);
     const std::vector<std::string> lines = described(sessions);
-    if (!as_json_ && lines.size() > 1) console_.out << fmt::format("{}\n\n", fmt::join(lines, "\n"));
-    for (const std::string& file : files.left_aside)
-      if (!as_json_) console_.out << "left aside: " << file << "\n";
-    for (const std::string& reason : files.unreadable)
-      if (!as_json_) console_.out << "unreadable: " << reason << "\n";
-    if (as_json_)
-      console_.out << Json{{"files", files_},
-                           {"sessions", lines},
-                           {"left_aside", files.left_aside},
-                           {"unreadable", files.unreadable}}
-                          .dump(2, ' ', false, Json::error_handler_t::replace)
-                   << "\n";
+    if (as_json_) {
+      const Json json = {
+          {"files", files_}, {"sessions", lines}, {"left_aside", files.left_aside}, {"unreadable", files.unreadable}};
+      console_.out << json.dump(2, ' ', false, Json::error_handler_t::replace) << "\n";
+      return;
+    }
+    if (lines.size() > 1) console_.out << fmt::format("{}\n\n", fmt::join(lines, "\n"));
+    for (const std::string& file : files.left_aside) console_.out << "left aside: " << file << "\n";
+    for (const std::string& reason : files.unreadable) console_.out << "unreadable: " << reason << "\n";
   }
 
   std::size_t unreadable() const { return unreadable_; }

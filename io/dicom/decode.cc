@@ -16,12 +16,10 @@
 
 #include "base/error.h"
 #include "io/dicom/decoder_process.h"
+#include "io/dicom/file_structure.h"
 
 namespace isoshift {
 namespace {
-
-constexpr int kMaxEdge = 8192;
-constexpr int kMaxFrames = 20000;
 
 int whole_number(const DicomItem& dataset, const DcmTagKey& tag, int max) {
   const double value = dataset.required_number(tag);
@@ -197,10 +195,8 @@ std::vector<std::uint8_t> decompressed_frame(const DicomFile& file, int frame) {
           .getUncompressedFrame(&dataset, static_cast<Uint32>(frame), fragment, bytes.data(),
                                 static_cast<Uint32>(bytes.size()), color_model)
           .bad())
-    throw Error(
-        fmt::format("{}: pixel data in transfer syntax {} cannot be decoded.\n"
-                    "       Convert the file first: gdcmconv --raw IN.dcm OUT.dcm (Debian package libgdcm-tools)",
-                    where, DcmXfer(dataset.getOriginalXfer()).getXferName()));
+    throw Error(fmt::format("{}: pixel data in transfer syntax {} cannot be decoded.\n       {}", where,
+                            DcmXfer(dataset.getOriginalXfer()).getXferName(), kConvertFirst));
   bytes.resize(size);
   return bytes;
 }

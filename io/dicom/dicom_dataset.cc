@@ -3,9 +3,7 @@
 #include <dcmtk/dcmdata/dcistrmb.h>
 #include <dcmtk/dcmdata/dcostrmb.h>
 #include <dcmtk/dcmdata/dctk.h>
-#include <fcntl.h>
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <array>
@@ -280,7 +278,7 @@ DicomFile::DicomFile(FileBytes& bytes, Extent extent) : DicomFile() {
     const auto left = static_cast<std::size_t>(std::min<std::uint64_t>(end - at, FileBytes::kLongestPiece));
     const std::string_view piece = structure.is_deflated ? std::string_view(deflated) : bytes.piece(at, left);
     at += piece.size();
-    sha256.add(piece);
+    if (extent == Extent::kWhole) sha256.add(piece);
     stream.setBuffer(piece.data(), static_cast<offile_off_t>(piece.size()));
     if (at == end || piece.empty()) stream.setEos();
     loaded = extent == Extent::kWhole
@@ -290,10 +288,7 @@ DicomFile::DicomFile(FileBytes& bytes, Extent extent) : DicomFile() {
   }
   file_->transferEnd();
   if (loaded == EC_InvalidStream || loaded == EC_EndOfStream)
-    throw Error(
-        fmt::format("{}: ends before what its elements announce: the file has been cut off, or is still being "
-                    "written",
-                    path_.string()));
+    throw Error(fmt::format("{}: {}", path_.string(), kIsCutOff));
   if (loaded.bad()) throw Error(fmt::format("{}: cannot be read as a DICOM file: {}", path_.string(), loaded.text()));
   if (extent == Extent::kWhole) sha256_ = sha256.hex();
 }

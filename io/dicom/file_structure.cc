@@ -26,7 +26,6 @@ constexpr std::size_t kMaxElements = 1'500'000, kElementsOfAnySize = 100'000, kL
 constexpr std::uint64_t kMaxHeaderBytes = std::uint64_t{128} << 20;
 constexpr std::uint64_t kMaxInflatedBytes = std::uint64_t{64} << 20;
 constexpr std::uint32_t kUndefinedLength = 0xFFFFFFFF;
-constexpr double kMaxEdge = 8192, kMaxFrames = 20000;  // as readers allow (decode.cc)
 constexpr std::uint64_t kUntilClosed = ~std::uint64_t{0};
 
 // Value representations with lengths of two bytes, and of four behind two that are reserved (PS3.5 7.1.2).
@@ -146,9 +145,7 @@ class Walk {
     if (found.size() < count) fail_as_cut_off();
     return found;
   }
-  [[noreturn]] void fail_as_cut_off() const {
-    fail("ends before what its elements announce: the file has been cut off, or is still being written");
-  }
+  [[noreturn]] void fail_as_cut_off() const { fail(kIsCutOff); }
 
   static std::uint32_t number(std::string_view bytes, bool is_little_endian) {
     std::uint32_t value = 0;
@@ -283,18 +280,18 @@ class Walk {
   }
 
   void note_size(const Level& level, const Element& element) {
-    const auto short_number = [&](double& into) {
-      if (element.length == 2) into = number(bytes(element.value_at, 2), level.encoding.is_little_endian);
+    const auto short_number = [&](double& into, double most) {
+      if (element.length == 2)
+        into = std::min<double>(number(bytes(element.value_at, 2), level.encoding.is_little_endian), most);
     };
-    if (element.tag == DCM_Rows) short_number(image_.rows);
-    if (element.tag == DCM_Columns) short_number(image_.columns);
-    image_.rows = std::min(image_.rows, kMaxEdge);
-    image_.columns = std::min(image_.columns, kMaxEdge);
-    if (element.tag == DCM_BitsAllocated) short_number(image_.bits);
-    if (element.tag == DCM_SamplesPerPixel) short_number(image_.samples);
+    constexpr double kMostOfAShort = 65535;
+    if (element.tag == DCM_Rows) short_number(image_.rows, kMaxEdge);
+    if (element.tag == DCM_Columns) short_number(image_.columns, kMaxEdge);
+    if (element.tag == DCM_BitsAllocated) short_number(image_.bits, kMostOfAShort);
+    if (element.tag == DCM_SamplesPerPixel) short_number(image_.samples, kMostOfAShort);
     if (element.tag == DCM_NumberOfFrames && element.length <= 12)
       image_.frames = std::clamp(std::strtod(std::string(bytes(element.value_at, element.length)).c_str(), nullptr),
-                                 0.0, kMaxFrames);
+                                 0.0, static_cast<double>(kMaxFrames));
   }
 
   // Native pixels take what the header says, and a byte that makes their number even; compressed ones may take more,
@@ -363,10 +360,8 @@ FileStructure structure_of(FileBytes& file) {
     const DcmXfer syntax(uid.c_str());
     // DCMTK would take it for explicit little endian, and its pixels for what they are not.
     if (syntax.getXfer() == EXS_Unknown)
-      throw Error(
-          fmt::format("{}: {} is {}, which isoshift does not know.\n       Convert the file first: gdcmconv --raw "
-                      "IN.dcm OUT.dcm (Debian package libgdcm-tools)",
-                      file.path().string(), described(DCM_TransferSyntaxUID), uid));
+      throw Error(fmt::format("{}: {} is {}, which isoshift does not know.\n       {}", file.path().string(),
+                              described(DCM_TransferSyntaxUID), uid, kConvertFirst));
     if (syntax.getStreamCompression() != ESC_none) {
       const std::string bytes =
           inflated(std::string_view(file.whole(kMaxInflatedBytes)).substr(walk.at()), file.path());

@@ -9,6 +9,15 @@
 
 namespace isoshift {
 
+// Of an image: what readers allow, and what bounds the bytes of its pixels.
+inline constexpr int kMaxEdge = 8192, kMaxFrames = 20000;
+
+// What messages say of a file that ends too early, and of pixels that nobody here decodes.
+inline constexpr const char* kIsCutOff =
+    "ends before what its elements announce: the file has been cut off, or is still being written";
+inline constexpr const char* kConvertFirst =
+    "Convert the file first: gdcmconv --raw IN.dcm OUT.dcm (Debian package libgdcm-tools)";
+
 struct FileStructure {
   bool is_deflated = false;      // the dataset is compressed (PS3.5 A.5)
   std::uint64_t header_end = 0;  // where Pixel Data begins; the end of the file where there are none, or if deflated

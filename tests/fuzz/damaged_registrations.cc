@@ -17,6 +17,7 @@
 #include <string>
 #include <vector>
 
+#include "base/text_file.h"
 #include "io/dicom/decoder_process.h"
 #include "tests/fuzz/dicom_mutator.h"
 #include "tests/support/command.h"
@@ -27,11 +28,6 @@ namespace isoshift {
 namespace {
 
 namespace fs = std::filesystem;
-
-std::string bytes_of(const fs::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), {}};
-}
 
 // How far the edge of a target of 30 mm around the isocenter lies off: by the translation, and by the rotation.
 double off_mm(const Eigen::Isometry3d& found, const Eigen::Isometry3d& expected) {
@@ -54,7 +50,7 @@ int run(std::uint64_t count, std::uint64_t first_seed) {
     const fs::path& file = seed % 4 == 0   ? study.plan()
                            : seed % 4 == 1 ? slices[seed / 4 % slices.size()]
                                            : xrays[seed % 2];
-    const std::string original = bytes_of(file);
+    const std::string original = text_of_file(file);
     std::ofstream(file, std::ios::binary) << DicomMutator(seed).mutated(original);
     const auto start = std::chrono::steady_clock::now();
     const CommandOutcome outcome =

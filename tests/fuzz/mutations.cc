@@ -14,6 +14,7 @@
 #include <string_view>
 
 #include "base/error.h"
+#include "base/text_file.h"
 #include "io/dicom/decoder_process.h"
 #include "tests/fuzz/dicom_mutator.h"
 #include "tests/fuzz/readers.h"
@@ -29,15 +30,10 @@ struct Original {
   std::string bytes;
 };
 
-std::string bytes_of(const std::filesystem::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), {}};
-}
-
 std::vector<Original> originals() {
   std::vector<Original> list;
   const auto add = [&](const std::string& reader, const std::string& file) {
-    list.push_back({reader, file, bytes_of(testdata(file))});
+    list.push_back({reader, file, text_of_file(testdata(file))});
   };
   add("ct", "small/1/CT/CT0018.dcm");
   for (const char* name : {"jpeg-ls", "jpeg-lossless", "rle", "deflated", "implicit", "big-endian"})
