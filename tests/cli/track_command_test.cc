@@ -166,11 +166,11 @@ TEST_F(TrackCommandTest, FollowsAFolderThatIsBeingFilled) {
       part << bytes.substr(bytes.size() / 2);
     }
     std::ofstream(incoming / "broken.dcm") << "no DICOM";
-    std::this_thread::sleep_for(std::chrono::milliseconds(1500));
+    std::this_thread::sleep_for(std::chrono::seconds(4));
     send(10);  // too late
   });
   std::vector<std::string> more = parts();
-  more.insert(more.end(), {"--follow", incoming.string(), "--idle", "3", "--predictor", "kalman"});
+  more.insert(more.end(), {"--follow", incoming.string(), "--idle", "6", "--predictor", "kalman"});
   const auto json = track(more, false);
   EXPECT_EQ(json["frames"], 20);
   EXPECT_EQ(json["status"]["measured"], 20);
@@ -182,6 +182,21 @@ TEST_F(TrackCommandTest, FollowsAFolderThatIsBeingFilled) {
   std::ifstream trace(output() / "trace.csv");
   const std::string rows{std::istreambuf_iterator<char>(trace), {}};
   EXPECT_THAT(rows, HasSubstr("\n1.8000,,,,,,,,,,,,,,,late\n1.8000,,,,,,,,,,,,,,,late\n2.0000,"));
+}
+
+TEST_F(TrackCommandTest, AFileThatIsNoXrayDoesNotKeepAFolderFromBeingFollowed) {
+  const std::filesystem::path incoming = own_ / "incoming";
+  std::filesystem::create_directories(incoming);
+  std::ofstream(incoming / "broken.dcm") << "no DICOM";
+  for (const int imager : {0, 90})
+    for (const int moment : {1, 2})
+      std::filesystem::copy_file(xray(imager, moment), incoming / fmt::format("{}_{}.dcm", imager, moment));
+  std::vector<std::string> more = parts();
+  more.insert(more.end(), {"--follow", incoming.string(), "--idle", "3"});
+  const auto json = track(more, false);
+  EXPECT_EQ(json["frames"], 2);
+  EXPECT_EQ(json["files"]["broken"], 1);
+  EXPECT_THAT(outcome_.err, HasSubstr("broken.dcm"));
 }
 
 // The second imager begins in the middle, and is one of megavoltage. Whoever ends the run has its results.

@@ -79,11 +79,30 @@ class TrackRun {
     std::this_thread::sleep_for(std::chrono::milliseconds(500));  // those of the other imager, too
   }
 
+  // The X-rays of the folder that is being filled, without the files that cannot be read: XrayStream tries those again
+  // and says which are left aside. Throws Error as the reader of the last file does if none can be read.
+  std::vector<std::filesystem::path> readable_xrays() const {
+    std::vector<std::filesystem::path> readable;
+    std::optional<Error> unreadable;
+    for (const std::filesystem::path& file : files_below({options_.follow})) {
+      try {
+        Notes unimportant;
+        read_rt_images(file, unimportant);
+        readable.push_back(file);
+      } catch (const Error& error) {
+        unreadable = error;
+      }
+    }
+    if (readable.empty() && unreadable) throw *unreadable;
+    return readable;
+  }
+
   // In a folder that is being filled the first X-rays may be half written.
-  Study first_study(const StudyRequest& request) {
+  Study first_study(StudyRequest request) {
     const auto begin = Clock::now();
     for (;;) {
       try {
+        if (is_filled()) request.parts.images = readable_xrays();
         Notes notes = notes_;
         Study study = load_study(request, notes, {});
         notes_ = notes;
