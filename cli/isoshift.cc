@@ -63,6 +63,8 @@ void add_commands(CLI::App& app, Console& console, int& exit_status) {
   add_batch_command(app, console, exit_status);
   add_drr_command(app, console, exit_status);
   add_phantom_command(app, console, exit_status);
+  add_deidentify_command(app, console, exit_status);
+  add_bundle_command(app, console, exit_status);
   add_evaluate_command(app, console, exit_status);
   add_track_command(app, console, exit_status);
   add_predict_command(app, console, exit_status);

@@ -67,6 +67,7 @@ compressed() {
   dcmcjpls +el $slice compressed/jpeg-ls.dcm
   dcmcjpeg +e1 $slice compressed/jpeg-lossless.dcm
   dcmcrle $slice compressed/rle.dcm
+  gdcmconv --j2k $slice compressed/jpeg2000.dcm
   dcmconv +td $slice compressed/deflated.dcm
   dcmconv +ti $slice compressed/implicit.dcm
   dcmconv +tb $slice compressed/big-endian.dcm

@@ -57,6 +57,7 @@ may_include tests/real_data/campaign base io/dicom phantom/dicom tests/support
 
 only_in 'dcmtk/' io phantom
 only_in 'opencv2/' registration/preprocess/
+only_in 'openjpeg' io/dicom/jpeg2000.cc
 only_in 'nlopt' registration/optimizer.cc
 only_in 'ceres/' registration/imager/bundle_adjustment.cc
 only_in '(EGL|GL|epoxy|glm)/' drr registration/similarity/

@@ -27,6 +27,8 @@ void add_delete_command(CLI::App& app, Console& console, int& exit_status);
 void add_release_command(CLI::App& app, Console& console, int& exit_status);
 void add_audit_command(CLI::App& app, Console& console, int& exit_status);
 void add_audit_setup_command(CLI::App& app, Console& console, int& exit_status);
+void add_deidentify_command(CLI::App& app, Console& console, int& exit_status);
+void add_bundle_command(CLI::App& app, Console& console, int& exit_status);
 void add_evaluate_command(CLI::App& app, Console& console, int& exit_status);
 void add_bench_command(CLI::App& app, Console& console, int& exit_status);
 

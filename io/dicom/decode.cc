@@ -17,6 +17,7 @@
 #include "base/error.h"
 #include "io/dicom/decoder_process.h"
 #include "io/dicom/file_structure.h"
+#include "io/dicom/jpeg2000.h"
 
 namespace isoshift {
 namespace {
@@ -32,13 +33,6 @@ void expect(const DicomItem& dataset, const DcmTagKey& tag, double expected) {
   const double found = dataset.required_number(tag);
   if (found != expected)
     throw Error(fmt::format("{}: {} is {}, expected {}", dataset.where(), described(tag), found, expected));
-}
-
-// The transfer syntaxes whose pixels lie in the file as they are. (DcmXfer's own test has another name in DCMTK 3.6.9
-// than in 3.6.7.)
-bool is_native(E_TransferSyntax syntax) {
-  return syntax == EXS_LittleEndianImplicit || syntax == EXS_LittleEndianExplicit || syntax == EXS_BigEndianExplicit ||
-         syntax == EXS_DeflatedLittleEndianExplicit;
 }
 
 // The bytes of a frame that lies in the file as it is. 16-bit pixels come as words; 8-bit pixels as bytes or, in
@@ -77,19 +71,33 @@ std::optional<std::pair<int, int>> jpeg_size(std::span<const Uint8> stream) {
   return std::nullopt;
 }
 
-void check_jpeg_size(DcmPixelData& pixels, const DcmDataset& dataset, int frame, const PixelFormat& format,
-                     const std::string& where) {
+bool is_jpeg2000(E_TransferSyntax syntax) { return syntax == EXS_JPEG2000LosslessOnly || syntax == EXS_JPEG2000; }
+
+// The compressed bytes of one frame, put together from their fragments (PS3.5 A.4); empty where they cannot be told
+// from those of other frames.
+std::vector<Uint8> frame_stream(DcmPixelData& pixels, const DcmDataset& dataset, int frame, int frames) {
   DcmPixelSequence* fragments = nullptr;
-  DcmPixelItem* fragment = nullptr;
-  Uint32 index = 0;
-  Uint8* bytes = nullptr;
-  const E_TransferSyntax syntax = dataset.getOriginalXfer();
-  if (syntax == EXS_RLELossless || pixels.getEncapsulatedRepresentation(syntax, nullptr, fragments).bad() ||
-      DcmCodec::determineStartFragment(static_cast<Uint32>(frame), format.frames, fragments, index).bad() ||
-      fragments->getItem(fragment, index).bad() || fragment->getUint8Array(bytes).bad() || bytes == nullptr)
-    return;  // the decoder will say what is wrong
-  if (const auto size = jpeg_size({bytes, fragment->getLength()});
-      size && *size != std::pair(format.columns, format.rows))
+  Uint32 index = 0, end = 0;
+  if (pixels.getEncapsulatedRepresentation(dataset.getOriginalXfer(), nullptr, fragments).bad() ||
+      DcmCodec::determineStartFragment(static_cast<Uint32>(frame), frames, fragments, index).bad())
+    return {};
+  end = static_cast<Uint32>(fragments->card());
+  if (frame + 1 < frames &&
+      DcmCodec::determineStartFragment(static_cast<Uint32>(frame) + 1, frames, fragments, end).bad())
+    return {};
+  std::vector<Uint8> stream;
+  for (; index < end; ++index) {
+    DcmPixelItem* fragment = nullptr;
+    Uint8* bytes = nullptr;
+    if (fragments->getItem(fragment, index).bad() || fragment->getUint8Array(bytes).bad() || bytes == nullptr)
+      return {};
+    stream.insert(stream.end(), bytes, bytes + fragment->getLength());
+  }
+  return stream;
+}
+
+void check_jpeg_size(std::span<const Uint8> stream, const PixelFormat& format, const std::string& where) {
+  if (const auto size = jpeg_size(stream); size && *size != std::pair(format.columns, format.rows))
     throw Error(fmt::format("{}: its compressed pixels are {} x {}, {} and {} say {} x {}", where, size->first,
                             size->second, described(DCM_Columns), described(DCM_Rows), format.columns, format.rows));
 }
@@ -137,7 +145,7 @@ std::vector<std::int32_t> decode_frame(const DicomFile& file, const PixelFormat&
   auto& dataset = dynamic_cast<DcmDataset&>(file.dataset().dcmtk());
   std::vector<std::uint8_t> decompressed;
   std::span<const std::uint8_t> bytes;
-  if (!is_native(dataset.getOriginalXfer())) {
+  if (file.is_compressed()) {
     decompressed = frame_from_decoder(file, frame, format.bytes_per_frame());
     bytes = decompressed;
   } else {
@@ -187,7 +195,10 @@ std::vector<std::uint8_t> decompressed_frame(const DicomFile& file, int frame) {
   if (dataset.findAndGetElement(DCM_PixelData, element).bad() || dynamic_cast<DcmPixelData*>(element) == nullptr)
     throw Error(fmt::format("{}: {} is missing", where, described(DCM_PixelData)));
   auto& pixels = dynamic_cast<DcmPixelData&>(*element);
-  check_jpeg_size(pixels, dataset, frame, format, where);
+  const E_TransferSyntax syntax = dataset.getOriginalXfer();
+  const std::vector<Uint8> stream = frame_stream(pixels, dataset, frame, format.frames);
+  if (is_jpeg2000(syntax)) return decoded_jpeg2000(stream, format, where);
+  if (syntax != EXS_RLELossless) check_jpeg_size(stream, format, where);
   Uint32 fragment = 0;  // found by the decoder
   OFString color_model;
   std::vector<std::uint8_t> bytes(size + size % 2);  // what DCMTK asks for, too: pixel_format() allows one sample only
@@ -196,7 +207,7 @@ std::vector<std::uint8_t> decompressed_frame(const DicomFile& file, int frame) {
                                 static_cast<Uint32>(bytes.size()), color_model)
           .bad())
     throw Error(fmt::format("{}: pixel data in transfer syntax {} cannot be decoded.\n       {}", where,
-                            DcmXfer(dataset.getOriginalXfer()).getXferName(), kConvertFirst));
+                            DcmXfer(syntax).getXferName(), kConvertFirst));
   bytes.resize(size);
   return bytes;
 }

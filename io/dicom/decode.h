@@ -30,16 +30,16 @@ PixelFormat pixel_format(const DicomItem& dataset);
 void put_pixel_format(DicomItem dataset, const PixelFormat& format);
 
 // Stored values of one frame (from 0), row-major: masked to BitsStored and sign-extended, before any rescale.
-// Decompresses RLE, JPEG baseline and lossless, JPEG-LS. Throws Error naming the transfer syntax and the way around for
-// any other, and for pixel data that are damaged or not as long as the format says.
+// Decompresses RLE, JPEG baseline and lossless, JPEG-LS and JPEG 2000. Throws Error naming the transfer syntax and the
+// way around for any other, and for pixel data that are damaged or not as long as the format says.
 std::vector<std::int32_t> decode_frame(const DicomFile& file, const PixelFormat& format, int frame);
 
 // Reads DCMTK's dictionary and registers its decoders, which it keeps in a list of the process: once, and before the
 // process is confined.
 void prepare_decoding();
 
-// One compressed frame as bytes, those of 16-bit pixels in the order of this machine: DCMTK's decoders, run here. Only
-// for the child process and for tests of hostile files.
+// One compressed frame as bytes, those of 16-bit pixels in the order of this machine: the decoders of DCMTK and
+// OpenJPEG, run here. Only for the child process and for tests of hostile files.
 std::vector<std::uint8_t> decompressed_frame(const DicomFile& file, int frame);
 
 }  // namespace isoshift

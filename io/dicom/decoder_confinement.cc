@@ -3,11 +3,9 @@
 #include <fmt/format.h>
 #include <seccomp.h>
 #include <sys/mman.h>
-#include <sys/prctl.h>
 #include <sys/resource.h>
 
 #include <cerrno>
-#include <csignal>
 #include <cstring>
 #include <memory>
 
@@ -53,7 +51,6 @@ void limit_system_calls() {
 }  // namespace
 
 void confine_decoder() {
-  ::prctl(PR_SET_PDEATHSIG, SIGKILL);  // it does not outlive who waits for it
   // The sanitizers of addresses and threads need all addresses there are, and system calls of their own.
 #if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
   limit_resources();

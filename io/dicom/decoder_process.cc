@@ -1,6 +1,7 @@
 #include "io/dicom/decoder_process.h"
 
 #include <fmt/format.h>
+#include <sys/prctl.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -162,6 +163,12 @@ bool send_answer(Channel& parent, const DecodedFrame& answer, std::span<const st
   return parent.send(to_line(answer)) && parent.send({reinterpret_cast<const char*>(pixels.data()), pixels.size()});
 }
 
+// A child of this process ends with it.
+void end_with(pid_t parent) {
+  ::prctl(PR_SET_PDEATHSIG, SIGKILL);
+  if (::getppid() != parent) ::_exit(1);  // it ended before
+}
+
 // All that a child of the child does.
 bool answer_frame(Channel& parent, const FrameToDecode& request, std::string_view file) {
   DecodedFrame answer;
@@ -220,8 +227,11 @@ int run_decoder() {
     try {
       const FrameToDecode request = frame_to_decode_from(*line, "the request of the parent");
       const std::string_view file = last.at(request.path, request.sha256);
-      const pid_t child = ::fork();
-      if (child == 0) ::_exit(answer_frame(parent, request, file) ? 0 : 1);
+      const pid_t self = ::getpid(), child = ::fork();
+      if (child == 0) {
+        end_with(self);
+        ::_exit(answer_frame(parent, request, file) ? 0 : 1);
+      }
       if (child < 0) throw Error(fmt::format("{}: no process can be made that decodes it", request.path.string()));
       end_like(child);
     } catch (const Error& refused) {

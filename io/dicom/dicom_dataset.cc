@@ -60,6 +60,14 @@ std::string described(const DcmTagKey& key) {
   return fmt::format("{} ({:04X},{:04X})", tag.getTagName(), key.getGroup(), key.getElement());
 }
 
+std::vector<std::pair<DcmTagKey, DcmEVR>> DicomItem::elements() const {
+  std::vector<std::pair<DcmTagKey, DcmEVR>> elements;
+  for (DcmObject* element = item_->nextInContainer(nullptr); element != nullptr;
+       element = item_->nextInContainer(element))
+    elements.emplace_back(element->getTag(), element->ident());
+  return elements;
+}
+
 bool DicomItem::has_value(const DcmTagKey& tag) const { return item_->tagExistsWithValue(tag); }
 
 std::vector<std::string> DicomItem::texts(const DcmTagKey& tag) const {
@@ -259,18 +267,22 @@ DicomFile::~DicomFile() = default;
 
 DicomFile DicomFile::read(const std::filesystem::path& path, Extent extent) {
   FileBytes bytes(path);
-  DicomFile file(bytes, extent);
+  DicomFile file;
+  Sha256 sha256;
+  file.load(bytes, extent, extent == Extent::kWhole ? &sha256 : nullptr);
+  if (extent == Extent::kWhole) file.sha256_ = sha256.hex();
   // Where the character set is unknown to the converter, the bytes stay as they are, together with their set.
   (void)file.file_->getDataset()->convertToUTF8();
   return file;
 }
 
-DicomFile::DicomFile(FileBytes& bytes, Extent extent) : DicomFile() {
+DicomFile::DicomFile(FileBytes& bytes, Extent extent) : DicomFile() { load(bytes, extent, nullptr); }
+
+void DicomFile::load(FileBytes& bytes, Extent extent, Sha256* sha256) {
   path_ = bytes.path();
   const FileStructure structure = structure_of(bytes);
   const std::string deflated = structure.is_deflated ? bytes.whole(bytes.size()) : "";
   const std::uint64_t end = extent == Extent::kHeader ? structure.header_end : bytes.size();
-  Sha256 sha256;
   DcmInputBufferStream stream;
   OFCondition loaded = EC_StreamNotifyClient;
   file_->transferInit();
@@ -278,7 +290,7 @@ DicomFile::DicomFile(FileBytes& bytes, Extent extent) : DicomFile() {
     const auto left = static_cast<std::size_t>(std::min<std::uint64_t>(end - at, FileBytes::kLongestPiece));
     const std::string_view piece = structure.is_deflated ? std::string_view(deflated) : bytes.piece(at, left);
     at += piece.size();
-    if (extent == Extent::kWhole) sha256.add(piece);
+    if (sha256 != nullptr) sha256->add(piece);
     stream.setBuffer(piece.data(), static_cast<offile_off_t>(piece.size()));
     if (at == end || piece.empty()) stream.setEos();
     loaded = extent == Extent::kWhole
@@ -290,10 +302,16 @@ DicomFile::DicomFile(FileBytes& bytes, Extent extent) : DicomFile() {
   if (loaded == EC_InvalidStream || loaded == EC_EndOfStream)
     throw Error(fmt::format("{}: {}", path_.string(), kIsCutOff));
   if (loaded.bad()) throw Error(fmt::format("{}: cannot be read as a DICOM file: {}", path_.string(), loaded.text()));
-  if (extent == Extent::kWhole) sha256_ = sha256.hex();
 }
 
 DicomItem DicomFile::dataset() const { return DicomItem(*file_->getDataset(), path_.string()); }
+
+// DcmXfer's own test has another name in DCMTK 3.6.9 than in 3.6.7.
+bool DicomFile::is_compressed() const {
+  const E_TransferSyntax syntax = file_->getDataset()->getOriginalXfer();
+  return syntax != EXS_LittleEndianImplicit && syntax != EXS_LittleEndianExplicit && syntax != EXS_BigEndianExplicit &&
+         syntax != EXS_DeflatedLittleEndianExplicit && syntax != EXS_Unknown;
+}
 
 void DicomFile::write(const std::filesystem::path& path) {
   const std::string where = path.string();
@@ -303,10 +321,11 @@ void DicomFile::write(const std::filesystem::path& path) {
   DcmOutputBufferStream stream(buffer.data(), static_cast<offile_off_t>(buffer.size()));
   std::string bytes;
   OFCondition written = EC_StreamNotifyClient;
+  const E_TransferSyntax syntax = is_compressed() ? file_->getDataset()->getOriginalXfer() : EXS_LittleEndianExplicit;
   file_->transferInit();
   while (written == EC_StreamNotifyClient) {
-    written = file_->write(stream, EXS_LittleEndianExplicit, EET_ExplicitLength, nullptr, EGL_recalcGL, EPD_noChange, 0,
-                           0, 0, EWM_createNewMeta);
+    written = file_->write(stream, syntax, EET_ExplicitLength, nullptr, EGL_recalcGL, EPD_noChange, 0, 0, 0,
+                           EWM_createNewMeta);
     void* filled = nullptr;
     offile_off_t size = 0;
     stream.flushBuffer(filled, size);
@@ -314,6 +333,8 @@ void DicomFile::write(const std::filesystem::path& path) {
   }
   file_->transferEnd();
   check(written, where, "cannot be written");
+  constexpr std::size_t kPreamble = 128;
+  std::fill_n(bytes.begin(), kPreamble, '\0');  // of the file that was read: it may hold anything (PS3.10 7.1)
   write_text(path, bytes);
   flush(path);
 }

@@ -4,6 +4,7 @@
 
 #include <dcmtk/config/osconfig.h>
 #include <dcmtk/dcmdata/dcdeftag.h>
+#include <dcmtk/dcmdata/dcvr.h>
 
 #include <cstdint>
 #include <filesystem>
@@ -12,6 +13,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 class DcmFileFormat;
@@ -20,6 +22,7 @@ class DcmItem;
 namespace isoshift {
 
 class FileBytes;
+class Sha256;
 
 // "RTImageSID (3002,0026)".
 std::string described(const DcmTagKey& tag);
@@ -31,6 +34,9 @@ class DicomItem {
 
   // The file, and for an item its sequence, as a message names it.
   const std::string& where() const { return where_; }
+
+  // The attributes it has, those without a value too, and their VRs.
+  std::vector<std::pair<DcmTagKey, DcmEVR>> elements() const;
 
   // Reading. Absent and empty are the same: nothing. Values lose their padding; text is UTF-8 where convertible, and
   // its control characters are spaces, so that no file can forge a line of a message or report.
@@ -74,7 +80,7 @@ class DicomFile {
   DicomFile();  // a new, empty object
   // Reads the file once: header, pixels and SHA-256 come from the same bytes.
   static DicomFile read(const std::filesystem::path& path, Extent extent);
-  // The same of bytes that are at hand, without converting texts to UTF-8.
+  // The same of bytes that are at hand, without a hash and without converting texts to UTF-8.
   DicomFile(FileBytes& bytes, Extent extent);
   DicomFile(DicomFile&&) noexcept;
   DicomFile& operator=(DicomFile&&) noexcept;
@@ -83,11 +89,15 @@ class DicomFile {
   const std::filesystem::path& path() const { return path_; }
   const std::string& sha256() const { return sha256_; }  // of the bytes that were read; of a file that was read whole
   DicomItem dataset() const;
+  bool is_compressed() const;  // the pixels: in no native transfer syntax (PS3.5 A.4)
 
-  // Explicit little endian, flushed to the disk. The file must not exist.
+  // Explicit little endian, or as they are if the pixels are compressed; flushed to the disk. What stood before the
+  // dataset in the file that was read is not written. The file must not exist.
   void write(const std::filesystem::path& path);
 
  private:
+  void load(FileBytes& bytes, Extent extent, Sha256* sha256);
+
   std::unique_ptr<DcmFileFormat> file_;
   std::filesystem::path path_;
   std::string sha256_;

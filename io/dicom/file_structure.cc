@@ -12,6 +12,7 @@
 #include <new>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "base/error.h"
@@ -284,11 +285,11 @@ class Walk {
       if (element.length == 2)
         into = std::min<double>(number(bytes(element.value_at, 2), level.encoding.is_little_endian), most);
     };
-    constexpr double kMostOfAShort = 65535;
+    constexpr double kMostBits = 64, kMostSamples = 4;  // of any image of PS3.3
     if (element.tag == DCM_Rows) short_number(image_.rows, kMaxEdge);
     if (element.tag == DCM_Columns) short_number(image_.columns, kMaxEdge);
-    if (element.tag == DCM_BitsAllocated) short_number(image_.bits, kMostOfAShort);
-    if (element.tag == DCM_SamplesPerPixel) short_number(image_.samples, kMostOfAShort);
+    if (element.tag == DCM_BitsAllocated) short_number(image_.bits, kMostBits);
+    if (element.tag == DCM_SamplesPerPixel) short_number(image_.samples, kMostSamples);
     if (element.tag == DCM_NumberOfFrames && element.length <= 12)
       image_.frames = std::clamp(std::strtod(std::string(bytes(element.value_at, element.length)).c_str(), nullptr),
                                  0.0, static_cast<double>(kMaxFrames));
@@ -349,6 +350,17 @@ std::string inflated(std::string_view bytes, const std::filesystem::path& path) 
   return whole;
 }
 
+// The transfer syntaxes that neither we nor gdcmconv decode, by what their UIDs begin with (PS3.6 A-1).
+void refuse_what_nobody_converts(std::string_view uid, const std::filesystem::path& path) {
+  for (const auto& [begin, name] : {std::pair("1.2.840.10008.1.2.4.20", "High-Throughput JPEG 2000"),
+                                    std::pair("1.2.840.10008.1.2.4.11", "JPEG XL")})
+    if (uid.starts_with(begin) && uid.size() == std::string_view(begin).size() + 1)
+      throw Error(
+          fmt::format("{}: {} is {}, {}, which isoshift does not decode.\n       Export the images again, "
+                      "uncompressed or with JPEG 2000, JPEG-LS, JPEG or RLE",
+                      path.string(), described(DCM_TransferSyntaxUID), uid, name));
+}
+
 }  // namespace
 
 FileStructure structure_of(FileBytes& file) {
@@ -357,6 +369,7 @@ FileStructure structure_of(FileBytes& file) {
   const bool has_preamble = preamble.size() == kPreamble && preamble.ends_with("DICM");
   Walk walk(file, has_preamble ? kPreamble : 0);
   if (const std::string uid = walk.transfer_syntax(); !uid.empty()) {
+    refuse_what_nobody_converts(uid, file.path());
     const DcmXfer syntax(uid.c_str());
     // DCMTK would take it for explicit little endian, and its pixels for what they are not.
     if (syntax.getXfer() == EXS_Unknown)

@@ -48,7 +48,7 @@ TEST_P(GdcmRoundTrip, ACompressedStudyRegistersTheSame) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(All, GdcmRoundTrip, testing::Values("--jpegls", "--rle", "--jpeg"));
+INSTANTIATE_TEST_SUITE_P(All, GdcmRoundTrip, testing::Values("--jpegls", "--rle", "--jpeg", "--j2k"));
 
 }  // namespace
 }  // namespace isoshift::round_trip_test

@@ -36,7 +36,7 @@ std::vector<Original> originals() {
     list.push_back({reader, file, text_of_file(testdata(file))});
   };
   add("ct", "small/1/CT/CT0018.dcm");
-  for (const char* name : {"jpeg-ls", "jpeg-lossless", "rle", "deflated", "implicit", "big-endian"})
+  for (const char* name : {"jpeg-ls", "jpeg-lossless", "jpeg2000", "rle", "deflated", "implicit", "big-endian"})
     add("ct", fmt::format("compressed/{}.dcm", name));
   add("rt_image", "small/1/RTIMAGE/KV_G090.dcm");
   add("rt_plan", "small/1/RTPLAN.dcm");

@@ -1,0 +1,130 @@
+#include "io/dicom/jpeg2000.h"
+
+#include <fmt/format.h>
+#include <openjpeg.h>
+
+#include <algorithm>
+#include <cstring>
+#include <memory>
+#include <string_view>
+
+#include "base/error.h"
+
+namespace isoshift {
+namespace {
+
+// What OpenJPEG reads from: bytes in memory.
+struct Bytes {
+  std::span<const std::uint8_t> all;
+  std::size_t at = 0;
+};
+
+OPJ_SIZE_T read_bytes(void* to, OPJ_SIZE_T most, void* data) {
+  auto& bytes = *static_cast<Bytes*>(data);
+  const std::size_t count = std::min<std::size_t>(most, bytes.all.size() - bytes.at);
+  if (count == 0) return static_cast<OPJ_SIZE_T>(-1);  // the end
+  std::memcpy(to, bytes.all.data() + bytes.at, count);
+  bytes.at += count;
+  return count;
+}
+
+OPJ_OFF_T skip_bytes(OPJ_OFF_T count, void* data) {
+  auto& bytes = *static_cast<Bytes*>(data);
+  const auto left = static_cast<OPJ_OFF_T>(bytes.all.size() - bytes.at);
+  if (count < 0 || left == 0) return -1;
+  const OPJ_OFF_T skipped = std::min(count, left);
+  bytes.at += static_cast<std::size_t>(skipped);
+  return skipped;
+}
+
+OPJ_BOOL seek_bytes(OPJ_OFF_T to, void* data) {
+  auto& bytes = *static_cast<Bytes*>(data);
+  if (to < 0 || static_cast<std::size_t>(to) > bytes.all.size()) return OPJ_FALSE;
+  bytes.at = static_cast<std::size_t>(to);
+  return OPJ_TRUE;
+}
+
+// OpenJPEG's first complaint, which names the fault; those that follow come from it.
+void keep_first(const char* message, void* data) {
+  auto& first = *static_cast<std::string*>(data);
+  if (!first.empty()) return;
+  first = message;
+  first.erase(first.find_last_not_of(" \r\n") + 1);
+}
+
+using OpjStream = std::unique_ptr<opj_stream_t, decltype(&opj_stream_destroy)>;
+using OpjCodec = std::unique_ptr<opj_codec_t, decltype(&opj_destroy_codec)>;
+using OpjImage = std::unique_ptr<opj_image_t, decltype(&opj_image_destroy)>;
+
+OpjStream stream_from(Bytes& bytes) {
+  OpjStream stream(opj_stream_default_create(OPJ_TRUE), &opj_stream_destroy);
+  opj_stream_set_user_data(stream.get(), &bytes, nullptr);
+  opj_stream_set_user_data_length(stream.get(), bytes.all.size());
+  opj_stream_set_read_function(stream.get(), &read_bytes);
+  opj_stream_set_skip_function(stream.get(), &skip_bytes);
+  opj_stream_set_seek_function(stream.get(), &seek_bytes);
+  return stream;
+}
+
+bool is_jp2(std::span<const std::uint8_t> bytes) {
+  constexpr std::string_view kSignature("\0\0\0\x0CjP  \r\n\x87\n", 12);
+  return bytes.size() >= kSignature.size() && std::memcmp(bytes.data(), kSignature.data(), kSignature.size()) == 0;
+}
+
+// Before anything is decoded: what the stream announces is the image of the header.
+void check_is_of(const PixelFormat& format, const opj_image_t& image, const std::string& where) {
+  if (image.numcomps != 1)
+    throw Error(fmt::format("{}: its compressed pixels have {} components, expected 1", where, image.numcomps));
+  const opj_image_comp_t& pixels = image.comps[0];
+  if (pixels.w != static_cast<OPJ_UINT32>(format.columns) || pixels.h != static_cast<OPJ_UINT32>(format.rows))
+    throw Error(fmt::format("{}: its compressed pixels are {} x {}, {} and {} say {} x {}", where, pixels.w, pixels.h,
+                            described(DCM_Columns), described(DCM_Rows), format.columns, format.rows));
+  if ((pixels.sgnd != 0) != format.is_signed)
+    throw Error(fmt::format("{}: its compressed pixels are {}, {} says {}", where,
+                            pixels.sgnd != 0 ? "signed" : "unsigned", described(DCM_PixelRepresentation),
+                            format.is_signed ? "signed" : "unsigned"));
+}
+
+}  // namespace
+
+std::vector<std::uint8_t> decoded_jpeg2000(std::span<const std::uint8_t> stream, const PixelFormat& format,
+                                           const std::string& where) {
+  std::string fault;
+  const auto expect = [&](bool is_done) {
+    if (!is_done)
+      throw Error(fmt::format("{}: its JPEG 2000 pixels cannot be decoded: {}", where,
+                              fault.empty() ? "they are damaged" : fault));
+  };
+  Bytes bytes{stream};
+  const OpjStream source = stream_from(bytes);
+  const OpjCodec codec(opj_create_decompress(is_jp2(stream) ? OPJ_CODEC_JP2 : OPJ_CODEC_J2K), &opj_destroy_codec);
+  opj_set_error_handler(codec.get(), &keep_first, &fault);
+  opj_dparameters_t parameters;
+  opj_set_default_decoder_parameters(&parameters);
+  expect(opj_setup_decoder(codec.get(), &parameters) && opj_decoder_set_strict_mode(codec.get(), OPJ_TRUE));
+  opj_image_t* announced = nullptr;
+  const bool is_read = opj_read_header(source.get(), codec.get(), &announced);
+  const OpjImage image(announced, &opj_image_destroy);
+  expect(is_read);
+  check_is_of(format, *image, where);
+  expect(opj_decode(codec.get(), source.get(), image.get()) && opj_end_decompress(codec.get(), source.get()) &&
+         image->comps[0].data != nullptr);
+  check_is_of(format, *image, where);  // a palette of a JP2 file makes several components of one
+
+  const std::span<const OPJ_INT32> values(image->comps[0].data, format.pixels_per_frame());
+  const auto [least, greatest] = std::ranges::minmax(values);
+  if (greatest > format.max_stored_value() || least < (format.is_signed ? -format.max_stored_value() - 1 : 0))
+    throw Error(fmt::format("{}: its compressed pixels have values from {} to {}, more than the {} bits of {} hold",
+                            where, least, greatest, format.bits_stored, described(DCM_BitsStored)));
+  std::vector<std::uint8_t> pixels(format.bytes_per_frame());
+  for (std::size_t n = 0; n < values.size(); ++n) {
+    const auto word = static_cast<std::uint16_t>(values[n]);
+    if (format.bits_allocated == 16)
+      std::memcpy(pixels.data() + 2 * n, &word, sizeof word);
+    else
+      pixels[n] = static_cast<std::uint8_t>(word);
+  }
+  return pixels;
+}
+
+}  // namespace isoshift

@@ -1,0 +1,210 @@
+#include "io/objects/deidentification.h"
+
+#include <dcmtk/dcmdata/dctk.h>
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <span>
+#include <string>
+#include <string_view>
+
+#include "base/version.h"
+
+namespace isoshift {
+namespace {
+
+// What is known of an attribute; the VR decides about all others (action_for).
+enum class Action { kKeep, kRemove, kEmpty, kReplaceText, kReplaceUids, kMoveDates, kLookInside };
+
+struct Replaced {
+  DcmTagKey tag;
+  const char* kind;  // of the pseudonym: short, a label has at most 16 characters
+};
+const Replaced kReplacedTexts[] = {
+    {DCM_PatientName, "Patient"},
+    {DCM_PatientID, "ANON"},
+    {DCM_IssuerOfPatientID, "Issuer"},
+    {DCM_StationName, "Station"},
+    {DCM_RadiationMachineName, "Machine"},
+    {DCM_TreatmentMachineName, "Machine"},
+    {DCM_RTImageLabel, "Image"},
+    {DCM_RTPlanLabel, "Plan"},
+    {DCM_StructureSetLabel, "Structure set"},
+    {DCM_ROIName, "Structure"},
+    {DCM_BeamName, "Beam"},
+    {DCM_ContentLabel, "CONTENT"},
+};
+
+// Attributes that an object must have, if only empty (type 2).
+const DcmTagKey kEmptied[] = {DCM_PatientBirthDate,           DCM_PatientSex,        DCM_AccessionNumber,
+                              DCM_ReferringPhysicianName,     DCM_StudyID,           DCM_OperatorsName,
+                              DCM_PositionReferenceIndicator, DCM_ROIInterpreter,    DCM_ReviewerName,
+                              DCM_ContentCreatorName,         DCM_ContentDescription};
+
+const DcmTagKey kKeptTexts[] = {DCM_SpecificCharacterSet,
+                                DCM_Manufacturer,
+                                DCM_ManufacturerModelName,
+                                DCM_SoftwareVersions,
+                                DCM_ConvolutionKernel,
+                                DCM_FilterType,
+                                DCM_CodeValue,
+                                DCM_CodingSchemeDesignator,
+                                DCM_CodingSchemeVersion,
+                                DCM_CodeMeaning,
+                                DCM_TimezoneOffsetFromUTC};
+
+// Of the groups that are kept: what Table E.1-1 removes and no VR tells.
+const DcmTagKey kRemoved[] = {DCM_InstitutionCodeSequence,
+                              DCM_InstitutionalDepartmentTypeCodeSequence,
+                              DCM_ReferringPhysicianIdentificationSequence,
+                              DCM_ConsultingPhysicianIdentificationSequence,
+                              DCM_PhysiciansOfRecordIdentificationSequence,
+                              DCM_PerformingPhysicianIdentificationSequence,
+                              DCM_PhysiciansReadingStudyIdentificationSequence,
+                              DCM_OperatorIdentificationSequence,
+                              DCM_AdmittingDiagnosesCodeSequence,
+                              DCM_ReferencedStudySequence,
+                              DCM_ReferencedPerformedProcedureStepSequence,
+                              DCM_ReferencedPatientSequence,
+                              {0x0008, 0x1301},  // PrincipalDiagnosisCodeSequence
+                              {0x0008, 0x1302},  // PrimaryDiagnosisCodeSequence
+                              {0x0008, 0x1303},  // SecondaryDiagnosesCodeSequence
+                              {0x0008, 0x1304},  // HistologicalDiagnosesCodeSequence
+                              DCM_UDISequence,
+                              DCM_TransducerIdentificationSequence,
+                              DCM_RETIRED_ModifyingDeviceID,
+                              DCM_GraphicAnnotationSequence,
+                              DCM_ContentCreatorIdentificationCodeSequence,
+                              {0x3006, 0x004D},   // ROICreatorSequence
+                              {0x3006, 0x004E}};  // ROIInterpreterSequence
+
+// UIDs that say what an object is, or what a code means, and not which it is.
+const DcmTagKey kKeptUids[] = {DCM_SOPClassUID,
+                               DCM_ReferencedSOPClassUID,
+                               DCM_CodingSchemeUID,
+                               DCM_ContextUID,
+                               DCM_MappingResourceUID,
+                               DCM_RelatedGeneralSOPClassUID,
+                               DCM_OriginalSpecializedSOPClassUID};
+
+// Frames of reference that every machine has (PS3.6 A-2): IEC 61217 fixed, the robotic arm's, the table top's.
+constexpr std::string_view kWellKnownFrames = "1.2.840.10008.1.4.3.";
+
+// Beside them all groups are removed, that of the file meta information too, which is made anew.
+constexpr std::array<Uint16, 12> kKeptGroups = {0x0008, 0x0018, 0x0020, 0x0028, 0x0070, 0x3002,
+                                                0x3004, 0x3006, 0x3008, 0x300A, 0x300C, 0x300E};
+const DcmTagKey kKeptOfOtherGroups[] = {DCM_PixelData, DCM_PurposeOfReferenceCodeSequence, DCM_ConceptNameCodeSequence};
+
+bool is_among(std::span<const DcmTagKey> tags, const DcmTagKey& tag) { return std::ranges::count(tags, tag) > 0; }
+
+const char* kind_of(const DcmTagKey& tag) {
+  const auto* const found = std::ranges::find(kReplacedTexts, tag, &Replaced::tag);
+  return found == std::end(kReplacedTexts) ? nullptr : found->kind;
+}
+
+Action action_for(const DcmTagKey& tag, DcmEVR vr) {
+  if (kind_of(tag) != nullptr) return Action::kReplaceText;
+  if (is_among(kEmptied, tag)) return Action::kEmpty;
+  const bool is_kept_group = std::ranges::count(kKeptGroups, tag.getGroup()) > 0;
+  const bool is_known = DcmTag(tag).error().good();
+  if (!is_known || (!is_kept_group && !is_among(kKeptOfOtherGroups, tag)) || is_among(kRemoved, tag))
+    return Action::kRemove;
+  switch (vr) {
+    case EVR_SQ: return Action::kLookInside;
+    case EVR_UI: return is_among(kKeptUids, tag) ? Action::kKeep : Action::kReplaceUids;
+    case EVR_DA:
+    case EVR_DT: return Action::kMoveDates;
+    case EVR_CS:
+    case EVR_TM:
+    case EVR_DS:
+    case EVR_IS:
+    case EVR_AT:
+    case EVR_FD:
+    case EVR_FL:
+    case EVR_OD:
+    case EVR_OF:
+    case EVR_SL:
+    case EVR_SS:
+    case EVR_UL:
+    case EVR_US: return Action::kKeep;
+    case EVR_OB:
+    case EVR_OW:
+    case EVR_PixelData: return tag == DCM_PixelData || tag.getGroup() == 0x0028 ? Action::kKeep : Action::kRemove;
+    default: return is_among(kKeptTexts, tag) ? Action::kKeep : Action::kRemove;
+  }
+}
+
+// Files may hold anything under the VR of a number, a time or a code word.
+bool is_of_its_vr(const DicomItem& item, const DcmTagKey& tag, DcmEVR vr) {
+  std::string_view allowed;
+  if (vr == EVR_DS || vr == EVR_IS) allowed = "0123456789+-.eE ";
+  if (vr == EVR_TM) allowed = "0123456789.: ";
+  if (vr == EVR_CS) allowed = "ABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_ ";
+  return allowed.empty() || std::ranges::all_of(item.texts(tag), [&](const std::string& value) {
+           return value.find_first_not_of(allowed) == std::string::npos;
+         });
+}
+
+// The values of an attribute, each replaced; without those for which nothing remains.
+void replace(DicomItem& item, const DcmTagKey& tag, const auto& by) {
+  std::string joined;
+  for (const std::string& value : item.texts(tag))
+    if (const std::string replaced = value.empty() ? "" : by(value); !replaced.empty())
+      joined += (joined.empty() ? "" : "\\") + replaced;
+  item.put(tag, joined);
+}
+
+void replace_in(DicomItem& item, Pseudonyms& pseudonyms) {
+  for (const auto& [tag, vr] : item.elements()) {
+    switch (action_for(tag, vr)) {
+      case Action::kKeep:
+        if (!is_of_its_vr(item, tag, vr)) item.erase(tag);
+        break;
+      case Action::kRemove: item.erase(tag); break;
+      case Action::kEmpty: item.put(tag, ""); break;
+      case Action::kReplaceText:
+        replace(item, tag, [&](const std::string& value) { return pseudonyms.text(kind_of(tag), value); });
+        break;
+      case Action::kReplaceUids:
+        replace(item, tag, [&](const std::string& value) {
+          return value.starts_with(kWellKnownFrames) ? value : pseudonyms.uid(value);
+        });
+        break;
+      case Action::kMoveDates:
+        replace(item, tag, [&](const std::string& value) { return pseudonyms.date(value); });
+        break;
+      case Action::kLookInside:
+        for (DicomItem& inner : item.items(tag)) replace_in(inner, pseudonyms);
+        break;
+    }
+  }
+}
+
+void put_code(DicomItem item, const char* value, const char* meaning) {
+  item.put(DCM_CodeValue, value);
+  item.put(DCM_CodingSchemeDesignator, "DCM");
+  item.put(DCM_CodeMeaning, meaning);
+}
+
+}  // namespace
+
+void deidentify(DicomItem dataset, Pseudonyms& pseudonyms) {
+  replace_in(dataset, pseudonyms);
+  // PS3.15 E.1.1, and CID 7050 of PS3.16.
+  dataset.put(DCM_PatientIdentityRemoved, "YES");
+  dataset.put(DCM_DeidentificationMethod, fmt::format("isoshift {}: PS3.15 Annex E, and stricter", kVersion));
+  put_code(dataset.append_item(DCM_DeidentificationMethodCodeSequence), "113100",
+           "Basic Application Confidentiality Profile");
+  put_code(dataset.append_item(DCM_DeidentificationMethodCodeSequence), "113107",
+           "Retain Longitudinal Temporal Information Modified Dates Option");
+  dataset.put(DCM_LongitudinalTemporalInformationModified, "MODIFIED");
+}
+
+BurntIn burnt_in(const DicomItem& dataset) {
+  const std::string says = dataset.text(DCM_BurnedInAnnotation).value_or("");
+  if (says == "NO") return BurntIn::kNo;
+  return says == "YES" ? BurntIn::kYes : BurntIn::kUnknown;
+}
+
+}  // namespace isoshift

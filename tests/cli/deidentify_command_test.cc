@@ -1,0 +1,156 @@
+// deidentify and bundle: nothing tells who the patient is, and all of it registers as before.
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <set>
+
+#include "io/study/study_files.h"
+#include "tests/support/pose_near.h"
+#include "tests/support/small_study.h"
+#include "tests/support/testdata.h"
+#include "workflow/register/truth.h"
+
+namespace isoshift::deidentify_command_test {
+namespace {
+
+using testing::HasSubstr;
+using testing::Not;
+
+std::string bytes_of(const std::filesystem::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+class DeidentifyCommandTest : public testing::Test {
+ protected:
+  DeidentifyCommandTest() {
+    for (const std::filesystem::path& file : files_below({study_.path()})) {
+      if (file.extension() != ".dcm") continue;
+      edit(file, [&](DicomItem dataset) {
+        dataset.put(DCM_PatientName, "Featherstone^Ada");
+        dataset.put(DCM_PatientID, "4711-0815");
+        dataset.put(DCM_InstitutionName, "St. Elsewhere");
+        dataset.put(DCM_StationName, "QUINCY7");
+        if (dataset.has_value(DCM_RTImageLabel))
+          dataset.put(DCM_RTImageLabel, "Featherst " + dataset.required_text(DCM_InstanceNumber));
+        for (const DcmTagKey& tag : {DCM_SOPInstanceUID, DCM_StudyInstanceUID, DCM_FrameOfReferenceUID})
+          if (dataset.has_value(tag)) uids_.insert(dataset.required_text(tag));
+      });
+    }
+    std::filesystem::rename(study_.image(0), study_.path() / "RTIMAGE/Featherstone.dcm");
+  }
+
+  std::string path(const std::string& name) const { return (study_.path().parent_path() / name).string(); }
+
+  void expect_tells_nothing(const std::filesystem::path& folder) const {
+    std::size_t files = 0;
+    for (const std::filesystem::path& file : files_below({folder})) {
+      ++files;
+      const std::string bytes = file.string().substr(folder.string().size()) + bytes_of(file);
+      for (const char* told : {"Featherst", "Ada", "4711-0815", "St. Elsewhere", "QUINCY7"})
+        EXPECT_EQ(bytes.find(told), std::string::npos) << file << " tells " << told;
+      for (const std::string& uid : uids_) EXPECT_EQ(bytes.find(uid), std::string::npos) << file << " tells " << uid;
+    }
+    EXPECT_GT(files, 20);
+  }
+
+  SmallStudy study_;
+  std::set<std::string> uids_;
+};
+
+TEST_F(DeidentifyCommandTest, TheStudyRegistersAsBefore) {
+  const CommandOutcome done = run_command({"deidentify", study_.path().string(), "-o", path("safe")});
+  ASSERT_EQ(done.exit_status, 0) << done.err;
+  EXPECT_THAT(done.out, HasSubstr("RTIMAGE        2 files"));
+  EXPECT_THAT(done.err, HasSubstr("CT: pixels stay as they are; from the CT of a head, the face can be drawn"));
+  expect_tells_nothing(path("safe"));
+
+  ASSERT_EQ(run_command({"register", study_.path().string(), "-o", path("before")}).exit_status, 0);
+  const CommandOutcome again = run_command({"register", path("safe"), "-o", path("after")});
+  ASSERT_EQ(again.exit_status, 0) << again.err;
+  EXPECT_THAT(read_setup_error(path("after/result.json")),
+              PoseNear(read_setup_error(path("before/result.json")), 1e-9, 1e-9));
+}
+
+TEST_F(DeidentifyCommandTest, WhatIsWrittenIsStillWholeDicom) {
+  ASSERT_EQ(run_command({"deidentify", study_.path().string(), "-o", path("safe")}).exit_status, 0);
+  for (const std::filesystem::path& file : files_below({path("safe")})) {
+    const auto errors = [](const std::filesystem::path& dicom) {
+      return run_shell(fmt::format("dciodvfy -new {} 2>&1 | grep -c ^Error", dicom.string())).out;
+    };
+    if (file.extension() != ".dcm") continue;
+    EXPECT_EQ(errors(file), "0\n") << run_shell("dciodvfy -new " + file.string()).out;
+  }
+}
+
+TEST_F(DeidentifyCommandTest, BurntInTextIsWarnedOf) {
+  edit(study_.image(1), [](DicomItem dataset) { dataset.put(DCM_BurnedInAnnotation, "YES"); });
+  const CommandOutcome done = run_command({"deidentify", study_.path().string(), "-o", path("safe")});
+  EXPECT_THAT(done.err, HasSubstr("RTIMAGE/00002.dcm: text is burnt into its pixels (BurnedInAnnotation (0028,0301) is "
+                                  "YES)"));
+}
+
+TEST_F(DeidentifyCommandTest, AFileThatCannotBeReadStopsIt) {
+  std::ofstream(study_.path() / "CT/broken.dcm") << "no DICOM";
+  const CommandOutcome done = run_command({"deidentify", study_.path().string(), "-o", path("safe")});
+  EXPECT_EQ(done.exit_status, 1);
+  EXPECT_THAT(done.err, HasSubstr("broken.dcm"));
+  EXPECT_FALSE(std::filesystem::exists(path("safe")));
+}
+
+TEST_F(DeidentifyCommandTest, WhatIsNoPartOfAStudyIsLeftAside) {
+  std::filesystem::copy_file(testdata("results/0.1.0/accepted/report.dcm"), study_.path() / "report.dcm");
+  const CommandOutcome done = run_command({"deidentify", study_.path().string(), "-o", path("safe")});
+  EXPECT_EQ(done.exit_status, 0);
+  EXPECT_THAT(done.err, HasSubstr("left aside: " + (study_.path() / "report.dcm").string()));
+  EXPECT_EQ(run_command({"deidentify", (study_.path() / "report.dcm").string(), "-o", path("none")}).exit_status, 1);
+  EXPECT_FALSE(std::filesystem::exists(path("none")));
+}
+
+class BundleCommandTest : public DeidentifyCommandTest {
+ protected:
+  BundleCommandTest() {
+    EXPECT_EQ(run_command({"register", study_.path().string(), "-o", path("Featherstone"), "--seed", "3"}).exit_status,
+              0);
+  }
+};
+
+TEST_F(BundleCommandTest, TheResultIsFoundAgainFromIt) {
+  const CommandOutcome done =
+      run_command({"bundle", path("Featherstone"), study_.path().string(), "-o", path("bundle")});
+  ASSERT_EQ(done.exit_status, 0) << done.err;
+  expect_tells_nothing(path("bundle"));
+  EXPECT_THAT(bytes_of(path("bundle/versions.txt")), testing::AllOf(HasSubstr("isoshift "), HasSubstr("libdcmdata")));
+  EXPECT_THAT(bytes_of(path("bundle/README.txt")), HasSubstr("--seed 3"));
+  const Eigen::Isometry3d found = read_setup_error(path("Featherstone/result.json"));
+  EXPECT_THAT(read_setup_error(path("bundle/result/result.json")), PoseNear(found, 1e-9, 1e-9));
+  ASSERT_EQ(run_command({"register", path("bundle/study"), "-o", path("again"), "--seed", "3"}).exit_status, 0);
+  EXPECT_THAT(read_setup_error(path("again/result.json")), PoseNear(found, 1e-9, 1e-9));
+  // Study and result belong together.
+  const auto again = nlohmann::json::parse(bytes_of(path("again/result.json")));
+  const auto bundled = nlohmann::json::parse(bytes_of(path("bundle/result/result.json")));
+  EXPECT_EQ(again["references"]["images"], bundled["references"]["images"]);
+  EXPECT_EQ(again["references"]["ct_series"], bundled["references"]["ct_series"]);
+  EXPECT_EQ(again["patient"]["id"], bundled["patient"]["id"]);
+  EXPECT_EQ(again["views"][0]["label"], bundled["views"][0]["label"]);
+}
+
+TEST_F(BundleCommandTest, AnotherStudyIsRefused) {
+  edit(study_.image(1), [](DicomItem dataset) { dataset.put(DCM_GantryAngle, 91.0); });
+  const CommandOutcome changed =
+      run_command({"bundle", path("Featherstone"), study_.path().string(), "-o", path("bundle")});
+  EXPECT_EQ(changed.exit_status, 1);
+  EXPECT_THAT(changed.err, HasSubstr("is not the file that was registered: its SHA-256 is another"));
+  std::filesystem::remove(study_.image(1));
+  const CommandOutcome without =
+      run_command({"bundle", path("Featherstone"), study_.path().string(), "-o", path("bundle")});
+  EXPECT_THAT(without.err, HasSubstr("the study does not hold the X-ray"));
+  EXPECT_FALSE(std::filesystem::exists(path("bundle")));
+}
+
+}  // namespace
+}  // namespace isoshift::deidentify_command_test

@@ -1,0 +1,47 @@
+#include "io/objects/pseudonyms.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+namespace isoshift::pseudonyms_test {
+namespace {
+
+TEST(Pseudonyms, AreTheSameForTheSame) {
+  Pseudonyms pseudonyms;
+  const std::string uid = pseudonyms.uid("1.2.3");
+  EXPECT_NE(uid, "1.2.3");
+  EXPECT_EQ(pseudonyms.uid("1.2.3"), uid);
+  EXPECT_NE(pseudonyms.uid("1.2.4"), uid);
+  EXPECT_EQ(pseudonyms.text("Patient", "Smith^John"), "Patient 1");
+  EXPECT_EQ(pseudonyms.text("Patient", "SMITH^JOHN"), "Patient 1");
+  EXPECT_EQ(pseudonyms.text("Patient", "Smith^Jane"), "Patient 2");
+  EXPECT_EQ(pseudonyms.text("Machine", "Smith^John"), "Machine 1");
+  EXPECT_NE(Pseudonyms().uid("1.2.3"), uid);
+}
+
+TEST(Pseudonyms, DatesMoveTogetherAndKeepTheirForm) {
+  const Pseudonyms pseudonyms;
+  const std::string moved = pseudonyms.date("20260301");
+  ASSERT_EQ(moved.size(), 8);
+  EXPECT_LT(moved, "20260301");
+  EXPECT_EQ(pseudonyms.date("2026.03.01"), moved.substr(0, 4) + "." + moved.substr(4, 2) + "." + moved.substr(6));
+  EXPECT_EQ(pseudonyms.date("2026-03-01T10:16:02+0100"),
+            moved.substr(0, 4) + "-" + moved.substr(4, 2) + "-" + moved.substr(6) + "T10:16:02+0100");
+  EXPECT_EQ(pseudonyms.date("20260301101602.5"), moved + "101602.5");
+  for (const char* none : {"", "yesterday", "2026", "20261301", "2026-3-1", "Smith 20260301"})
+    EXPECT_EQ(pseudonyms.date(none), "") << none;
+}
+
+TEST(Pseudonyms, ReplaceWordsOfSentences) {
+  Pseudonyms pseudonyms;
+  pseudonyms.text("Image", "KV");
+  pseudonyms.text("Image", "KV_G090");
+  pseudonyms.uid("1.2.3");
+  pseudonyms.stands_for("exported/Smith/a.dcm", "CT/00001.dcm");
+  EXPECT_EQ(pseudonyms.in("exported/Smith/a.dcm: KV_G090, KV and kV 1.2.3"),
+            "CT/00001.dcm: Image 2, Image 1 and kV " + pseudonyms.uid("1.2.3"));
+  EXPECT_EQ(pseudonyms.in("MKV"), "MKV");
+}
+
+}  // namespace
+}  // namespace isoshift::pseudonyms_test

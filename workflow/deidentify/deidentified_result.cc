@@ -1,0 +1,88 @@
+#include "workflow/deidentify/deidentified_result.h"
+
+#include <string>
+#include <vector>
+
+namespace isoshift {
+namespace {
+
+// Nobody knows what the name of a folder tells.
+void replace_in(std::vector<std::string>& messages, const Pseudonyms& pseudonyms) {
+  for (std::string& message : messages) {
+    message = pseudonyms.in(message);
+    if (message.find('/') != std::string::npos || message.find(".dcm") != std::string::npos)
+      message = "a message that names a file";
+  }
+}
+
+void replace_name(std::string& name, const char* kind, Pseudonyms& pseudonyms) {
+  if (!name.empty()) name = pseudonyms.text(kind, name);
+}
+
+void replace_uid(std::string& uid, Pseudonyms& pseudonyms) {
+  if (!uid.empty()) uid = pseudonyms.uid(uid);
+}
+
+Identity deidentified(const Identity& identity, Pseudonyms& pseudonyms) {
+  Identity replaced{.character_set = identity.character_set,
+                    .patient_id = identity.patient_id,
+                    .patient_id_issuer = identity.patient_id_issuer,
+                    .patient_name = identity.patient_name,
+                    .study_instance_uid = identity.study_instance_uid,
+                    .study_date = pseudonyms.date(identity.study_date),
+                    .study_time = identity.study_time};
+  replace_name(replaced.patient_id, "ANON", pseudonyms);
+  replace_name(replaced.patient_id_issuer, "Issuer", pseudonyms);
+  replace_name(replaced.patient_name, "Patient", pseudonyms);
+  replace_uid(replaced.study_instance_uid, pseudonyms);
+  return replaced;
+}
+
+void replace_in(SetupResult::View& view, Pseudonyms& pseudonyms) {
+  replace_uid(view.sop_instance_uid, pseudonyms);
+  view.label = pseudonyms.in(view.label);
+  view.match.label = pseudonyms.in(view.match.label);
+  view.match.field.doubt = pseudonyms.in(view.match.field.doubt);
+  view.acquired = pseudonyms.date(view.acquired);
+  replace_name(view.machine, "Machine", pseudonyms);
+  for (ViewPicture::Outline& outline : view.picture.structures) outline.name = pseudonyms.in(outline.name);
+}
+
+void replace_in(SiteRules& site, Pseudonyms& pseudonyms) {
+  replace_name(site.name, "Site", pseudonyms);
+  site.target = pseudonyms.in(site.target);
+  site.surrogate = pseudonyms.in(site.surrogate);
+  if (site.couch_scale) replace_name(site.couch_scale->validated_by, "Person", pseudonyms);
+  if (site.automatic_release) replace_name(site.automatic_release->by, "Person", pseudonyms);
+}
+
+}  // namespace
+
+SetupResult deidentified(SetupResult result, Pseudonyms& pseudonyms) {
+  result.identity = deidentified(result.identity, pseudonyms);
+  for (std::string* uid : {&result.ct_series_uid, &result.plan_uid, &result.spatial_registration_uid})
+    replace_uid(*uid, pseudonyms);
+  for (SetupResult::View& view : result.views) replace_in(view, pseudonyms);
+  replace_name(result.plan_label, "Plan", pseudonyms);
+  result.made_on = pseudonyms.date(result.made_on);
+  if (result.site) replace_in(*result.site, pseudonyms);
+  if (result.machine) replace_name(result.machine->name, "Machine profile", pseudonyms);
+  if (result.start) {
+    replace_name(result.start->file, "File", pseudonyms);
+    replace_name(result.start->set_by, "Person", pseudonyms);
+  }
+  for (SetupResult::Point& point : result.points) point.name = pseudonyms.in(point.name);
+  if (result.target) {
+    result.target->name = pseudonyms.in(result.target->name);
+    result.target->chosen_by = pseudonyms.in(result.target->chosen_by);
+    result.target->surrogate = pseudonyms.in(result.target->surrogate);
+  }
+  for (Alternative& alternative : result.alternatives) alternative.description = pseudonyms.in(alternative.description);
+  for (StructureMotion& structure : result.structures) structure.name = pseudonyms.in(structure.name);
+  for (std::vector<std::string>* messages : {&result.region, &result.reasons, &result.overrides, &result.warnings})
+    replace_in(*messages, pseudonyms);
+  result.left_aside.clear();
+  return result;
+}
+
+}  // namespace isoshift
