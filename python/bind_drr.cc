@@ -1,15 +1,14 @@
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <memory>
+#include <optional>
 #include <string>
 
-#include "base/error.h"
 #include "drr/renderer.h"
 #include "io/dicom/ct_series.h"
 #include "io/objects/image_files.h"
 #include "io/report/view_picture.h"
 #include "python/bindings.h"
+#include "workflow/register/rendering_options.h"
 
 namespace isoshift::python {
 namespace {
@@ -17,27 +16,19 @@ namespace {
 using Views = std::vector<XrayView>;
 using Pixels = std::vector<std::vector<std::uint32_t>>;
 
-AttenuationModel model_of(const std::string& attenuation, double threshold_hu) {
-  if (attenuation != "physical" && attenuation != "windowed")
-    throw UsageError(fmt::format("attenuation is {}, expected physical or windowed", attenuation));
-  AttenuationModel model;
-  model.kind = attenuation == "physical" ? AttenuationModel::Kind::kPhysical : AttenuationModel::Kind::kWindowed;
-  model.threshold_hu = threshold_hu;
-  return model;
-}
-
 std::shared_ptr<Renderer> renderer_of(const CtSeries& ct, const std::string& kind, bool megavoltage,
-                                      const std::string& attenuation, double threshold_hu, const std::string& gl) {
-  const auto known = renderer_kind_from(kind);
-  if (!known) throw UsageError(fmt::format("there is no renderer {}", kind));
-  if (gl != "hardware" && gl != "software")
-    throw UsageError(fmt::format("gl is {}, expected hardware or software", gl));
+                                      const std::string& attenuation, double threshold_hu,
+                                      const std::optional<std::string>& gl) {
+  RenderingOptions options;
+  options.renderer = kind;
+  options.attenuation = attenuation;
+  options.threshold_hu = threshold_hu;
+  options.gl = gl;
+  options.check();
   const std::vector<Beam> beams =
       megavoltage ? std::vector{Beam::kKilovoltage, Beam::kMegavoltage} : std::vector{Beam::kKilovoltage};
-  RendererOptions options;
-  options.gl = GlChoice{gl == "hardware" ? GlDevice::kHardware : GlDevice::kSoftware};
   const py::gil_scoped_release released;
-  return make_renderer(*known, ct.hu, model_of(attenuation, threshold_hu), beams, options);
+  return make_renderer(options.kind(), ct.hu, options.model(), beams, options.options());
 }
 
 // One array per view, of shape (poses, rows, columns, ...) or, of listed pixels, (poses, pixels, ...), without a copy.
@@ -126,9 +117,10 @@ void bind_drr(py::module_& module) {
       "spot to the centers of pixels, in batches of poses and views.")
       .def(py::init(&renderer_of), py::arg("ct"), py::kw_only(), py::arg("kind") = "cpu",
            py::arg("megavoltage") = false, py::arg("attenuation") = "physical", py::arg("threshold_hu") = -540.0,
-           py::arg("gl") = "hardware",
-           "kind: cpu, raycast (OpenGL), the oracles siddon and trilinear, or the founding paper's. megavoltage: "
-           "views of both beam qualities can be rendered. gl: hardware or software, for kinds that use OpenGL.")
+           py::arg("gl") = py::none(),
+           "kind: cpu, raycast (OpenGL), auto (which of both this computer has), the oracles siddon and trilinear, or "
+           "the founding paper's. megavoltage: views of both beam qualities can be rendered. gl: hardware or software, "
+           "for kinds that use OpenGL; None: hardware.")
       .def_property_readonly("device", &Renderer::device)
       .def_property_readonly("kind", [](const Renderer& self) { return std::string(to_string(self.kind())); })
       .def_property_readonly("has_derivatives", &Renderer::has_derivatives)

@@ -181,7 +181,7 @@ def test_what_cannot_be_is_an_error(folder, study, renderer, tmp_path):
             renderer.render(study.views, np.zeros(shape))
     with pytest.raises(ValueError, match="pose 0 is not a rigid motion"):
         renderer.render(study.views, 2 * np.eye(4))
-    with pytest.raises(isoshift.UsageError, match="there is no renderer gpu"):
+    with pytest.raises(isoshift.UsageError, match="renderer gpu: there is no such renderer"):
         isoshift.Renderer(study.ct, kind="gpu")
     for nonsense in ({"preset": "best"}, {"dof": "Rigid"}, {"renderer": "gpu"}):
         with pytest.raises(isoshift.UsageError):

@@ -31,17 +31,19 @@ RendererKind RenderingOptions::kind() const {
 std::optional<std::string> RenderingOptions::why_cpu() const {
   if (renderer != "auto") return std::nullopt;
   const GlChoice choice = gl_choice_from(gl, gpu);
-  if (choice.kind == GlDevice::kSoftware) return "--gl software asks for no GPU";
+  if (choice.kind == GlDevice::kSoftware) return option("gl", "software") + " asks for no GPU";
   if (auto none = why_no_gpu(choice.gpu)) return none;
   return failed_gpu();
 }
 
 AttenuationModel RenderingOptions::model() const {
+  if (attenuation_name() != "physical" && attenuation_name() != "windowed")
+    throw UsageError(fmt::format("{}: there is no such attenuation", option("attenuation", *attenuation)));
   AttenuationModel model;
   model.kind = attenuation_name() == "physical" ? AttenuationModel::Kind::kPhysical : AttenuationModel::Kind::kWindowed;
   model.threshold_hu = threshold_hu;
   if (!window.empty() && attenuation_name() != "windowed")
-    throw UsageError("--window works only with --attenuation windowed");
+    throw UsageError(fmt::format("{} works only with {}", option("window"), option("attenuation", "windowed")));
   if (!window.empty()) {
     model.window_low_hu = window[0];
     model.window_high_hu = window[1];
@@ -54,21 +56,21 @@ RendererOptions RenderingOptions::options() const {
   const RendererKind chosen = kind();
   const bool splats = is_splatting(chosen);
   // A flag that the renderer does not have is an error.
-  const auto refuse = [&](bool given, const char* flag, const char* of) {
+  const auto refuse = [&](bool given, const std::string& flag, const char* of) {
     if (!given) return;
     const std::optional<std::string> why = why_cpu();
     throw UsageError(fmt::format("{} works only with {}, and the renderer is {}{}", flag, of, to_string(chosen),
                                  why ? fmt::format(" ({})", *why) : ""));
   };
-  refuse(gl && !uses_gl(chosen), "--gl", "renderers on OpenGL");
-  refuse(gpu && !uses_gl(chosen), "--device", "renderers on OpenGL");
-  refuse(precision.value_or("f32") != "f32" && is_oracle(chosen), "--precision below f32",
+  refuse(gl && !uses_gl(chosen), option("gl"), "renderers on OpenGL");
+  refuse(gpu && !uses_gl(chosen), option("device"), "renderers on OpenGL");
+  refuse(precision.value_or("f32") != "f32" && is_oracle(chosen), option("precision") + " below f32",
          "renderers other than references");
-  refuse(block_edge && chosen != RendererKind::kRaycastCuberille, "--block-edge", "raycast-cuberille");
-  refuse(wobble && !splats, "--wobble", "splatting");
-  refuse(wobble_sigma_mm && !splats, "--wobble-sigma", "splatting");
-  refuse(wobble_seed && !splats, "--wobble-seed", "splatting");
-  refuse(deposit && !splats, "--deposit", "splatting");
+  refuse(block_edge && chosen != RendererKind::kRaycastCuberille, option("block-edge"), "raycast-cuberille");
+  refuse(wobble && !splats, option("wobble"), "splatting");
+  refuse(wobble_sigma_mm && !splats, option("wobble-sigma"), "splatting");
+  refuse(wobble_seed && !splats, option("wobble-seed"), "splatting");
+  refuse(deposit && !splats, option("deposit"), "splatting");
 
   RendererOptions result;
   result.gl = gl_choice_from(gl, gpu);
@@ -123,6 +125,8 @@ std::vector<std::pair<std::string, std::string>> RenderingOptions::settings() co
 }
 
 GlChoice gl_choice_from(const std::optional<std::string>& gl, const std::optional<std::string>& gpu) {
+  if (gl && *gl != "hardware" && *gl != "software")
+    throw UsageError(fmt::format("{}: there is no such OpenGL", option("gl", *gl)));
   return {gl.value_or("hardware") == "hardware" ? GlDevice::kHardware : GlDevice::kSoftware, gpu.value_or("")};
 }
 

@@ -32,7 +32,7 @@ double number_from(const std::string& text, std::string_view flag) {
 
 }  // namespace
 
-void check_finite(const char* flag, std::span<const double> values) {
+void check_finite(const std::string& flag, std::span<const double> values) {
   for (const double value : values)
     if (!std::isfinite(value)) throw UsageError(fmt::format("{}: {} is not a finite number", flag, value));
 }
@@ -41,9 +41,9 @@ void check_couch_angles(const std::optional<double>& couch_angle_deg, const std:
                         const std::optional<double>& couch_roll_deg) {
   constexpr double kTurnDeg = 360.0, kMostTiltedDeg = 45.0;
   if (const double angle_deg = couch_angle_deg.value_or(0.0); !(std::abs(angle_deg) <= kTurnDeg))
-    throw UsageError(fmt::format("--couch-angle: {}, expected degrees from -360 to 360", angle_deg));
-  for (const auto& [flag, angle_deg] : {std::pair("--couch-pitch", couch_pitch_deg.value_or(0.0)),
-                                        std::pair("--couch-roll", couch_roll_deg.value_or(0.0))})
+    throw UsageError(fmt::format("{}: {}, expected degrees from -360 to 360", option("couch-angle"), angle_deg));
+  for (const auto& [flag, angle_deg] : {std::pair(option("couch-pitch"), couch_pitch_deg.value_or(0.0)),
+                                        std::pair(option("couch-roll"), couch_roll_deg.value_or(0.0))})
     if (!(std::abs(angle_deg) <= kTurnDeg) ||
         std::abs(wrapped_rad(rad_from_deg(angle_deg))) > rad_from_deg(kMostTiltedDeg))
       throw UsageError(
@@ -71,16 +71,17 @@ auto known(std::string_view name, const std::string& word, From from) -> decltyp
 void StudyOptions::check_numbers() const {
   check_count("isocenter", isocenter, 3);
   check_count("rt-image-position", rt_image_position, 2);
-  check_finite("--isocenter", isocenter);
-  check_finite("--rt-image-position", rt_image_position);
+  check_finite(option("isocenter"), isocenter);
+  check_finite(option("rt-image-position"), rt_image_position);
   check_couch_angles(couch_angle_deg, couch_pitch_deg, couch_roll_deg);
-  check_finite("--sad", std::array{sad_mm.value_or(0.0)});
-  check_finite("--sid", std::array{sid_mm.value_or(0.0)});
+  check_finite(option("sad", "MM"), std::array{sad_mm.value_or(0.0)});
+  check_finite(option("sid", "MM"), std::array{sid_mm.value_or(0.0)});
 }
 
 std::optional<MachineProfile> named_machine(const std::filesystem::path& profile, const std::filesystem::path& key) {
   if (profile.empty() && !key.empty())
-    throw UsageError("--machine-key says who signed the profile: name that with --machine");
+    throw UsageError(
+        fmt::format("{} says who signed the profile: name that with {}", option("machine-key"), option("machine")));
   if (profile.empty()) return std::nullopt;
   return read_machine_profile(profile, key.empty() ? std::nullopt : std::optional(VerifyingKey(key)));
 }
@@ -88,9 +89,9 @@ std::optional<MachineProfile> named_machine(const std::filesystem::path& profile
 Allowances allowances_from(std::span<const std::string> allow) {
   Allowances allowed;
   for (const std::string& text : allow) {
-    const auto [key, reason] = key_and_value(text, "--allow");
+    const auto [key, reason] = key_and_value(text, option("allow"));
     if (std::ranges::find(kAllowKeys, key, &AllowKey::key) == std::end(kAllowKeys))
-      throw UsageError(fmt::format("--allow {}: no check has this key", key));
+      throw UsageError(fmt::format("{}: no check has this key", option("allow", key)));
     allowed[key] = reason;
   }
   return allowed;
@@ -100,12 +101,13 @@ StudyRequest StudyOptions::request() const {
   check_numbers();
   StudyRequest request;
   if (parts.study.empty() && (parts.ct.empty() || parts.images.empty()))
-    throw UsageError("which study? Name its folder, or its parts with --ct and --image");
+    throw UsageError(
+        fmt::format("which study? Name its folder, or its parts with {} and {}", option("ct"), option("image")));
   request.parts = parts;
   if (!isocenter.empty()) request.isocenter_patient_mm = Eigen::Vector3d(isocenter.data());
   for (const std::string& text : gantry_angles) {
-    const auto [label, angle] = key_and_value(text, "--gantry-angle");
-    request.switches.gantry_angle_deg[label] = number_from(angle, "--gantry-angle");
+    const auto [label, angle] = key_and_value(text, option("gantry-angle"));
+    request.switches.gantry_angle_deg[label] = number_from(angle, option("gantry-angle"));
   }
   request.max_span_s = max_span_s;
   request.switches.couch_angle_deg = couch_angle_deg;

@@ -11,7 +11,7 @@
 namespace isoshift {
 
 // Throws UsageError if one of the values of a flag is not finite.
-void check_finite(const char* flag, std::span<const double> values);
+void check_finite(const std::string& flag, std::span<const double> values);
 
 // Throws UsageError for an angle of the couch at imaging that no couch has, in degrees, IEC 61217.
 void check_couch_angles(const std::optional<double>& couch_angle_deg, const std::optional<double>& couch_pitch_deg,

@@ -9,6 +9,7 @@
 #include <optional>
 
 #include "base/error.h"
+#include "base/option_name.h"
 #include "drr/attenuation.h"
 #include "geometry/mask.h"
 #include "io/dicom/structure_mask.h"
@@ -109,8 +110,8 @@ TargetChoice choice_of(const Candidate& candidate, const Study& study, const std
 TargetChoice named(const Study& study, const std::string& name, const std::string& by) {
   if (name == kIsocenter) return {.target = surroundings(by), .doubts = {}};
   if (!study.structures)
-    throw Error(
-        fmt::format("target {} ({}): the study holds no RT Structure Set (--structures FILE names one)", name, by));
+    throw Error(fmt::format("target {} ({}): the study holds no RT Structure Set ({} names one)", name, by,
+                            option("structures", "FILE")));
   return choice_of(candidate_of(structure_named(*study.structures, name), study), study, by);
 }
 
@@ -123,8 +124,8 @@ TargetChoice chosen_among(std::vector<Candidate> candidates, const Study& study,
   if (any_holds) std::erase_if(candidates, [](const Candidate& candidate) { return !candidate.holds_isocenter; });
   TargetChoice choice = choice_of(*std::ranges::min_element(candidates, {}, &Candidate::voxels), study, why);
   if (names.size() == 1) return choice;
-  choice.doubts.push_back(fmt::format("several structures may be the target ({}); {} was taken. Name it: --target NAME",
-                                      fmt::join(names, ", "), choice.target.name));
+  choice.doubts.push_back(fmt::format("several structures may be the target ({}); {} was taken. Name it: {}",
+                                      fmt::join(names, ", "), choice.target.name, option("target", "NAME")));
   return choice;
 }
 
@@ -156,7 +157,7 @@ void doubt_lost_rois(const Study& study, TargetChoice& choice) {
   for (const int number : prescribed_rois(study)) {
     const std::string plans_target =
         fmt::format("the plan's target is ROI number {} (ReferencedROINumber (3006,0084))", number);
-    const char* const instead = "Name the target: --target NAME or isocenter";
+    const std::string instead = fmt::format("Name the target: {} or isocenter", option("target", "NAME"));
     const auto found = std::ranges::find(study.structures->structures, number, &Structure::number);
     const std::string file = study.structures->path.filename().string();
     if (found == study.structures->structures.end())
@@ -221,7 +222,7 @@ void doubt_near_end_of_ct(const Study& study, TargetChoice& choice) {
 }
 
 TargetChoice chosen(const Study& study, const TargetWish& wish) {
-  if (!wish.by_person.empty()) return named(study, wish.by_person, "--target");
+  if (!wish.by_person.empty()) return named(study, wish.by_person, option("target"));
   if (!wish.by_site.empty()) return named(study, wish.by_site, "the site file");
   TargetChoice choice = chosen_by_plan(study);
   doubt_lost_rois(study, choice);
