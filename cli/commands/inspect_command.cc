@@ -2,6 +2,7 @@
 #include <fmt/ranges.h>
 
 #include <functional>
+#include <map>
 #include <memory>
 
 #include "base/error.h"
@@ -48,7 +49,9 @@ void add_geometry_as_understood(const RtImage& image, Description& description) 
 // An angle that registration takes as 0 where no X-ray of the session has it.
 std::string taken_as_0(std::string_view flag) { return fmt::format("missing, taken as 0 without {} DEG", flag); }
 
-void add_attributes(const RtImage& image, Description& description) {
+// `planned_position`: of the patient, where the image's plan is there.
+void add_attributes(const RtImage& image, const std::optional<std::string>& planned_position,
+                    Description& description) {
   description.show("image type", "image_type", image.image_type, image.image_type);
   description.show("pixels", "pixels", {image.columns, image.rows}, fmt::format("{} x {}", image.columns, image.rows));
   description.add("values origin", "reported_values_origin", image.reported_values_origin);
@@ -64,7 +67,11 @@ void add_attributes(const RtImage& image, Description& description) {
   description.add("RT Image Position", "rt_image_position_mm", image.position_mm, "mm");
   description.add("collimator angle", "collimator_angle_deg", image.collimator_angle_deg, "deg");
   description.show("jaws and leaves", "jaws_and_leaves", described(image.jaws), described(image.jaws));
-  description.add("patient position", "patient_position", image.patient_position);
+  if (image.patient_position || !planned_position)
+    description.add("patient position", "patient_position", image.patient_position);
+  else
+    description.show("patient position", "planned_patient_position", *planned_position,
+                     *planned_position + ", which its plan says");
   description.add("intensity", "intensity_relationship", image.intensity_relationship);
   description.show("intensity sign", "intensity_sign", image.intensity_sign ? Json(*image.intensity_sign) : Json(),
                    image.intensity_sign ? fmt::format("{:+}", *image.intensity_sign) : "missing");
@@ -79,9 +86,9 @@ Description describe_rt_image(RtImage image, const std::optional<std::string>& p
                               const std::optional<MachineProfile>& machine) {
   Notes applied;
   if (machine) image = with_machine(image, *machine, {}, applied);
-  if (!image.patient_position) image.patient_position = planned_position;
   Description description(image.is_rt_image() ? "RT Image" : "X-ray", image.label, image.path.string());
-  add_attributes(image, description);
+  add_attributes(image, planned_position, description);
+  if (!image.patient_position) image.patient_position = planned_position;
   remark_all(applied.overrides, Remark::kProfile, description);
   if (image.imager && !image.imager->is_corrected)
     description.remark(Remark::kProfile,
@@ -246,14 +253,15 @@ class Inspection {
   // And how the X-rays are grouped, so that a person can choose.
   void tell_others(const StudyFiles& files, bool takes_other_xrays) {
     const std::vector<SessionFiles> sessions = sessions_of(files, takes_other_xrays);
-    const std::vector<std::string> lines = described(sessions);
     if (as_json_) {
-      const Json json = {
-          {"files", files_}, {"sessions", lines}, {"left_aside", files.left_aside}, {"unreadable", files.unreadable}};
+      const Json json = {{"files", files_},
+                         {"sessions", json_of(sessions)},
+                         {"left_aside", files.left_aside},
+                         {"unreadable", files.unreadable}};
       console_.out << json.dump(2, ' ', false, Json::error_handler_t::replace) << "\n";
       return;
     }
-    if (lines.size() > 1) console_.out << fmt::format("{}\n\n", fmt::join(lines, "\n"));
+    if (sessions.size() > 1) console_.out << fmt::format("{}\n\n", fmt::join(described(sessions), "\n"));
     for (const std::string& file : files.left_aside) console_.out << "left aside: " << file << "\n";
     for (const std::string& reason : files.unreadable) console_.out << "unreadable: " << reason << "\n";
   }
@@ -261,6 +269,20 @@ class Inspection {
   std::size_t unreadable() const { return unreadable_; }
 
  private:
+  static Json json_of(const std::vector<SessionFiles>& sessions) {
+    Json all = Json::array();
+    for (const SessionFiles& session : sessions) {
+      Json images = Json::array();
+      for (const StudyFiles::Image& image : session.images) images.push_back(image.file.string());
+      const std::string& acquired = session.images.front().acquired;
+      all.push_back({{"name", session.name},
+                     {"acquired", acquired.empty() ? Json() : Json(acquired)},
+                     {"fraction", json_value(fraction_of(session))},
+                     {"images", images}});
+    }
+    return all;
+  }
+
   bool as_json_;
   Console& console_;
   Json files_ = Json::array();
@@ -282,17 +304,21 @@ void run_inspect(const std::vector<std::filesystem::path>& paths, const std::opt
                  bool as_json, Console& console) {
   const StudyFiles files = scan_study(paths);
   Inspection inspection(as_json, console);
-  std::optional<std::string> planned_position;
+  std::map<std::string, std::optional<std::string>> planned_positions;  // by the plan's SOPInstanceUID
   for (const StudyFiles::Plan& found : files.plans)
     inspection.tell("RT Plan", found.file, [&]() -> std::vector<Description> {
       const RtPlan plan = read_rt_plan(found.file);
-      planned_position = common_patient_position(plan, plan.beams);
+      planned_positions[found.sop_instance_uid] = common_patient_position(plan, plan.beams);
       return {describe_plan(plan)};
     });
   for (const StudyFiles::Ct& ct : files.cts) inspection.tell(describe_ct(ct, console));
   for (const auto& images : {files.images, files.other_xrays})
     for (const StudyFiles::Image& image : images)
-      inspection.tell("X-ray", image.file, [&] { return describe_rt_images(image.file, planned_position, machine); });
+      inspection.tell("X-ray", image.file, [&] {
+        const auto planned = planned_positions.find(image.plan_uid);
+        return describe_rt_images(image.file, planned == planned_positions.end() ? std::nullopt : planned->second,
+                                  machine);
+      });
   for (const StudyFiles::Structures& structures : files.structures)
     inspection.tell("RT Structure Set", structures.file,
                     [&]() -> std::vector<Description> { return {describe_structures(structures.file)}; });
@@ -349,10 +375,8 @@ void add_inspect_command(CLI::App& app, Console& console, int&) {
   CLI::App* command = app.add_subcommand(
       "inspect", "Show what files contain, how their geometry is understood, and every missing attribute");
   command->footer(
-      "\nExample:\n  isoshift inspect exported/\n  isoshift inspect RTIMAGE/KV_AP.dcm --json\n  isoshift inspect "
-      "exported/ "
-      "--bodies "
-      "bodies\n  isoshift inspect --devices");
+      "\nExample:\n  isoshift inspect exported/\n  isoshift inspect RTIMAGE/KV_AP.dcm --json\n"
+      "  isoshift inspect exported/ --bodies bodies\n  isoshift inspect --devices");
   auto* paths = command->add_option("path", options->paths, "Files or folders")->type_name("PATH");
   command->add_option("--machine", options->machine, "Machine profile to apply to the X-rays before they are shown")
       ->type_name("FILE");

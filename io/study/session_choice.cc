@@ -18,14 +18,6 @@ std::string date_of(const SessionFiles& session) {
   return session.images.back().acquired.substr(0, kDate);
 }
 
-// Of all its X-rays; nothing where they differ or do not say.
-std::optional<int> fraction_of(const SessionFiles& session) {
-  const auto fraction = session.images.front().fraction;
-  const bool is_common =
-      std::ranges::all_of(session.images, [&](const auto& image) { return image.fraction == fraction; });
-  return is_common ? fraction : std::nullopt;
-}
-
 std::string as_asked(const SessionChoice& choice) {
   std::vector<std::string> words;
   if (!choice.name.empty()) words.push_back("named " + choice.name);
@@ -35,6 +27,13 @@ std::string as_asked(const SessionChoice& choice) {
 }
 
 }  // namespace
+
+std::optional<int> fraction_of(const SessionFiles& session) {
+  const auto fraction = session.images.front().fraction;
+  const bool is_common =
+      std::ranges::all_of(session.images, [&](const auto& image) { return image.fraction == fraction; });
+  return is_common ? fraction : std::nullopt;
+}
 
 std::vector<std::string> described(std::span<const SessionFiles> sessions) {
   std::vector<std::string> lines;

@@ -1,6 +1,7 @@
 #pragma once
 // Which of several sessions of X-rays in one folder a person means.
 
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -12,6 +13,9 @@ namespace isoshift {
 
 // A line for each session: its name, when it was taken, its fraction where the X-rays say it, and their labels.
 std::vector<std::string> described(std::span<const SessionFiles> sessions);
+
+// FractionNumber of its X-rays; nothing where one lacks it, or they differ.
+std::optional<int> fraction_of(const SessionFiles& session);
 
 // The session that is meant. Throws Error that lists the sessions if none or several fit, and if a fraction is asked
 // for and X-rays that would fit otherwise do not tell theirs.

@@ -89,9 +89,13 @@ TEST_F(SessionChoiceCommandTest, ASessionIsChosenByTheNameThatInspectGives) {
   ASSERT_EQ(inspected.exit_status, 0) << inspected.err;
   const auto sessions = nlohmann::json::parse(inspected.out)["sessions"];
   ASSERT_EQ(sessions.size(), 2U);
-  const std::string line = sessions[0];
-  EXPECT_THAT(line, HasSubstr(": 2026-03-01 10:15:00, fraction 1, KV_G000, KV_G090"));
-  const std::string name = line.substr(8, line.find(':') - 8);
+  EXPECT_EQ(sessions[0]["acquired"], "2026-03-01 10:15:00");
+  EXPECT_EQ(sessions[0]["fraction"], 1);
+  EXPECT_EQ(sessions[0]["images"],
+            nlohmann::json({(study_ / "RTIMAGE/KV_G000.dcm").string(), (study_ / "RTIMAGE/KV_G090.dcm").string()}));
+  const std::string name = sessions[0]["name"];
+  EXPECT_THAT(run_command({"inspect", study_.string()}).out,
+              HasSubstr("session " + name + ": 2026-03-01 10:15:00, fraction 1, KV_G000, KV_G090"));
   ASSERT_EQ(register_with({"--session", name.substr(0, 6)}).exit_status, 0);
   EXPECT_THAT(found(), PoseNear(first_, 0.5, 3.0));
   EXPECT_THAT(register_with({"--session", "nobody"}).err, HasSubstr("there is no session named nobody"));
