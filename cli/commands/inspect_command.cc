@@ -55,17 +55,24 @@ void add_attributes(const RtImage& image, const std::optional<std::string>& plan
   description.show("image type", "image_type", image.image_type, image.image_type);
   description.show("pixels", "pixels", {image.columns, image.rows}, fmt::format("{} x {}", image.columns, image.rows));
   description.add("values origin", "reported_values_origin", image.reported_values_origin);
-  description.add("SAD", "sad_mm", image.sad_mm, "mm");
+  // A projection matrix replaces what the file says of source and receptor, which may be that of the linac.
+  const bool by_matrix = image.pixel_from_room.has_value();
+  if (by_matrix)
+    description.show("source and receptor", "geometry", "projection matrix", "by the profile's projection matrix");
+  else
+    description.add("SAD", "sad_mm", image.sad_mm, "mm");
   description.add("SID", "sid_mm", image.sid_mm, "mm");
-  description.add("gantry angle", "gantry_angle_deg", image.gantry_angle_deg, "deg");
+  if (!by_matrix) description.add("gantry angle", "gantry_angle_deg", image.gantry_angle_deg, "deg");
   description.add("couch angle", "couch_angle_deg", image.table.support_angle_deg, "deg");
   description.add("couch pitch", "couch_pitch_deg", image.table.pitch_deg, "deg", taken_as_0("--couch-pitch"));
   description.add("couch roll", "couch_roll_deg", image.table.roll_deg, "deg", taken_as_0("--couch-roll"));
-  description.add("receptor translation", "receptor_translation_mm", image.receptor_translation_mm, "mm");
-  description.add("receptor angle", "receptor_angle_deg", image.receptor_angle_deg, "deg");
-  description.add("pixel spacing", "pixel_spacing_mm", image.pixel_spacing_mm, "mm, rows then columns");
-  description.add("RT Image Position", "rt_image_position_mm", image.position_mm, "mm");
-  description.add("collimator angle", "collimator_angle_deg", image.collimator_angle_deg, "deg");
+  if (!by_matrix) {
+    description.add("receptor translation", "receptor_translation_mm", image.receptor_translation_mm, "mm");
+    description.add("receptor angle", "receptor_angle_deg", image.receptor_angle_deg, "deg");
+    description.add("pixel spacing", "pixel_spacing_mm", image.pixel_spacing_mm, "mm, rows then columns");
+    description.add("RT Image Position", "rt_image_position_mm", image.position_mm, "mm");
+    description.add("collimator angle", "collimator_angle_deg", image.collimator_angle_deg, "deg");
+  }
   description.show("jaws and leaves", "jaws_and_leaves", described(image.jaws), described(image.jaws));
   if (image.patient_position || !planned_position)
     description.add("patient position", "patient_position", image.patient_position);

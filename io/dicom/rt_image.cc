@@ -178,6 +178,7 @@ RtImage read_frame(const std::filesystem::path& path, const DicomItem& d, const 
 // Both angles turn counter-clockwise seen from the source, which is how the image is displayed (PS3.3 C.8.8.2.7). An
 // image that is itself turned or mirrored on the receptor shows them turned back.
 double collimator_angle_on_image_rad(const RtImage& image) {
+  if (image.pixel_from_room) return 0.0;  // the angle is of the linac, not of an imager that a matrix places
   const std::vector<double> orientation = image.orientation.value_or(std::vector{1.0, 0.0, 0.0, 0.0, -1.0, 0.0});
   const Eigen::Vector3d row_direction(orientation.data()), column_direction(orientation.data() + 3);
   const double on_receptor_rad =
@@ -190,15 +191,18 @@ double collimator_angle_on_image_rad(const RtImage& image) {
 }  // namespace
 
 const std::map<std::string, DcmTagKey, std::less<>> kEquipmentAttributes = {
+    {"DetectorDescription", DCM_DetectorDescription},
     {"DetectorID", DCM_DetectorID},
     {"DeviceSerialNumber", DCM_DeviceSerialNumber},
     {"Manufacturer", DCM_Manufacturer},
     {"ManufacturerModelName", DCM_ManufacturerModelName},
     {"Modality", DCM_Modality},
+    {"ProtocolName", DCM_ProtocolName},
     {"RTImageLabel", DCM_RTImageLabel},
     {"RadiationMachineName", DCM_RadiationMachineName},
     {"SeriesDescription", DCM_SeriesDescription},
     {"StationName", DCM_StationName},
+    {"ViewPosition", DCM_ViewPosition},
 };
 
 bool RtImage::is_rt_image() const { return sop_class_uid == UID_RTImageStorage; }

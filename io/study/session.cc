@@ -40,9 +40,12 @@ std::optional<Finding> table_finding(const TableReadOut& read_out, const RtImage
 constexpr const char* kNoReadOuts =
     "without measured table positions in all views it is not known whether the table moved";
 
-// Whether both show the same view: from one gantry angle, or, where one of them has none, under one label.
+// Whether both show the same view: by one projection matrix, from one gantry angle, or, where one of them has none,
+// under one label. The files of room-mounted imagers may hold the gantry angle of the linac, which is no imager's, and
+// labels of their own for every exposure.
 bool is_retake(const RtImage& image, const RtImage& earlier) {
   constexpr double kSameAngleRad = rad_from_deg(1.0);
+  if (image.pixel_from_room || earlier.pixel_from_room) return image.pixel_from_room == earlier.pixel_from_room;
   if (!image.gantry_angle_deg || !earlier.gantry_angle_deg) return image.label == earlier.label;
   return std::abs(wrapped_rad(rad_from_deg(*image.gantry_angle_deg - *earlier.gantry_angle_deg))) < kSameAngleRad;
 }

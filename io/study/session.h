@@ -32,7 +32,7 @@ std::vector<Finding> session_findings(std::span<const RtImage> images, Notes& no
 
 // Reasons to doubt that the views show one setup, so that a person must review the result:
 // - if not all views have measured read-outs of the table's position: views more than `max_span_s` apart, and a view
-//   that was taken twice;
+//   that was taken twice (by its projection matrix where a machine profile gives it one);
 // - in any case: views with unknown times, views of two machines or two fractions, and a table angle that is not 0 in
 //   one view and missing in another.
 std::vector<Finding> session_doubts(std::span<const RtImage> images, double max_span_s);

@@ -215,10 +215,15 @@ void check_isocenter(const Study& study) {
   for (std::size_t n = 0; n < study.xrays.size(); ++n) {
     const XrayView& view = study.xrays[n].view;
     const auto pixel = view.project(Eigen::Vector3d::Zero());
-    if (!pixel || !is_inside(*pixel, Eigen::Vector2d(view.columns, view.rows)))
-      throw Error(fmt::format("{}: the isocenter is projected outside the image ({}, {})",
-                              study.rt_images[n].path.string(), described(DCM_RTImagePosition),
-                              described(DCM_XRayImageReceptorTranslation)));
+    if (pixel && is_inside(*pixel, Eigen::Vector2d(view.columns, view.rows))) continue;
+    if (study.rt_images[n].pixel_from_room && pixel)
+      throw Error(
+          fmt::format("{}: the projection matrix puts the isocenter at column {:.1f}, row {:.1f}, outside the image of "
+                      "{} x {} pixels",
+                      study.rt_images[n].path.string(), pixel->x(), pixel->y(), view.columns, view.rows));
+    throw Error(fmt::format("{}: the isocenter is projected outside the image ({}, {})",
+                            study.rt_images[n].path.string(), described(DCM_RTImagePosition),
+                            described(DCM_XRayImageReceptorTranslation)));
   }
 }
 
@@ -238,15 +243,18 @@ std::vector<RtImage> read_images(const std::vector<std::filesystem::path>& paths
   if (request.one_per_imager) keep_earliest_of_each_imager(images);
   check_labels(request.switches, images);
   sort_by_time(images);
-  // By what was measured: a switch hides no move of the table.
+  std::vector<RtImage> supplied;
+  supplied.reserve(images.size());
+  for (RtImage& image : images) {
+    RtImage by_profile = request.machine ? with_machine(image, *request.machine, request.switches, notes) : image;
+    image.pixel_from_room = by_profile.pixel_from_room;  // only the profile tells which views are the same
+    supplied.push_back(with_switches(std::move(by_profile), request.switches, notes));
+  }
+  // By what was measured: neither a switch nor a profile hides a move of the table.
   said.findings = session_findings(images, notes);
   said.doubts = session_doubts(images, request.max_span_s);
   std::ranges::move(switch_doubts(images, request.switches), std::back_inserter(said.doubts));
-  for (RtImage& image : images) {
-    if (request.machine) image = with_machine(image, *request.machine, request.switches, notes);
-    image = with_switches(image, request.switches, notes);
-  }
-  return images;
+  return supplied;
 }
 
 // What each X-ray must have by itself. What is missing is told together with what is forbidden.

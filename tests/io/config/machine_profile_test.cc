@@ -321,6 +321,33 @@ TEST_F(OtherXrayTest, AreRegisteredAsRtImagesAre) {
   EXPECT_EQ(checked.exit_status, 0) << checked.out;
 }
 
+// What tells two imagers apart may stand in any of these attributes.
+TEST_F(OtherXrayTest, AreToldApartByWhatTheirFilesSayOfDetectorProtocolOrView) {
+  for (const auto& [keyword, tag] : {std::pair("DetectorDescription", DCM_DetectorDescription),
+                                     {"ProtocolName", DCM_ProtocolName},
+                                     {"ViewPosition", DCM_ViewPosition}}) {
+    const DcmTagKey& told_by = tag;
+    edit(study_.image(1), [&](DicomItem d) { d.put(told_by, "OBLIQUE 2"); });
+    const MachineProfile rules =
+        profile({{{"where", {{keyword, "OBLIQUE 2"}}}, {"couch_pitch_deg", 2}}, {{"couch_pitch_deg", 1}}});
+    EXPECT_EQ(with_machine(image(0), rules, {}, notes_).table.pitch_deg, 1.0) << keyword;
+    EXPECT_EQ(with_machine(image(1), rules, {}, notes_).table.pitch_deg, 2.0) << keyword;
+  }
+}
+
+TEST_F(OtherXrayTest, AnIsocenterOutsideTheImageIsToldInPixels) {
+  std::ifstream file(path_);
+  nlohmann::json images = nlohmann::json::parse(file)["images"];
+  nlohmann::json& matrix = images[0]["pixel_from_room"];
+  for (int column = 0; column < 4; ++column)
+    matrix[0][column] = matrix[0][column].get<double>() + 200.0 * matrix[2][column].get<double>();
+  write(images);
+  const CommandOutcome outcome = register_study(study_, {"--machine", path_.string()});
+  EXPECT_EQ(outcome.exit_status, 1);
+  EXPECT_THAT(outcome.err, HasSubstr("the projection matrix puts the isocenter at column 247.5, row 47.5, outside the "
+                                     "image of 96 x 96 pixels"));
+}
+
 TEST_F(OtherXrayTest, WithoutAProfileTheErrorNamesTheSwitch) {
   const CommandOutcome outcome = register_study(study_);
   EXPECT_EQ(outcome.exit_status, 1);
