@@ -18,6 +18,7 @@ import markdown
 import motion
 import renderers
 import scout
+import stereoscopic
 
 # Of each page all tables in their order: the heading above a table, and the function that makes its lines. A table of
 # words is declared by its header.
@@ -27,7 +28,8 @@ PAGES = {"docs/commands/commission.md": commission.TABLES,
          "docs/evaluation.md": evaluation.TABLES,
          "docs/founding-paper.md": founding_paper.TABLES,
          "docs/motion.md": motion.TABLES,
-         "docs/renderers.md": renderers.TABLES}
+         "docs/renderers.md": renderers.TABLES,
+         "docs/stereoscopic.md": stereoscopic.TABLES}
 
 
 def wrong_headings(found, tables):
