@@ -140,8 +140,8 @@ void judge_contradiction(RegistrationResult& result) {
   else if (result.turn.is_clear() && !(result.turn.share_of_bodies_gain.value_or(1.0) <= kMostByTurn))
     review(result,
            fmt::format("the views contradict each other: each of them alone would want the patient turned, by "
-                       "{:.1f} degrees against the other. A gantry angle in a file may be wrong, or the patient "
-                       "may have turned between the images",
+                       "{:.1f} degrees against the other. A gantry angle in a file, or a projection matrix of a "
+                       "machine profile, may be wrong, or the patient may have turned between the images",
                        deg_from_rad(result.turn.angle_rad)));
 }
 
