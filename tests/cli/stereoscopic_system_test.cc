@@ -10,6 +10,8 @@
 #include <cmath>
 #include <cstdint>
 #include <filesystem>
+#include <fstream>
+#include <functional>
 #include <nlohmann/json.hpp>
 #include <regex>
 #include <sstream>
@@ -210,10 +212,16 @@ class StereoscopicSystemCommandTest : public testing::Test {
     return stored.pixels;
   }
 
-  static CommandOutcome registered(const std::vector<std::string>& more = {}) {
-    std::vector<std::string> arguments = {"--machine", profile(), "--overwrite"};
-    arguments.insert(arguments.end(), more.begin(), more.end());
-    return register_study(*study_, arguments);
+  static CommandOutcome registered(const std::string& machine = profile()) {
+    return register_study(*study_, {"--machine", machine, "--overwrite"});
+  }
+  // With the page's profile, its rules changed.
+  static CommandOutcome registered_with(const std::function<void(nlohmann::json&)>& change) {
+    nlohmann::json changed = nlohmann::json::parse(text_of_file(profile()));
+    change(changed["images"]);
+    const std::filesystem::path path = study_->path().parent_path() / "changed.json";
+    std::ofstream(path, std::ios::trunc) << changed.dump();
+    return registered(path.string());
   }
   static nlohmann::json result() { return nlohmann::json::parse(text_of_file(study_->output() / "result.json")); }
 
@@ -226,7 +234,7 @@ TEST_F(StereoscopicSystemCommandTest, IsRegisteredByTheProfileOfThePage) {
   const CommandOutcome outcome = registered();
   EXPECT_EQ(outcome.exit_status, kExitAccepted) << outcome.out << outcome.err;
   EXPECT_THAT(read_setup_error(study_->output() / "result.json"),
-              PoseNear(read_setup_error(study_->truth()), 0.5, 0.5));
+              PoseNear(read_setup_error(study_->truth()), 0.3, 0.3));
   const nlohmann::json views = result()["views"];
   for (const nlohmann::json& view : views) EXPECT_TRUE(view["gantry_deg"].is_null());
   EXPECT_THAT(outcome.out, Not(HasSubstr("gantry 0.0 deg")));
@@ -244,6 +252,32 @@ TEST_F(StereoscopicSystemCommandTest, AViewTakenTwiceNeedsAReview) {
   std::filesystem::remove(again);
   EXPECT_EQ(outcome.exit_status, kExitReview) << outcome.out << outcome.err;
   EXPECT_THAT(result()["reasons"].dump(), HasSubstr("KV_G090 and AGAIN show the same view"));
+}
+
+// What the page says that wrong matrices look like.
+TEST_F(StereoscopicSystemCommandTest, ExchangedImagersAreRejected) {
+  const CommandOutcome outcome =
+      registered_with([](nlohmann::json& rules) { rules[0]["pixel_from_room"].swap(rules[1]["pixel_from_room"]); });
+  EXPECT_EQ(outcome.exit_status, kExitRejected) << outcome.out << outcome.err;
+}
+
+TEST_F(StereoscopicSystemCommandTest, MirroredColumnsOfOneImagerAreNamed) {
+  const CommandOutcome outcome = registered_with([](nlohmann::json& rules) {
+    nlohmann::json& matrix = rules[1]["pixel_from_room"];
+    for (std::size_t n = 0; n < 4; ++n)
+      matrix[0][n] = (kPixels - 1) * matrix[2][n].get<double>() - matrix[0][n].get<double>();
+  });
+  EXPECT_EQ(outcome.exit_status, kExitReview) << outcome.out << outcome.err;
+  EXPECT_THAT(result()["reasons"].dump(), HasSubstr("with KV_G090 mirrored the images match better"));
+}
+
+TEST_F(StereoscopicSystemCommandTest, AMatrixThatCountsTheRoomInCentimetersIsAnError) {
+  const CommandOutcome outcome = registered_with([](nlohmann::json& rules) {
+    for (nlohmann::json& row : rules[0]["pixel_from_room"])
+      for (std::size_t n = 0; n < 3; ++n) row[n] = 0.1 * row[n].get<double>();
+  });
+  EXPECT_EQ(outcome.exit_status, kExitFailed);
+  EXPECT_THAT(outcome.err, HasSubstr("put the isocenter not between source and receptor"));
 }
 
 TEST_F(StereoscopicSystemCommandTest, InspectShowsSourceReceptorAndIsocenter) {
