@@ -15,7 +15,7 @@ namespace isoshift {
 namespace {
 
 // What is known of an attribute; the VR decides about all others (action_for).
-enum class Action { kKeep, kRemove, kEmpty, kReplaceText, kReplaceUids, kMoveDates, kLookInside };
+enum class Action { kKeep, kRemove, kEmpty, kReplaceText, kReplaceId, kReplaceUids, kMoveDates, kLookInside };
 
 struct Replaced {
   DcmTagKey tag;
@@ -23,9 +23,10 @@ struct Replaced {
 };
 const Replaced kReplacedTexts[] = {
     {DCM_PatientName, "Patient"},
-    {DCM_PatientID, "ANON"},
-    {DCM_IssuerOfPatientID, "Issuer"},
     {DCM_StationName, "Station"},
+    {DCM_DeviceSerialNumber, "Device"},
+    {DCM_DetectorID, "Detector"},
+    {DCM_ProtocolName, "Protocol"},
     {DCM_RadiationMachineName, "Machine"},
     {DCM_TreatmentMachineName, "Machine"},
     {DCM_RTImageLabel, "Image"},
@@ -52,7 +53,8 @@ const DcmTagKey kKeptTexts[] = {DCM_SpecificCharacterSet,
                                 DCM_CodingSchemeDesignator,
                                 DCM_CodingSchemeVersion,
                                 DCM_CodeMeaning,
-                                DCM_TimezoneOffsetFromUTC};
+                                DCM_TimezoneOffsetFromUTC,
+                                DCM_RescaleType};
 
 // Of the groups that are kept: what Table E.1-1 removes and no VR tells.
 const DcmTagKey kRemoved[] = {DCM_InstitutionCodeSequence,
@@ -105,6 +107,7 @@ const char* kind_of(const DcmTagKey& tag) {
 
 Action action_for(const DcmTagKey& tag, DcmEVR vr) {
   if (kind_of(tag) != nullptr) return Action::kReplaceText;
+  if (tag == DCM_PatientID) return Action::kReplaceId;
   if (is_among(kEmptied, tag)) return Action::kEmpty;
   const bool is_kept_group = std::ranges::count(kKeptGroups, tag.getGroup()) > 0;
   const bool is_known = DcmTag(tag).error().good();
@@ -156,6 +159,7 @@ void replace(DicomItem& item, const DcmTagKey& tag, const auto& by) {
 }
 
 void replace_in(DicomItem& item, Pseudonyms& pseudonyms) {
+  const std::string issuer = item.text(DCM_IssuerOfPatientID).value_or("");
   for (const auto& [tag, vr] : item.elements()) {
     switch (action_for(tag, vr)) {
       case Action::kKeep:
@@ -165,6 +169,9 @@ void replace_in(DicomItem& item, Pseudonyms& pseudonyms) {
       case Action::kEmpty: item.put(tag, ""); break;
       case Action::kReplaceText:
         replace(item, tag, [&](const std::string& value) { return pseudonyms.text(kind_of(tag), value); });
+        break;
+      case Action::kReplaceId:
+        replace(item, tag, [&](const std::string& value) { return pseudonyms.patient_id(value, issuer); });
         break;
       case Action::kReplaceUids:
         replace(item, tag, [&](const std::string& value) {

@@ -54,6 +54,13 @@ std::string Pseudonyms::text(std::string_view kind, const std::string& original)
   return known;
 }
 
+std::string Pseudonyms::patient_id(const std::string& original, const std::string& issuer) {
+  std::string known = text("ANON", original + "\\" + issuer);
+  stands_for(original, known);
+  stands_for(issuer, known);
+  return known;
+}
+
 std::string Pseudonyms::date(const std::string& original) const {
   using std::chrono::day, std::chrono::month, std::chrono::year;
   constexpr std::size_t kDigits = 8;

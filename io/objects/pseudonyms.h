@@ -19,6 +19,9 @@ class Pseudonyms {
   // case of letters differs.
   std::string text(std::string_view kind, const std::string& original);
 
+  // The same of a PatientID and its issuer, which may be empty: one ID of two issuers is of two patients.
+  std::string patient_id(const std::string& original, const std::string& issuer);
+
   // The date with which a DA or DT value or an ISO 8601 time begins is moved ("20260301", "2026.03.01", "2026-03-01"),
   // and the time behind it stays. Empty for what does not begin with a date.
   std::string date(const std::string& original) const;

@@ -1,16 +1,17 @@
-"""The DRRs of a study, and one of a gantry angle that no X-ray has: drr.py STUDY_FOLDER OUTPUT_FOLDER"""
+"""The DRRs of a study, and one of a gantry angle that no X-ray has: drr.py STUDY_FOLDER PICTURE.png"""
 
 import pathlib
 import sys
 
+import numpy as np
+
 import isoshift
 
 study = isoshift.load_study(sys.argv[1])
-output = pathlib.Path(sys.argv[2])
-output.mkdir(parents=True, exist_ok=True)
-
 renderer = isoshift.Renderer(study.ct)
-views = study.views + [isoshift.carm_view(45.0)]
-for number, images in enumerate(renderer.render(views, study.planned_room_from_patient), start=1):
-    (output / f"drr{number}.png").write_bytes(isoshift.png(images[0]))
-    print(f"drr{number}.png: {images.shape[2]} x {images.shape[1]} pixels, line integrals up to {images.max():.2f}")
+of_study = study.views[0]
+oblique = isoshift.carm_view(45.0, columns=of_study.columns, rows=of_study.rows, pixel_mm=2.0)
+drrs = [images[0] for images in renderer.render([*study.views, oblique], study.planned_room_from_patient)]
+for number, drr in enumerate(drrs, start=1):
+    print(f"DRR {number}: {drr.shape[1]} x {drr.shape[0]} pixels, line integrals up to {drr.max():.2f}")
+pathlib.Path(sys.argv[2]).write_bytes(isoshift.png(np.hstack(drrs)))

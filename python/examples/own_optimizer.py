@@ -1,4 +1,4 @@
-"""An optimizer of one's own on the batched objective: own_optimizer.py STUDY_FOLDER [OUTPUT_FOLDER]
+"""An optimizer of one's own on the batched objective: own_optimizer.py STUDY_FOLDER [PICTURE.png]
 
 An evolution strategy: every generation renders a batch of poses at once, keeps the better quarter, and draws the next
 generation around their mean.
@@ -43,8 +43,8 @@ for factor in (4, 2):
 
 result = isoshift.register(study)
 print(f"isoshift's own: translation ({', '.join(f'{value:+.2f}' for value in result.setup_error[:3, 3])}) mm")
-if len(sys.argv) > 2:
-    output = pathlib.Path(sys.argv[2])
-    output.mkdir(parents=True, exist_ok=True)
-    for number, drr in enumerate(renderer.render(study.views, motion(mean) @ planned), start=1):
-        (output / f"found{number}.png").write_bytes(isoshift.png(drr[0]))
+if len(sys.argv) > 2:  # of every view: X-ray, DRR where the strategy began, DRR where it ended
+    drrs = renderer.render(study.views, np.array([planned, motion(mean) @ planned]))
+    rows = [np.hstack([shown / np.quantile(shown, 0.99) for shown in (image.line_integral, *of_view)])
+            for image, of_view in zip(images, drrs)]
+    pathlib.Path(sys.argv[2]).write_bytes(isoshift.png(np.vstack(rows)))

@@ -181,7 +181,7 @@ def test_what_cannot_be_is_an_error(folder, study, renderer, tmp_path):
             renderer.render(study.views, np.zeros(shape))
     with pytest.raises(ValueError, match="pose 0 is not a rigid motion"):
         renderer.render(study.views, 2 * np.eye(4))
-    with pytest.raises(isoshift.UsageError, match="renderer gpu: there is no such renderer"):
+    with pytest.raises(isoshift.UsageError, match="renderer=gpu: there is no such renderer"):
         isoshift.Renderer(study.ct, kind="gpu")
     for nonsense in ({"preset": "best"}, {"dof": "Rigid"}, {"renderer": "gpu"}):
         with pytest.raises(isoshift.UsageError):
@@ -230,9 +230,8 @@ def test_stubs_and_docstrings_are_there_for_all_names():
 
 @pytest.mark.parametrize("example", ["drr.py", "register.py", "own_optimizer.py"])
 def test_examples_run(example, folder, tmp_path):
-    words = [] if example == "register.py" else [tmp_path / "pictures"]
-    outcome = subprocess.run([sys.executable, SOURCE / "python" / "examples" / example, folder, *words], capture_output=True,
-                             text=True)
+    picture = tmp_path / "picture.png"
+    outcome = subprocess.run([sys.executable, SOURCE / "python" / "examples" / example, folder, picture],
+                             capture_output=True, text=True)
     assert outcome.returncode == 0, outcome.stderr
-    if words:
-        assert len(list((tmp_path / "pictures").glob("*.png"))) >= 2
+    assert picture.read_bytes().startswith(b"\x89PNG")

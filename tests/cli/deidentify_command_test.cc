@@ -31,7 +31,7 @@ class DeidentifyCommandTest : public testing::Test {
     for (const std::filesystem::path& file : files_below({study_.path()})) {
       if (file.extension() != ".dcm") continue;
       edit(file, [&](DicomItem dataset) {
-        dataset.put(DCM_PatientName, "Featherstone^Ada");
+        dataset.put(DCM_PatientName, "Featherstone^Adalgunde");
         dataset.put(DCM_PatientID, "4711-0815");
         dataset.put(DCM_InstitutionName, "St. Elsewhere");
         dataset.put(DCM_StationName, "QUINCY7");
@@ -51,7 +51,7 @@ class DeidentifyCommandTest : public testing::Test {
     for (const std::filesystem::path& file : files_below({folder})) {
       ++files;
       const std::string bytes = file.string().substr(folder.string().size()) + bytes_of(file);
-      for (const char* told : {"Featherst", "Ada", "4711-0815", "St. Elsewhere", "QUINCY7"})
+      for (const char* told : {"Featherst", "Adalgunde", "4711-0815", "St. Elsewhere", "QUINCY7"})
         EXPECT_EQ(bytes.find(told), std::string::npos) << file << " tells " << told;
       for (const std::string& uid : uids_) EXPECT_EQ(bytes.find(uid), std::string::npos) << file << " tells " << uid;
     }
@@ -78,13 +78,13 @@ TEST_F(DeidentifyCommandTest, TheStudyRegistersAsBefore) {
 
 TEST_F(DeidentifyCommandTest, WhatIsWrittenIsStillWholeDicom) {
   ASSERT_EQ(run_command({"deidentify", study_.path().string(), "-o", path("safe")}).exit_status, 0);
-  for (const std::filesystem::path& file : files_below({path("safe")})) {
-    const auto errors = [](const std::filesystem::path& dicom) {
-      return run_shell(fmt::format("dciodvfy -new {} 2>&1 | grep -c ^Error", dicom.string())).out;
-    };
-    if (file.extension() != ".dcm") continue;
-    EXPECT_EQ(errors(file), "0\n") << run_shell("dciodvfy -new " + file.string()).out;
-  }
+  // The phantom's plan and X-rays are short of some things, before and after.
+  const auto errors_in = [](const std::filesystem::path& folder) {
+    return run_shell(fmt::format("find {} -name '*.dcm' | xargs -n 1 dciodvfy -new 2>&1 | grep ^Error | sort",
+                                 folder.string()))
+        .out;
+  };
+  EXPECT_EQ(errors_in(path("safe")), errors_in(study_.path()));
 }
 
 TEST_F(DeidentifyCommandTest, BurntInTextIsWarnedOf) {

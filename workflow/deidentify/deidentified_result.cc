@@ -25,14 +25,12 @@ void replace_uid(std::string& uid, Pseudonyms& pseudonyms) {
 
 Identity deidentified(const Identity& identity, Pseudonyms& pseudonyms) {
   Identity replaced{.character_set = identity.character_set,
-                    .patient_id = identity.patient_id,
-                    .patient_id_issuer = identity.patient_id_issuer,
                     .patient_name = identity.patient_name,
                     .study_instance_uid = identity.study_instance_uid,
                     .study_date = pseudonyms.date(identity.study_date),
                     .study_time = identity.study_time};
-  replace_name(replaced.patient_id, "ANON", pseudonyms);
-  replace_name(replaced.patient_id_issuer, "Issuer", pseudonyms);
+  if (!identity.patient_id.empty())
+    replaced.patient_id = pseudonyms.patient_id(identity.patient_id, identity.patient_id_issuer);
   replace_name(replaced.patient_name, "Patient", pseudonyms);
   replace_uid(replaced.study_instance_uid, pseudonyms);
   return replaced;

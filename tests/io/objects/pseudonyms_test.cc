@@ -19,6 +19,14 @@ TEST(Pseudonyms, AreTheSameForTheSame) {
   EXPECT_NE(Pseudonyms().uid("1.2.3"), uid);
 }
 
+TEST(Pseudonyms, AnIdOfTwoIssuersIsOfTwoPatients) {
+  Pseudonyms pseudonyms;
+  EXPECT_EQ(pseudonyms.patient_id("7", "St. Elsewhere"), "ANON 1");
+  EXPECT_EQ(pseudonyms.patient_id("7", "Princeton"), "ANON 2");
+  EXPECT_EQ(pseudonyms.patient_id("7", "St. Elsewhere"), "ANON 1");
+  EXPECT_EQ(pseudonyms.in("7 (Princeton)"), "ANON 1 (ANON 2)");
+}
+
 TEST(Pseudonyms, DatesMoveTogetherAndKeepTheirForm) {
   const Pseudonyms pseudonyms;
   const std::string moved = pseudonyms.date("20260301");
