@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <cmath>
 #include <memory>
 #include <optional>
 #include <string>
@@ -106,6 +107,10 @@ void bind_drr(py::module_& module) {
       "png",
       [](const py::array_t<float, py::array::c_style | py::array::forcecast>& line_integrals) {
         if (line_integrals.ndim() != 2) throw py::value_error("an image has the shape (rows, columns)");
+        const auto is_number = [](float value) { return std::isfinite(value); };
+        if (line_integrals.size() == 0 ||
+            !std::all_of(line_integrals.data(), line_integrals.data() + line_integrals.size(), is_number))
+          throw py::value_error("an image has pixels, and all are finite numbers");
         Image<float> image(static_cast<int>(line_integrals.shape(1)), static_cast<int>(line_integrals.shape(0)));
         std::copy_n(line_integrals.data(), image.pixels.size(), image.pixels.begin());
         return py::bytes(png_of(radiograph(image)));

@@ -1,7 +1,11 @@
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cmath>
+
 #include "geometry/rotation.h"
 #include "geometry/xray_view.h"
+#include "io/dicom/file_structure.h"
 #include "python/bindings.h"
 
 namespace isoshift::python {
@@ -28,10 +32,24 @@ Eigen::Isometry3d pose_from(const Poses& array) {
   return poses_from(array).front();
 }
 
+void check_size(int columns, int rows) {
+  if (columns < 1 || rows < 1 || columns > kMaxEdge || rows > kMaxEdge)
+    throw py::value_error(fmt::format("columns and rows are 1 to {}", kMaxEdge));
+}
+
+void check_block(int factor, int columns, int rows) {
+  if (factor < 1 || factor > columns || factor > rows)
+    throw py::value_error(fmt::format("factor is 1 to {}, the image's shorter edge", std::min(columns, rows)));
+}
+
 namespace {
 
 XrayView view_of_carm(double gantry_deg, double sad_mm, double sid_mm, int columns, int rows, double pixel_mm,
                       bool is_megavoltage) {
+  check_size(columns, rows);
+  const bool is_possible = std::isfinite(gantry_deg) && std::isfinite(sid_mm) && pixel_mm > 0.0 &&
+                           std::isfinite(pixel_mm) && sad_mm > 0.0 && sid_mm > sad_mm;
+  if (!is_possible) throw py::value_error("pixel_mm and sad_mm are positive, sid_mm is larger than sad_mm");
   const CarmGeometry geometry{.sad_mm = sad_mm,
                               .gantry_angle_rad = rad_from_deg(gantry_deg),
                               .receptor_translation_mm = Eigen::Vector3d(0.0, 0.0, sad_mm - sid_mm),
@@ -61,8 +79,13 @@ void bind_geometry(py::module_& module) {
       .def(
           "project", [](const XrayView& view, const Eigen::Vector3d& room_mm) { return view.project(room_mm); },
           py::arg("room_mm"), "(column, row) of a room point, or None at or behind the source.")
-      .def("downscaled", &XrayView::downscaled, py::arg("factor"),
-           "The same receptor, read out in blocks of factor x factor pixels.");
+      .def(
+          "downscaled",
+          [](const XrayView& view, int factor) {
+            check_block(factor, view.columns, view.rows);
+            return view.downscaled(factor);
+          },
+          py::arg("factor"), "The same receptor, read out in blocks of factor x factor pixels.");
   module.def("carm_view", &view_of_carm, py::arg("gantry_deg"), py::kw_only(), py::arg("sad_mm") = 1000.0,
              py::arg("sid_mm") = 1500.0, py::arg("columns") = 512, py::arg("rows") = 512, py::arg("pixel_mm") = 0.8,
              py::arg("is_megavoltage") = false,
@@ -71,6 +94,7 @@ void bind_geometry(py::module_& module) {
       "view_from_matrix",
       [](const Eigen::Matrix<double, 3, 4>& pixel_from_room, double sid_mm, int columns, int rows,
          bool is_megavoltage) {
+        check_size(columns, rows);
         return xray_view_from_matrix(pixel_from_room, sid_mm, columns, rows,
                                      is_megavoltage ? Beam::kMegavoltage : Beam::kKilovoltage);
       },

@@ -1,5 +1,7 @@
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cmath>
 #include <map>
 #include <memory>
 #include <optional>
@@ -57,6 +59,9 @@ double similarity_of(const std::string& kind, const py::array_t<float, py::array
   const std::vector<float> fixed(xray.data(), xray.data() + xray.size());
   const std::span<const float> moving(drr.data(), static_cast<std::size_t>(drr.size()));
   if (moving.empty()) throw py::value_error("the lists hold no pixel");
+  const auto is_number = [](float value) { return std::isfinite(value); };
+  if (!std::ranges::all_of(fixed, is_number) || !std::ranges::all_of(moving, is_number))
+    throw py::value_error("a pixel is not a finite number");
   return Comparison(known, fixed, {}, range_of(moving)).of(moving);
 }
 
@@ -72,6 +77,15 @@ SetupResult register_for_python(const LoadedStudy& loaded, RegisterOptions optio
   result.overrides = loaded.notes.overrides;
   result.left_aside = loaded.notes.left_aside;
   return result;
+}
+
+// An object with the numbers of one patient and the name of another must not be written.
+void check_is_of(const SetupResult& result, const Study& study) {
+  const auto is_in_study = [&](const SetupResult::View& view) {
+    return std::ranges::count(study.rt_images, view.sop_instance_uid, &RtImage::sop_instance_uid) > 0;
+  };
+  if (result.ct_series_uid != study.ct->series_instance_uid || !std::ranges::all_of(result.views, is_in_study))
+    throw Error("the result is of another study: its CT and X-rays are not those of this study");
 }
 
 py::object json_of(const SetupResult& result) { return py::module_::import("json").attr("loads")(json_report(result)); }
@@ -119,7 +133,13 @@ void bind_registration(py::module_& module) {
       .def_property_readonly(
           "field", [](const py::object& self) { return python::array_of(self.cast<const FixedImage&>().field, self); },
           "uint8, shape (rows, columns): 1 where pixels are compared.")
-      .def("reduced", &reduced, py::arg("factor"), "Blocks of factor x factor pixels, averaged.");
+      .def(
+          "reduced",
+          [](const FixedImage& image, int factor) {
+            check_block(factor, image.view.columns, image.view.rows);
+            return reduced(image, factor);
+          },
+          py::arg("factor"), "Blocks of factor x factor pixels, averaged.");
   module.def(
       "prepare", [](const XrayImage& xray) { return prepare(xray); }, py::arg("xray"),
       py::call_guard<py::gil_scoped_release>(), "Line integrals and irradiated field of an X-ray.");
@@ -178,6 +198,7 @@ void bind_registration(py::module_& module) {
       "write_spatial_registration",
       [](const LoadedStudy& loaded, const SetupResult& result, const std::filesystem::path& path, bool for_review,
          bool accept_unobservable) {
+        check_is_of(result, loaded.study);
         RegisterOptions options;
         options.write_reg_for_review = for_review;
         options.accept_unobservable = accept_unobservable;

@@ -36,6 +36,10 @@ std::vector<Eigen::Isometry3d> poses_from(const Poses& array);
 Eigen::Isometry3d pose_from(const Poses& array);
 inline Eigen::Matrix4d matrix_of(const Eigen::Isometry3d& pose) { return pose.matrix(); }
 
+// Throws ValueError for a size that no image has, and for a block that is not within one.
+void check_size(int columns, int rows);
+void check_block(int factor, int columns, int rows);
+
 // What is read from files stays as it was read.
 template <class T>
 py::array_t<T> read_only(py::array_t<T> array) {

@@ -44,11 +44,14 @@ std::optional<std::string> time_digits(const RtImage& image) {
   return digits;
 }
 
-// "+0130" (PS3.3 C.12.1.1.8).
+// "+0130", from -1200 to +1400 (PS3.3 C.12.1.1.8).
 std::optional<int> utc_offset_min(const std::string& text) {
   if (text.size() != 5 || (text[0] != '+' && text[0] != '-') || !digits_of(text.substr(1), ':', 4)) return std::nullopt;
-  const int minutes = 60 * number_in(text, 1, 2) + number_in(text, 3, 2);
-  return text[0] == '-' ? -minutes : minutes;
+  constexpr int kFarthestWestMin = -12 * 60, kFarthestEastMin = 14 * 60, kHourMin = 60;
+  const int minutes = (text[0] == '-' ? -1 : 1) * (kHourMin * number_in(text, 1, 2) + number_in(text, 3, 2));
+  if (number_in(text, 3, 2) >= kHourMin || minutes < kFarthestWestMin || minutes > kFarthestEastMin)
+    return std::nullopt;
+  return minutes;
 }
 
 }  // namespace

@@ -5,8 +5,8 @@
 
 #include <algorithm>
 #include <cstring>
+#include <map>
 #include <memory>
-#include <string_view>
 
 #include "base/error.h"
 
@@ -66,9 +66,46 @@ OpjStream stream_from(Bytes& bytes) {
   return stream;
 }
 
-bool is_jp2(std::span<const std::uint8_t> bytes) {
-  constexpr std::string_view kSignature("\0\0\0\x0CjP  \r\n\x87\n", 12);
-  return bytes.size() >= kSignature.size() && std::memcmp(bytes.data(), kSignature.data(), kSignature.size()) == 0;
+std::uint32_t number(std::span<const std::uint8_t> bytes) {
+  std::uint32_t value = 0;
+  for (const std::uint8_t byte : bytes) value = value << 8 | byte;
+  return value;
+}
+
+// How many tile-parts of each tile are there (ISO/IEC 15444-1, A.4.2). Throws Error for a stream that ends within one,
+// or whose tile-parts are out of order or less than they say: OpenJPEG takes what is missing for zeros.
+std::map<std::uint32_t, std::uint32_t> tile_parts_in(std::span<const std::uint8_t> stream, const std::string& where) {
+  constexpr std::uint32_t kStartOfTilePart = 0xFF90, kEnd = 0xFFD9;
+  constexpr std::size_t kSegment = 12;  // marker, length, tile, length of the tile-part, its number, count of all
+  const auto at = [&](std::size_t place, std::size_t count) {
+    if (place > stream.size() || stream.size() - place < count)
+      throw Error(fmt::format("{}: its JPEG 2000 pixels are cut off", where));
+    return number(stream.subspan(place, count));
+  };
+  std::size_t place = 2;
+  while (at(place, 2) != kStartOfTilePart && at(place, 2) != kEnd) place += 2 + at(place + 2, 2);
+  std::map<std::uint32_t, std::uint32_t> counts, announced;
+  while (at(place, 2) == kStartOfTilePart) {
+    const std::uint32_t tile = at(place + 4, 2), length = at(place + 6, 4), part = at(place + 10, 1);
+    if (part != counts[tile]++) throw Error(fmt::format("{}: its JPEG 2000 tile-parts are out of order", where));
+    if (const std::uint32_t of = at(place + 11, 1); of != 0) announced[tile] = of;
+    if (length == 0) break;  // up to the end
+    if (length < kSegment) throw Error(fmt::format("{}: its JPEG 2000 tile-parts are damaged", where));
+    place += length;
+  }
+  for (const auto& [tile, count] : announced)
+    if (counts[tile] != count)
+      throw Error(fmt::format("{}: of its JPEG 2000 tile {} there are {} tile-parts, expected {}", where, tile,
+                              counts[tile], count));
+  return counts;
+}
+
+void expect_all_tiles(opj_codec_t* codec, std::span<const std::uint8_t> stream, const std::string& where) {
+  opj_codestream_info_v2_t* info = opj_get_cstr_info(codec);
+  const std::size_t tiles = std::size_t{info->tw} * info->th;
+  opj_destroy_cstr_info(&info);
+  if (const std::size_t found = tile_parts_in(stream, where).size(); found != tiles)
+    throw Error(fmt::format("{}: {} of its {} JPEG 2000 tiles are there", where, found, tiles));
 }
 
 // Before anything is decoded: what the stream announces is the image of the header.
@@ -97,7 +134,7 @@ std::vector<std::uint8_t> decoded_jpeg2000(std::span<const std::uint8_t> stream,
   };
   Bytes bytes{stream};
   const OpjStream source = stream_from(bytes);
-  const OpjCodec codec(opj_create_decompress(is_jp2(stream) ? OPJ_CODEC_JP2 : OPJ_CODEC_J2K), &opj_destroy_codec);
+  const OpjCodec codec(opj_create_decompress(OPJ_CODEC_J2K), &opj_destroy_codec);
   opj_set_error_handler(codec.get(), &keep_first, &fault);
   opj_dparameters_t parameters;
   opj_set_default_decoder_parameters(&parameters);
@@ -107,9 +144,9 @@ std::vector<std::uint8_t> decoded_jpeg2000(std::span<const std::uint8_t> stream,
   const OpjImage image(announced, &opj_image_destroy);
   expect(is_read);
   check_is_of(format, *image, where);
+  expect_all_tiles(codec.get(), stream, where);
   expect(opj_decode(codec.get(), source.get(), image.get()) && opj_end_decompress(codec.get(), source.get()) &&
          image->comps[0].data != nullptr);
-  check_is_of(format, *image, where);  // a palette of a JP2 file makes several components of one
 
   const std::span<const OPJ_INT32> values(image->comps[0].data, format.pixels_per_frame());
   const auto [least, greatest] = std::ranges::minmax(values);

@@ -10,10 +10,10 @@
 
 namespace isoshift {
 
-// The stored values of one frame as bytes, those of 16-bit pixels in the order of this machine, from its code stream
-// or, as some programs write it, from a JP2 file. Throws Error beginning with `where` if the stream is damaged or cut
-// off; if its size or sign is not the header's; if it holds several components or a part of the image; or if a value
-// needs more than BitsStored. Only for the child process (decoder_process.h).
+// The stored values of one frame as bytes, those of 16-bit pixels in the order of this machine, from its code stream.
+// Throws Error beginning with `where` if the stream is damaged or cut off, or tiles are missing; if its size or sign is
+// not the header's; if it holds several components or a part of the image; or if a value needs more than BitsStored.
+// Only for the child process (decoder_process.h).
 std::vector<std::uint8_t> decoded_jpeg2000(std::span<const std::uint8_t> stream, const PixelFormat& format,
                                            const std::string& where);
 

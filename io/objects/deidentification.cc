@@ -91,7 +91,9 @@ const DcmTagKey kKeptUids[] = {DCM_SOPClassUID,
                                DCM_OriginalSpecializedSOPClassUID};
 
 // Frames of reference that every machine has (PS3.6 A-2): IEC 61217 fixed, the robotic arm's, the table top's.
-constexpr std::string_view kWellKnownFrames = "1.2.840.10008.1.4.3.";
+bool is_well_known_frame(std::string_view uid) {
+  return uid == "1.2.840.10008.1.4.3.1" || uid == "1.2.840.10008.1.4.3.2" || uid == "1.2.840.10008.1.4.3.3";
+}
 
 // Beside them all groups are removed, that of the file meta information too, which is made anew.
 constexpr std::array<Uint16, 12> kKeptGroups = {0x0008, 0x0018, 0x0020, 0x0028, 0x0070, 0x3002,
@@ -105,6 +107,13 @@ const char* kind_of(const DcmTagKey& tag) {
   return found == std::end(kReplacedTexts) ? nullptr : found->kind;
 }
 
+// Whether an attribute has the VR of the dictionary: under another one it may hold anything.
+bool has_its_vr(const DcmTagKey& tag, DcmEVR found) {
+  const DcmEVR vr = DcmTag(tag).getEVR();
+  const bool is_number = found == EVR_US || found == EVR_SS;
+  return found == vr || (vr == EVR_xs && is_number) || (vr == EVR_lt && (is_number || found == EVR_OW));
+}
+
 Action action_for(const DcmTagKey& tag, DcmEVR vr) {
   if (kind_of(tag) != nullptr) return Action::kReplaceText;
   if (tag == DCM_PatientID) return Action::kReplaceId;
@@ -113,6 +122,8 @@ Action action_for(const DcmTagKey& tag, DcmEVR vr) {
   const bool is_known = DcmTag(tag).error().good();
   if (!is_known || (!is_kept_group && !is_among(kKeptOfOtherGroups, tag)) || is_among(kRemoved, tag))
     return Action::kRemove;
+  if (tag == DCM_PixelData) return Action::kKeep;
+  if (!has_its_vr(tag, vr)) return Action::kRemove;
   switch (vr) {
     case EVR_SQ: return Action::kLookInside;
     case EVR_UI: return is_among(kKeptUids, tag) ? Action::kKeep : Action::kReplaceUids;
@@ -130,10 +141,10 @@ Action action_for(const DcmTagKey& tag, DcmEVR vr) {
     case EVR_SL:
     case EVR_SS:
     case EVR_UL:
-    case EVR_US: return Action::kKeep;
-    case EVR_OB:
-    case EVR_OW:
-    case EVR_PixelData: return tag == DCM_PixelData || tag.getGroup() == 0x0028 ? Action::kKeep : Action::kRemove;
+    case EVR_US:
+    case EVR_xs: return Action::kKeep;
+    case EVR_lt:
+    case EVR_OW: return tag.getGroup() == 0x0028 ? Action::kKeep : Action::kRemove;  // look-up tables
     default: return is_among(kKeptTexts, tag) ? Action::kKeep : Action::kRemove;
   }
 }
@@ -142,6 +153,7 @@ Action action_for(const DcmTagKey& tag, DcmEVR vr) {
 bool is_of_its_vr(const DicomItem& item, const DcmTagKey& tag, DcmEVR vr) {
   std::string_view allowed;
   if (vr == EVR_DS || vr == EVR_IS) allowed = "0123456789+-.eE ";
+  if (vr == EVR_UI) allowed = "0123456789.";
   if (vr == EVR_TM) allowed = "0123456789.: ";
   if (vr == EVR_CS) allowed = "ABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_ ";
   return allowed.empty() || std::ranges::all_of(item.texts(tag), [&](const std::string& value) {
@@ -174,9 +186,8 @@ void replace_in(DicomItem& item, Pseudonyms& pseudonyms) {
         replace(item, tag, [&](const std::string& value) { return pseudonyms.patient_id(value, issuer); });
         break;
       case Action::kReplaceUids:
-        replace(item, tag, [&](const std::string& value) {
-          return value.starts_with(kWellKnownFrames) ? value : pseudonyms.uid(value);
-        });
+        replace(item, tag,
+                [&](const std::string& value) { return is_well_known_frame(value) ? value : pseudonyms.uid(value); });
         break;
       case Action::kMoveDates:
         replace(item, tag, [&](const std::string& value) { return pseudonyms.date(value); });

@@ -73,7 +73,8 @@ SessionFiles chosen_session(const SessionChoice& choice, const std::vector<Sessi
   const auto newest = [](const SessionFiles& session) -> const StudyFiles::Image& { return session.images.back(); };
   for (const SessionFiles& session : fitting)
     for (const SessionFiles& other : fitting)
-      if (&session != &other && !tells_which_is_first(newest(session), newest(other)))
+      if (&session != &other &&
+          (!tells_which_is_first(newest(session), newest(other)) || newest(session).at_s == newest(other).at_s))
         fail(fmt::format("{} and {}: their times do not tell which was taken later", newest(session).file.string(),
                          newest(other).file.string()));
   return *std::ranges::max_element(fitting, {}, [&](const SessionFiles& session) { return newest(session).at_s; });

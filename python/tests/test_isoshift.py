@@ -191,6 +191,31 @@ def test_what_cannot_be_is_an_error(folder, study, renderer, tmp_path):
             isoshift.load_study(folder, **nonsense)
 
 
+def test_numbers_that_mean_nothing_are_errors(study):
+    view = study.views[0]
+    image = isoshift.prepare(study.xrays[0])
+    nan, numbers = [float("nan")] * 100, list(range(100))
+    for nonsense in (lambda: view.downscaled(0), lambda: view.downscaled(-2), lambda: view.downscaled(10**6),
+                     lambda: image.reduced(0), lambda: image.reduced(view.rows + 1),
+                     lambda: isoshift.carm_view(float("nan")), lambda: isoshift.carm_view(0, pixel_mm=-1),
+                     lambda: isoshift.carm_view(0, columns=0), lambda: isoshift.carm_view(0, rows=10**6),
+                     lambda: isoshift.carm_view(0, sad_mm=2000),
+                     lambda: isoshift.view_from_matrix(view.pixel_from_room, sid_mm=1500, columns=-1, rows=96),
+                     lambda: isoshift.png(np.zeros((0, 0))), lambda: isoshift.png(np.full((4, 4), np.inf)),
+                     *(lambda kind=kind: isoshift.similarity(kind, nan, numbers) for kind in ("ncc", "src", "mi", "nmi")),
+                     *(lambda kind=kind: isoshift.similarity(kind, numbers, nan) for kind in ("ncc", "src", "mi", "nmi"))):
+        with pytest.raises(ValueError):
+            nonsense()
+
+
+def test_an_object_is_of_the_study_of_its_result(study, tmp_path):
+    result = isoshift.register(study)
+    other = isoshift.load_study(SOURCE / "testdata" / "small" / "2", latest=True)
+    with pytest.raises(isoshift.Error, match="the result is of another study"):
+        isoshift.write_spatial_registration(other, result, tmp_path / "other.dcm")
+    assert not (tmp_path / "other.dcm").exists()
+
+
 def test_messages_name_arguments_and_not_flags(folder, tmp_path):
     broken = tmp_path / "broken"
     subprocess.run(["cp", "-r", folder, broken], check=True)

@@ -102,6 +102,28 @@ TEST_F(SessionChoiceCommandTest, ASessionIsChosenByTheNameThatInspectGives) {
   EXPECT_EQ(register_with({"--session", name, "--image", (study_ / "RTIMAGE").string()}).exit_status, 2);
 }
 
+TEST_F(SessionChoiceCommandTest, OfTwoOfTheSameTimeNoneIsTheLatest) {
+  for (const char* name : {"KV_G000.dcm", "KV_G090.dcm"})
+    edit(study_ / "RTIMAGE/F02" / name, [&](DicomItem d) {
+      const DicomFile first = DicomFile::read(study_ / "RTIMAGE" / name, DicomFile::Extent::kHeader);
+      for (const DcmTagKey& tag : {DCM_AcquisitionDate, DCM_AcquisitionTime})
+        d.put(tag, first.dataset().required_text(tag));
+    });
+  const CommandOutcome outcome = register_with({"--latest"});
+  EXPECT_EQ(outcome.exit_status, 1);
+  EXPECT_THAT(outcome.err, HasSubstr("their times do not tell which was taken later"));
+}
+
+// PS3.3 C.12.1.1.8: from -1200 to +1400.
+TEST_F(SessionChoiceCommandTest, AZoneThatThereIsNotMovesNoTime) {
+  for (const char* zone : {"+9999", "+1401", "+0060", "-1201"}) {
+    for (const char* name : {"KV_G000.dcm", "KV_G090.dcm"})
+      edit(study_ / "RTIMAGE/F02" / name, [&](DicomItem d) { d.put(DCM_TimezoneOffsetFromUTC, zone); });
+    ASSERT_EQ(register_with({"--latest"}).exit_status, 0) << zone;
+    EXPECT_THAT(found(), PoseNear(second_, 0.5, 3.0)) << zone;
+  }
+}
+
 // Who has no time may be the latest.
 TEST_F(SessionChoiceCommandTest, WithoutTimesNoneIsTheLatest) {
   edit(study_ / "RTIMAGE/F02/KV_G000.dcm", [](DicomItem d) {
