@@ -12,6 +12,12 @@
 
 namespace isoshift {
 
+std::string reason_of(const nlohmann::json::exception& error) {
+  const std::string what = error.what();  // "[json.exception.parse_error.101] ..."
+  const std::size_t end = what.find("] ");
+  return end == std::string::npos ? what : what.substr(end + 2);
+}
+
 nlohmann::json json_from(const std::string& text, const std::string& where) {
   std::vector<std::set<std::string>> keys;  // of the objects that are open
   const auto check_keys = [&](int, nlohmann::json::parse_event_t event, const nlohmann::json& parsed) {
@@ -25,7 +31,7 @@ nlohmann::json json_from(const std::string& text, const std::string& where) {
   try {
     return nlohmann::json::parse(text, check_keys);
   } catch (const nlohmann::json::exception& error) {
-    throw Error(fmt::format("{}: is not JSON: {}", where, error.what()));
+    throw Error(fmt::format("{}: is not JSON: {}", where, reason_of(error)));
   }
 }
 

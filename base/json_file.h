@@ -18,6 +18,9 @@ struct JsonFile {
   std::string sha256;  // of that, hexadecimal
 };
 
+// What the library says of a text that it cannot read, without its own name for that: "parse error at line 1, ...".
+std::string reason_of(const nlohmann::json::exception& error);
+
 // Throws Error naming `where` for a text that is not JSON, or in which an object has a key twice.
 nlohmann::json json_from(const std::string& text, const std::string& where);
 

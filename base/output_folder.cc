@@ -68,6 +68,17 @@ void check_replaceable(const fs::path& destination, bool overwrite) {
                     (destination / foreign).string(), option("overwrite")));
 }
 
+// What is read must not be replaced by what is written.
+void check_holds_none_of(const fs::path& destination, const std::vector<fs::path>& inputs) {
+  const fs::path place = fs::weakly_canonical(destination);
+  for (const fs::path& input : inputs) {
+    const fs::path found = input.empty() ? fs::path() : fs::weakly_canonical(input);
+    if (std::ranges::mismatch(place, found).in1 == place.end())
+      throw Error(fmt::format("{}: holds {}, which is read.\n       Name another output folder", destination.string(),
+                              input.string()));
+  }
+}
+
 }  // namespace
 
 void flush(const fs::path& path) {
@@ -79,13 +90,15 @@ void flush(const fs::path& path) {
   if (failed != 0) fail(path, std::strerror(reason));
 }
 
-OutputFolder::OutputFolder(fs::path destination, bool overwrite) : destination_(std::move(destination)) {
+OutputFolder::OutputFolder(fs::path destination, bool overwrite, const std::vector<fs::path>& inputs)
+    : destination_(std::move(destination)) {
   if (destination_.empty()) throw UsageError("the name of the output folder is empty");
   destination_ = fs::absolute(destination_).lexically_normal();
   if (destination_.filename().empty()) destination_ = destination_.parent_path();  // "out/" is "out"
   std::error_code error;
   if (fs::exists(destination_, error)) {
     check_replaceable(destination_, overwrite);
+    check_holds_none_of(destination_, inputs);
     replaces_ = !fs::is_empty(destination_);
   }
   make_parents();

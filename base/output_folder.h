@@ -18,8 +18,9 @@ namespace isoshift {
 class OutputFolder {
  public:
   // Throws Error if `destination` holds anything and `overwrite` is false, if it holds anything that no output folder
-  // wrote, or if nothing can be written beside it.
-  OutputFolder(std::filesystem::path destination, bool overwrite);
+  // wrote or any of `inputs`, or if nothing can be written beside it.
+  OutputFolder(std::filesystem::path destination, bool overwrite,
+               const std::vector<std::filesystem::path>& inputs = {});
   ~OutputFolder();
   OutputFolder(const OutputFolder&) = delete;
   OutputFolder& operator=(const OutputFolder&) = delete;

@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cctype>
 #include <exception>
 #include <span>
 #include <sstream>
@@ -95,6 +96,24 @@ void check_command(const CLI::App& app, std::span<const char* const> words) {
     throw UsageError(fmt::format("{} belongs behind the command: isoshift {} ... {}", first, *command, first));
 }
 
+// An empty value comes from a variable of a script that is unset: what it was meant to switch on would be left out. No
+// limit holds for what is not a number.
+void check_words(std::span<const char* const> words) {
+  for (std::size_t n = 0; n < words.size(); ++n) {
+    std::string word = words[n];
+    if (word.empty() || (word.starts_with("--") && word.ends_with('=')))
+      throw UsageError(
+          fmt::format("an argument is empty{}", n > 0 ? fmt::format(" (after {})", words[n - 1]) : ": the first"));
+    std::ranges::transform(word, word.begin(), [](unsigned char c) { return std::tolower(c); });
+    std::ranges::replace(word, '=', ',');
+    std::istringstream parts(word);
+    for (std::string part; std::getline(parts, part, ',');)
+      for (const char* const none : {"nan", "inf", "infinity"})
+        if (part.substr(part.find_first_not_of("+-") == 1 ? 1 : 0) == none)
+          throw UsageError(fmt::format("{} is not a finite number (a file of this name is ./{})", words[n], words[n]));
+  }
+}
+
 // Whoever read the output has had enough of it (isoshift ... | head).
 bool is_reader_gone() {
   pollfd output{.fd = STDOUT_FILENO, .events = POLLOUT, .revents = 0};
@@ -124,7 +143,9 @@ int run_isoshift(int argc, const char* const* argv, Console& console) {
   CLI::App app(kDescription, "isoshift");
   add_commands(app, console, exit_status);
   try {
-    check_command(app, std::span(argv, static_cast<std::size_t>(argc)).subspan(1));
+    const auto words = std::span(argv, static_cast<std::size_t>(argc)).subspan(1);
+    check_command(app, words);
+    check_words(words);
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() == 0) {  // the help, or the version

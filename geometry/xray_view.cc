@@ -127,6 +127,14 @@ XrayView xray_view_from_matrix(const Eigen::Matrix<double, 3, 4>& pixel_from_roo
     throw Error(fmt::format(
         "the projection matrix and the SID of {} mm put the isocenter not between source and receptor", sid_mm));
 
+  // A matrix of another unit of length has its source next to the isocenter, or far away.
+  constexpr double kLeastShare = 0.1;
+  if (view.pixel_from_room(2, 3) < kLeastShare)
+    throw Error(fmt::format(
+        "the projection matrix puts the isocenter {:.4g} mm from the source along the normal of the receptor, which is "
+        "{} mm away: expected at least a tenth of that. Is the matrix of mm?",
+        view.pixel_from_room(2, 3) * sid_mm, sid_mm));
+
   // Any matrix has a camera; that of an X-ray has pixels such as receptors have.
   constexpr double kMinPitchMm = 0.05, kMaxPitchMm = 6.0, kMaxCosine = 0.01, kMaxPitchRatio = 2.0;
   const Eigen::Matrix3d receptor_from_pixel = view.pixel_from_room.leftCols<3>().inverse();

@@ -33,7 +33,7 @@ std::array<double, 2> pixel_size_mm(const XrayView& view) {
 }
 
 void run_drr(const DrrOptions& options, Console& console) {
-  OutputFolder output(options.output, options.overwrite);
+  OutputFolder output(options.output, options.overwrite, options.study.parts.paths());
   Notes notes;
   options.rendering.check();
   ConsoleObserver observer(console);

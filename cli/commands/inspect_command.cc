@@ -206,7 +206,7 @@ Description describe_registration(const std::filesystem::path& path) {
 // The bodies of every CT: a picture each, and a table.
 void run_inspect_bodies(const std::vector<std::filesystem::path>& paths, const std::filesystem::path& folder,
                         bool overwrite, Console& console) {
-  OutputFolder output(folder, overwrite);
+  OutputFolder output(folder, overwrite, paths);
   const StudyFiles files = scan_study(paths);
   if (files.cts.empty()) throw Error(fmt::format("{}: holds no CT", paths.front().string()));
   std::string listing;

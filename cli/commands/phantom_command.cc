@@ -60,7 +60,7 @@ void add_phantom_command(CLI::App& app, Console& console, int&) {
       "\nExample:\n  isoshift phantom -o study --translation 5,0,-3 --rotation 1,0,2\n"
       "  isoshift register study -o result --truth study/truth.json\n"
       "  isoshift phantom -o bent --anatomy spine --bend spine:4,weight-loss:10\n"
-      "  isoshift phantom -o breathing --anatomy thorax --breathing 30 --image-pixels 256 --voxel-mm 2 --translation "
+      "  isoshift phantom -o breathing --anatomy thorax --breathing 30 --image-pixels 192 --voxel-mm 2 --translation "
       "0,0,0 --rotation 0,0,0");
   command->add_option("-o,--output", options->output, "Folder to make")->required()->type_name("FOLDER");
   command

@@ -86,6 +86,7 @@ void add_track_command(CLI::App& app, Console& console, int&) {
       ->add_option("--budget", flags->budget_ms,
                    "Time that a moment may take; the summary says how many moments took no longer")
       ->type_name("MS")
+      ->check(CLI::PositiveNumber)
       ->capture_default_str();
   command->add_flag("--rigid", flags->six_dof, "Six degrees of freedom instead of the three translations");
   command->add_option("--box", options.tracking.box_mm, "Half the width of the search box around the expected position")

@@ -103,7 +103,8 @@ MachineProfile::Rule rule_from(JsonSection section) {
     rule.rows = section.required<int>("rows", "the height of the images, in pixels");
     if (!rule.switches.sid_mm)
       throw Error(fmt::format("{}: sid_mm is missing, which pixel_from_room needs", section.where()));
-    if (rule.gantry_angle_offset_deg != 0.0 || rule.spacing_at_axis || rule.imager || rule.switches.assume_centered)
+    if (rule.gantry_angle_offset_deg != 0.0 || rule.spacing_at_axis || rule.imager || rule.switches.assume_centered ||
+        rule.switches.sad_mm || rule.switches.position_mm)
       throw Error(fmt::format("{}: pixel_from_room says where all pixels are; it goes with no other geometry",
                               section.where()));
   }

@@ -10,6 +10,7 @@
 
 #include "base/error.h"
 #include "base/output_folder.h"
+#include "base/text_file.h"
 
 namespace isoshift {
 
@@ -49,6 +50,7 @@ std::string png_of(const Image<std::uint8_t>& gray) {
 }
 
 Image<std::uint8_t> read_gray_png(const std::filesystem::path& path) {
+  expect_no_pipe(path);
   const Surface surface(cairo_image_surface_create_from_png(path.c_str()), &cairo_surface_destroy);
   if (const auto status = cairo_surface_status(surface.get()); status != CAIRO_STATUS_SUCCESS)
     throw Error(fmt::format("{}: cannot be read as a PNG: {}", path.string(), cairo_status_to_string(status)));

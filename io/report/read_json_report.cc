@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "base/error.h"
+#include "base/json_file.h"
 #include "geometry/patient_setup.h"
 #include "geometry/rotation.h"
 #include "io/report/formats.h"
@@ -348,7 +349,7 @@ SetupResult report_from_json(const std::string& json, const std::string& where) 
   } catch (const Error& error) {
     throw Error(fmt::format("{}: {}", where, error.what()));
   } catch (const Json::exception& error) {
-    throw Error(fmt::format("{}: is not a result of this program: {}", where, error.what()));
+    throw Error(fmt::format("{}: is not a result of this program: {}", where, reason_of(error)));
   }
 }
 

@@ -385,6 +385,14 @@ std::vector<fs::path> files_below(const std::vector<fs::path>& paths, const std:
   return files;
 }
 
+std::vector<fs::path> StudyParts::paths() const {
+  std::vector<fs::path> paths = {study, plan, structures};
+  paths.insert(paths.end(), ct.begin(), ct.end());
+  paths.insert(paths.end(), images.begin(), images.end());
+  std::erase(paths, fs::path());
+  return paths;
+}
+
 StudyFiles scan_file(const fs::path& path) {
   StudyFiles files;
   const Beginning beginning = beginning_of(path);

@@ -109,6 +109,8 @@ struct StudyParts {
   std::filesystem::path plan, structures;
   std::vector<std::string> doubts;  // why the images may not show one setup: then the result needs a person's review
 
+  std::vector<std::filesystem::path> paths() const;  // all that are named
+
   bool operator==(const StudyParts&) const = default;
 };
 

@@ -49,6 +49,21 @@ TEST(OutputFolder, RefusesAFolderThatHoldsSomething) {
   EXPECT_EQ(content(folder / "precious.txt"), "keep me");
 }
 
+// A study that isoshift wrote is an earlier output, too.
+TEST(OutputFolder, WhatIsReadIsNotReplaced) {
+  TemporaryFolder folder;
+  OutputFolder earlier(folder / "study", false);
+  std::filesystem::create_directory(earlier.path() / "CT");
+  write_text(earlier.path() / "CT" / "slice", "precious");
+  earlier.commit();
+  std::filesystem::create_directory_symlink(folder / "study", folder / "link");
+  for (const std::filesystem::path& input : {folder / "study", folder / "study/CT", folder / "link/CT/slice"})
+    EXPECT_THROW(OutputFolder(folder / "study", true, {input}), Error) << input;
+  EXPECT_THROW(OutputFolder(folder / "link", true, {folder / "study/CT"}), Error);
+  EXPECT_EQ(content(folder / "study/CT/slice"), "precious");
+  EXPECT_NO_THROW(OutputFolder(folder / "study", true, {folder / "studies", folder.path()}));
+}
+
 TEST(OutputFolder, OverwritingReplacesAnEarlierOutputAsAWhole) {
   TemporaryFolder folder;
   {

@@ -57,6 +57,23 @@ TEST_F(ErrorMessagesTest, WhatStandsBeforeTheCommand) {
   EXPECT_EQ(run_command({"--version", "register"}).exit_status, 0);
 }
 
+// Of a script whose variable is unset, and of one that divided by zero.
+TEST_F(ErrorMessagesTest, ArgumentsThatAreEmptyOrNoNumber) {
+  const std::vector<std::string> start = {"register", study_.path().string(), "-o", study_.output().string()};
+  const auto error_with = [&](const std::vector<std::string>& more) {
+    std::vector<std::string> words = start;
+    words.insert(words.end(), more.begin(), more.end());
+    const CommandOutcome outcome = run_command(words);
+    EXPECT_EQ(outcome.exit_status, 2);
+    return outcome.err;
+  };
+  EXPECT_THAT(error_with({"--site", ""}), HasSubstr("an argument is empty (after --site)"));
+  EXPECT_THAT(error_with({"--machine="}), HasSubstr("an argument is empty (after "));
+  EXPECT_THAT(error_with({"--sid", "nan"}), HasSubstr("nan is not a finite number"));
+  EXPECT_THAT(error_with({"--isocenter=1,-Inf,2"}), HasSubstr("--isocenter=1,-Inf,2 is not a finite number"));
+  EXPECT_FALSE(std::filesystem::exists(study_.output()));
+}
+
 TEST_F(ErrorMessagesTest, TwoCtSeries) {
   for (const int k : {0, 1, 2}) edit(study_.ct_slice(k), [](DicomItem d) { d.put(DCM_SeriesInstanceUID, "1.2.3"); });
   const CommandOutcome outcome = register_study(study_);

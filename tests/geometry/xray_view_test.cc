@@ -218,11 +218,12 @@ TEST(XrayView, AMatrixOfImpossiblePixelsIsRefused) {
     return xray_view_from_matrix(matrix, 1500, 1000, 1000, Beam::kKilovoltage);
   };
   EXPECT_NO_THROW(view_of(right));
-  Eigen::Matrix<double, 3, 4> sheared = right, thin = right, fine = right;
+  Eigen::Matrix<double, 3, 4> sheared = right, thin = right, fine = right, of_meters = right;
   sheared.row(0) += 0.1 * right.row(1);
   thin.row(0) *= 3.0;
   fine.topRows<2>() *= 10.0;
-  for (const auto& matrix : {sheared, thin, fine}) EXPECT_THROW(view_of(matrix), Error);
+  of_meters.leftCols<3>() *= 1000.0;
+  for (const auto& matrix : {sheared, thin, fine, of_meters}) EXPECT_THROW(view_of(matrix), Error);
 }
 
 }  // namespace

@@ -41,9 +41,9 @@ Eigen::Isometry3d written_pose(const Study& study, const SetupResult& result, No
 
 SpatialRegistrationOptions registration_options(RegistrationSource source, const SetupResult& result) {
   if (!result.is_searched)
-    return {.content_label = "SETUP_BY_HAND", .content_description = "SET BY HAND: REVIEW", .source = source};
+    return {.content_label = kLabelOfHand, .content_description = kHandDescription, .source = source};
   if (result.verdict == Verdict::kAccepted) return {.source = source};
-  return {.content_label = "SETUP_REVIEW", .content_description = "NOT ACCEPTED: REVIEW", .source = source};
+  return {.content_label = kLabelOfReview, .content_description = kReviewDescription, .source = source};
 }
 
 }  // namespace
@@ -74,7 +74,7 @@ SetupResult register_loaded(const Study& study, const RegisterOptions& options, 
 
 SetupResult register_study(const RegisterOptions& options, SharedWork& shared, Observer& observer) {
   const Stopwatch total;
-  OutputFolder output(options.output, options.overwrite);
+  OutputFolder output(options.output, options.overwrite, options.study.parts.paths());
   const std::optional<SiteFile> site_file = named_site(options.site);
   const std::optional<SiteRules> site = chosen_site(site_file, options.anatomy);
 

@@ -120,7 +120,7 @@ Start read_start(const std::filesystem::path& file, const Study& study, std::spa
             .sha256 = read.sha256,
             .set_by = json.value("set_by", "")};
   } catch (const Json::exception& error) {
-    throw Error(fmt::format("{}: is no result.json, truth.json or pose set by hand: {}", name, error.what()));
+    throw Error(fmt::format("{}: is no result.json, truth.json or pose set by hand: {}", name, reason_of(error)));
   }
 }
 

@@ -49,7 +49,7 @@ std::vector<BodyTruth> read_body_truths(const std::filesystem::path& path) {
   } catch (const Error& error) {
     throw Error(fmt::format("{}: {}", path.string(), error.what()));
   } catch (const nlohmann::json::exception& error) {
-    throw Error(fmt::format("{}: the motions of its bodies cannot be read: {}", path.string(), error.what()));
+    throw Error(fmt::format("{}: the motions of its bodies cannot be read: {}", path.string(), reason_of(error)));
   }
 }
 

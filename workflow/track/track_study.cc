@@ -28,7 +28,10 @@ class TrackRun {
   }
 
   TrackRecord run() {
-    OutputFolder output(options_.output, options_.overwrite);
+    std::vector<std::filesystem::path> inputs = options_.study.parts.paths();
+    inputs.push_back(options_.follow);
+    inputs.insert(inputs.end(), options_.phases.begin(), options_.phases.end());
+    OutputFolder output(options_.output, options_.overwrite, inputs);
     if (!options_.truth.empty()) record_.truth = read_motion_trace(options_.truth, notes_);
     StudyOptions named = options_.study;
     if (is_filled()) named.parts.images = {options_.follow};
