@@ -18,6 +18,7 @@ namespace {
 // The planned pose and others, each 0.1 mm farther along the room's x.
 std::vector<Eigen::Isometry3d> poses_of(const Study& study, int count) {
   std::vector<Eigen::Isometry3d> poses;
+  poses.reserve(static_cast<std::size_t>(count));
   for (int n = 0; n < count; ++n)
     poses.emplace_back(Eigen::Translation3d(0.1 * n, 0.0, 0.0) * study.planned_room_from_patient);
   return poses;
@@ -29,6 +30,7 @@ void run(const std::filesystem::path& folder, const std::vector<int>& counts) {
   Notes notes;
   const Study study = load_study(request, notes, {});
   std::vector<XrayView> views;
+  views.reserve(study.xrays.size());
   for (const XrayImage& xray : study.xrays) views.push_back(xray.view);
   const auto renderer = make_renderer(RendererKind::kCpu, study.ct->hu, {}, std::vector{Beam::kKilovoltage}, {});
   renderer->render(views, poses_of(study, 1), {});  // the first call fills caches

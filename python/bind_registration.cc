@@ -120,6 +120,49 @@ void bind_result(py::module_& module) {
       .def("__str__", [](const SetupResult& result) { return text_report(report_page(result)); });
 }
 
+void bind_register(py::module_& module) {
+  module.def(
+      "register",
+      [](const LoadedStudy& study, const std::string& preset, const std::string& dof, const std::string& target,
+         const std::string& renderer, std::uint64_t seed, const std::optional<Poses>& start_setup_error, bool search) {
+        RegisterOptions options;
+        options.registration.search.preset = preset;
+        options.registration.search.dof = dof;
+        options.registration.search.seed = seed;
+        options.registration.search.is_searched = search;
+        options.registration.rendering.renderer = renderer;
+        options.target = target;
+        std::optional<Start> start;
+        if (start_setup_error) start = Start{.setup_error = pose_from(*start_setup_error), .set_by = "Python"};
+        return register_for_python(study, std::move(options), std::move(start));
+      },
+      py::arg("study"), py::kw_only(), py::arg("preset") = "setup", py::arg("dof") = "rigid", py::arg("target") = "",
+      py::arg("renderer") = "auto", py::arg("seed") = 1, py::arg("start_setup_error") = py::none(),
+      py::arg("search") = true,
+      "Find the setup error of a study, as isoshift register does. search: false judges the start and searches none.");
+  module.def(
+      "write_spatial_registration",
+      [](const LoadedStudy& loaded, const SetupResult& result, const std::filesystem::path& path, bool for_review,
+         bool accept_unobservable) {
+        check_is_of(result, loaded.study);
+        RegisterOptions options;
+        options.write_reg_for_review = for_review;
+        options.accept_unobservable = accept_unobservable;
+        Notes notes;
+        std::string uid = write_registration(options, loaded.study, result, path, notes);
+        if (uid.empty())
+          throw Error(
+              fmt::format("a result that is {}, or has directions that were not measured, is written only on "
+                          "request: for_review, accept_unobservable; one that is rejected never is",
+                          to_string(result.verdict)));
+        return py::make_tuple(uid, notes.warnings);
+      },
+      py::arg("study"), py::arg("result"), py::arg("path"), py::kw_only(), py::arg("for_review") = false,
+      py::arg("accept_unobservable") = false,
+      "Write the DICOM Spatial Registration object of a result, as the program does. Returns its SOP Instance UID and "
+      "warnings. Raises Error for a result that may not be written.");
+}
+
 }  // namespace
 
 void bind_registration(py::module_& module) {
@@ -175,46 +218,7 @@ void bind_registration(py::module_& module) {
           "Per pose the value, its gradient, shape (6,), and its curvature, shape (6, 6) or (0, 0): by the patient's "
           "translation (mm) and rotation (rad) in the room, about the isocenter.");
   bind_result(module);
-  module.def(
-      "register",
-      [](const LoadedStudy& study, const std::string& preset, const std::string& dof, const std::string& target,
-         const std::string& renderer, std::uint64_t seed, const std::optional<Poses>& start_setup_error, bool search) {
-        RegisterOptions options;
-        options.registration.search.preset = preset;
-        options.registration.search.dof = dof;
-        options.registration.search.seed = seed;
-        options.registration.search.is_searched = search;
-        options.registration.rendering.renderer = renderer;
-        options.target = target;
-        std::optional<Start> start;
-        if (start_setup_error) start = Start{.setup_error = pose_from(*start_setup_error), .set_by = "Python"};
-        return register_for_python(study, std::move(options), std::move(start));
-      },
-      py::arg("study"), py::kw_only(), py::arg("preset") = "setup", py::arg("dof") = "rigid", py::arg("target") = "",
-      py::arg("renderer") = "auto", py::arg("seed") = 1, py::arg("start_setup_error") = py::none(),
-      py::arg("search") = true,
-      "Find the setup error of a study, as isoshift register does. search: false judges the start and searches none.");
-  module.def(
-      "write_spatial_registration",
-      [](const LoadedStudy& loaded, const SetupResult& result, const std::filesystem::path& path, bool for_review,
-         bool accept_unobservable) {
-        check_is_of(result, loaded.study);
-        RegisterOptions options;
-        options.write_reg_for_review = for_review;
-        options.accept_unobservable = accept_unobservable;
-        Notes notes;
-        std::string uid = write_registration(options, loaded.study, result, path, notes);
-        if (uid.empty())
-          throw Error(
-              fmt::format("a result that is {}, or has directions that were not measured, is written only on "
-                          "request: for_review, accept_unobservable; one that is rejected never is",
-                          to_string(result.verdict)));
-        return py::make_tuple(uid, notes.warnings);
-      },
-      py::arg("study"), py::arg("result"), py::arg("path"), py::kw_only(), py::arg("for_review") = false,
-      py::arg("accept_unobservable") = false,
-      "Write the DICOM Spatial Registration object of a result, as the program does. Returns its SOP Instance UID and "
-      "warnings. Raises Error for a result that may not be written.");
+  bind_register(module);
 }
 
 }  // namespace isoshift::python

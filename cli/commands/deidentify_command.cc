@@ -31,7 +31,7 @@ void run_deidentify(const DeidentifyOptions& options, Console& console) {
   // A file that looks like DICOM and is missing in the output would be missed by nobody but its reader.
   if (!files.unreadable.empty()) throw Error(fmt::format("{}", fmt::join(files.unreadable, "\n")));
   for (const std::string& file : files.left_aside) observer.say("left aside: " + file);
-  OutputFolder output(options.output, options.overwrite);
+  OutputFolder output(options.output, options.overwrite, options.study);
   Pseudonyms pseudonyms;
   const DeidentifiedFiles written = deidentify_study(files, output.path(), pseudonyms, observer);
   if (written.count.empty()) throw Error("no CT, X-ray, plan, structure set or registration object is there");

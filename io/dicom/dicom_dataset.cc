@@ -321,11 +321,10 @@ void DicomFile::write(const std::filesystem::path& path) {
   DcmOutputBufferStream stream(buffer.data(), static_cast<offile_off_t>(buffer.size()));
   std::string bytes;
   OFCondition written = EC_StreamNotifyClient;
-  const E_TransferSyntax syntax = is_compressed() ? file_->getDataset()->getOriginalXfer() : EXS_LittleEndianExplicit;
   file_->transferInit();
   while (written == EC_StreamNotifyClient) {
-    written = file_->write(stream, syntax, EET_ExplicitLength, nullptr, EGL_recalcGL, EPD_noChange, 0, 0, 0,
-                           EWM_createNewMeta);
+    written = file_->write(stream, EXS_LittleEndianExplicit, EET_ExplicitLength, nullptr, EGL_recalcGL, EPD_noChange, 0,
+                           0, 0, EWM_createNewMeta);
     void* filled = nullptr;
     offile_off_t size = 0;
     stream.flushBuffer(filled, size);
@@ -333,8 +332,6 @@ void DicomFile::write(const std::filesystem::path& path) {
   }
   file_->transferEnd();
   check(written, where, "cannot be written");
-  constexpr std::size_t kPreamble = 128;
-  std::fill_n(bytes.begin(), kPreamble, '\0');  // of the file that was read: it may hold anything (PS3.10 7.1)
   write_text(path, bytes);
   flush(path);
 }

@@ -91,8 +91,7 @@ class DicomFile {
   DicomItem dataset() const;
   bool is_compressed() const;  // the pixels: in no native transfer syntax (PS3.5 A.4)
 
-  // Explicit little endian, or as they are if the pixels are compressed; flushed to the disk. What stood before the
-  // dataset in the file that was read is not written. The file must not exist.
+  // Explicit little endian, flushed to the disk. The file must not exist.
   void write(const std::filesystem::path& path);
 
  private:

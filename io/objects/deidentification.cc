@@ -5,24 +5,38 @@
 
 #include <algorithm>
 #include <array>
+#include <regex>
 #include <span>
 #include <string>
 #include <string_view>
 
+#include "base/error.h"
 #include "base/version.h"
+#include "io/dicom/decode.h"
+#include "io/objects/spatial_registration.h"
 
 namespace isoshift {
 namespace {
 
 // What is known of an attribute; the VR decides about all others (action_for).
-enum class Action { kKeep, kRemove, kEmpty, kReplaceText, kReplaceId, kReplaceUids, kMoveDates, kLookInside };
+enum class Action {
+  kKeep,
+  kRemove,
+  kEmpty,
+  kReplaceName,
+  kReplaceId,
+  kReplaceBirthDate,
+  kReplaceText,
+  kReplaceUids,
+  kMoveDates,
+  kLookInside
+};
 
 struct Replaced {
   DcmTagKey tag;
   const char* kind;  // of the pseudonym: short, a label has at most 16 characters
 };
 const Replaced kReplacedTexts[] = {
-    {DCM_PatientName, "Patient"},
     {DCM_StationName, "Station"},
     {DCM_DeviceSerialNumber, "Device"},
     {DCM_DetectorID, "Detector"},
@@ -38,10 +52,10 @@ const Replaced kReplacedTexts[] = {
 };
 
 // Attributes that an object must have, if only empty (type 2).
-const DcmTagKey kEmptied[] = {DCM_PatientBirthDate,           DCM_PatientSex,        DCM_AccessionNumber,
-                              DCM_ReferringPhysicianName,     DCM_StudyID,           DCM_OperatorsName,
-                              DCM_PositionReferenceIndicator, DCM_ROIInterpreter,    DCM_ReviewerName,
-                              DCM_ContentCreatorName,         DCM_ContentDescription};
+const DcmTagKey kEmptied[] = {DCM_PatientSex,        DCM_AccessionNumber, DCM_ReferringPhysicianName,
+                              DCM_StudyID,           DCM_OperatorsName,   DCM_PositionReferenceIndicator,
+                              DCM_ROIInterpreter,    DCM_ReviewerName,    DCM_ContentCreatorName,
+                              DCM_ContentDescription};
 
 const DcmTagKey kKeptTexts[] = {DCM_SpecificCharacterSet,
                                 DCM_Manufacturer,
@@ -95,10 +109,16 @@ bool is_well_known_frame(std::string_view uid) {
   return uid == "1.2.840.10008.1.4.3.1" || uid == "1.2.840.10008.1.4.3.2" || uid == "1.2.840.10008.1.4.3.3";
 }
 
+// The standard's own UIDs of classes and codes, and well-known frames.
+bool is_kept(const DcmTagKey& tag, std::string_view uid) {
+  const bool is_standard = uid.starts_with("1.2.840.10008.") && uid.find_first_not_of("0123456789.") == uid.npos;
+  return is_well_known_frame(uid) || (is_standard && std::ranges::count(kKeptUids, tag) > 0);
+}
+
 // Beside them all groups are removed, that of the file meta information too, which is made anew.
 constexpr std::array<Uint16, 12> kKeptGroups = {0x0008, 0x0018, 0x0020, 0x0028, 0x0070, 0x3002,
                                                 0x3004, 0x3006, 0x3008, 0x300A, 0x300C, 0x300E};
-const DcmTagKey kKeptOfOtherGroups[] = {DCM_PixelData, DCM_PurposeOfReferenceCodeSequence, DCM_ConceptNameCodeSequence};
+const DcmTagKey kKeptOfOtherGroups[] = {DCM_PurposeOfReferenceCodeSequence, DCM_ConceptNameCodeSequence};
 
 bool is_among(std::span<const DcmTagKey> tags, const DcmTagKey& tag) { return std::ranges::count(tags, tag) > 0; }
 
@@ -116,17 +136,18 @@ bool has_its_vr(const DcmTagKey& tag, DcmEVR found) {
 
 Action action_for(const DcmTagKey& tag, DcmEVR vr) {
   if (kind_of(tag) != nullptr) return Action::kReplaceText;
+  if (tag == DCM_PatientName) return Action::kReplaceName;
   if (tag == DCM_PatientID) return Action::kReplaceId;
+  if (tag == DCM_PatientBirthDate) return Action::kReplaceBirthDate;
   if (is_among(kEmptied, tag)) return Action::kEmpty;
   const bool is_kept_group = std::ranges::count(kKeptGroups, tag.getGroup()) > 0;
   const bool is_known = DcmTag(tag).error().good();
   if (!is_known || (!is_kept_group && !is_among(kKeptOfOtherGroups, tag)) || is_among(kRemoved, tag))
     return Action::kRemove;
-  if (tag == DCM_PixelData) return Action::kKeep;
   if (!has_its_vr(tag, vr)) return Action::kRemove;
   switch (vr) {
     case EVR_SQ: return Action::kLookInside;
-    case EVR_UI: return is_among(kKeptUids, tag) ? Action::kKeep : Action::kReplaceUids;
+    case EVR_UI: return Action::kReplaceUids;
     case EVR_DA:
     case EVR_DT: return Action::kMoveDates;
     case EVR_CS:
@@ -153,9 +174,11 @@ Action action_for(const DcmTagKey& tag, DcmEVR vr) {
 bool is_of_its_vr(const DicomItem& item, const DcmTagKey& tag, DcmEVR vr) {
   std::string_view allowed;
   if (vr == EVR_DS || vr == EVR_IS) allowed = "0123456789+-.eE ";
-  if (vr == EVR_UI) allowed = "0123456789.";
-  if (vr == EVR_TM) allowed = "0123456789.: ";
   if (vr == EVR_CS) allowed = "ABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_ ";
+  static const std::regex time("(([01][0-9]|2[0-3])(:?[0-5][0-9](:?([0-5][0-9]|60)(\\.[0-9]{1,6})?)?)?)?");
+  if (vr == EVR_TM)
+    return std::ranges::all_of(item.texts(tag),
+                               [&](const std::string& value) { return std::regex_match(value, time); });
   return allowed.empty() || std::ranges::all_of(item.texts(tag), [&](const std::string& value) {
            return value.find_first_not_of(allowed) == std::string::npos;
          });
@@ -170,9 +193,20 @@ void replace(DicomItem& item, const DcmTagKey& tag, const auto& by) {
   item.put(tag, joined);
 }
 
+// What isoshift says of a registration that is not accepted must not be lost.
+bool is_ours(const DicomItem& item, const DcmTagKey& tag) {
+  if (tag != DCM_ContentLabel && tag != DCM_ContentDescription) return false;
+  const std::string says = item.text(tag).value_or("");
+  return says == kLabelOfAccepted || says == kLabelOfReview || says == kLabelOfHand || says == kReviewDescription ||
+         says == kHandDescription;
+}
+
 void replace_in(DicomItem& item, Pseudonyms& pseudonyms) {
   const std::string issuer = item.text(DCM_IssuerOfPatientID).value_or("");
-  for (const auto& [tag, vr] : item.elements()) {
+  for (const auto& element : item.elements()) {
+    const DcmTagKey tag = element.first;
+    const DcmEVR vr = element.second;
+    if (is_ours(item, tag)) continue;
     switch (action_for(tag, vr)) {
       case Action::kKeep:
         if (!is_of_its_vr(item, tag, vr)) item.erase(tag);
@@ -182,12 +216,18 @@ void replace_in(DicomItem& item, Pseudonyms& pseudonyms) {
       case Action::kReplaceText:
         replace(item, tag, [&](const std::string& value) { return pseudonyms.text(kind_of(tag), value); });
         break;
+      case Action::kReplaceName:
+        replace(item, tag, [&](const std::string& value) { return pseudonyms.patient_name(value); });
+        break;
+      case Action::kReplaceBirthDate:
+        replace(item, tag, [&](const std::string& value) { return pseudonyms.birth_date(value); });
+        break;
       case Action::kReplaceId:
         replace(item, tag, [&](const std::string& value) { return pseudonyms.patient_id(value, issuer); });
         break;
       case Action::kReplaceUids:
         replace(item, tag,
-                [&](const std::string& value) { return is_well_known_frame(value) ? value : pseudonyms.uid(value); });
+                [&](const std::string& value) { return is_kept(tag, value) ? value : pseudonyms.uid(value); });
         break;
       case Action::kMoveDates:
         replace(item, tag, [&](const std::string& value) { return pseudonyms.date(value); });
@@ -199,6 +239,30 @@ void replace_in(DicomItem& item, Pseudonyms& pseudonyms) {
   }
 }
 
+void copy(const DcmTagKey& tag, const DicomItem& from, DicomItem to) {
+  DcmElement* copied = nullptr;
+  if (from.dcmtk().findAndGetElement(tag, copied, OFFalse, OFTrue).bad() || to.dcmtk().insert(copied).bad())
+    throw Error(fmt::format("{}: {} cannot be copied", from.where(), described(tag)));
+}
+
+// The pixels as their format has them, and nothing else: not what unused bits hold, nor comments of compressed streams.
+void put_pixels_alone(const DicomFile& file, DicomItem to) {
+  const PixelFormat format = pixel_format(file.dataset());
+  std::vector<std::uint16_t> words;
+  std::string bytes;
+  for (int frame = 0; frame < format.frames; ++frame)
+    for (const std::int32_t value : decode_frame(file, format, frame)) {
+      if (format.bits_allocated == 16)
+        words.push_back(static_cast<std::uint16_t>(value));
+      else
+        bytes.push_back(static_cast<char>(value));
+    }
+  if (format.bits_allocated == 16)
+    to.put_pixels(words);
+  else
+    to.put_bytes(DCM_PixelData, bytes);
+}
+
 void put_code(DicomItem item, const char* value, const char* meaning) {
   item.put(DCM_CodeValue, value);
   item.put(DCM_CodingSchemeDesignator, "DCM");
@@ -207,8 +271,14 @@ void put_code(DicomItem item, const char* value, const char* meaning) {
 
 }  // namespace
 
-void deidentify(DicomItem dataset, Pseudonyms& pseudonyms) {
+DicomFile deidentified(const DicomFile& file, Pseudonyms& pseudonyms) {
+  DicomFile safe;
+  const DicomItem from = file.dataset();
+  for (const auto& element : from.elements())
+    if (element.first != DCM_PixelData) copy(element.first, from, safe.dataset());
+  DicomItem dataset = safe.dataset();
   replace_in(dataset, pseudonyms);
+  if (from.has_value(DCM_PixelData)) put_pixels_alone(file, dataset);
   // PS3.15 E.1.1, and CID 7050 of PS3.16.
   dataset.put(DCM_PatientIdentityRemoved, "YES");
   dataset.put(DCM_DeidentificationMethod, fmt::format("isoshift {}: PS3.15 Annex E, and stricter", kVersion));
@@ -217,6 +287,7 @@ void deidentify(DicomItem dataset, Pseudonyms& pseudonyms) {
   put_code(dataset.append_item(DCM_DeidentificationMethodCodeSequence), "113107",
            "Retain Longitudinal Temporal Information Modified Dates Option");
   dataset.put(DCM_LongitudinalTemporalInformationModified, "MODIFIED");
+  return safe;
 }
 
 BurntIn burnt_in(const DicomItem& dataset) {

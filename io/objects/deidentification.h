@@ -12,7 +12,9 @@ namespace isoshift {
 // whole groups about patients, visits and procedures, overlays, curves, and all text but that of device models,
 // reconstruction kernels and codes; labels, names of machines and of structures become pseudonyms; UIDs but those of
 // classes and of well-known frames of reference are replaced, and dates moved.
-void deidentify(DicomItem dataset, Pseudonyms& pseudonyms);
+// The pixels are written anew, too, uncompressed and without what their unused bits or a compressed stream hold beside
+// them. Throws Error as decode_frame() does.
+DicomFile deidentified(const DicomFile& file, Pseudonyms& pseudonyms);
 
 // Whether text may be burnt into the pixels of an image (BurnedInAnnotation): no pixel is changed here.
 enum class BurntIn { kNo, kYes, kUnknown };

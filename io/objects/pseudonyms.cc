@@ -6,6 +6,7 @@
 #include <cctype>
 #include <chrono>
 #include <random>
+#include <regex>
 #include <vector>
 
 #include "io/dicom/dicom_dataset.h"
@@ -18,6 +19,11 @@ bool is_of_word(char c) { return std::isalnum(static_cast<unsigned char>(c)) != 
 std::string in_small_letters(std::string text) {
   std::ranges::transform(text, text.begin(), [](unsigned char c) { return std::tolower(c); });
   return text;
+}
+
+std::string text_of(std::chrono::year_month_day day, std::string_view separator) {
+  return fmt::format("{:04}{}{:02}{}{:02}", static_cast<int>(day.year()), separator, static_cast<unsigned>(day.month()),
+                     separator, static_cast<unsigned>(day.day()));
 }
 
 // `original` where no letter or digit goes on before or behind it.
@@ -47,17 +53,35 @@ std::string Pseudonyms::uid(const std::string& original) {
 
 std::string Pseudonyms::text(std::string_view kind, const std::string& original) {
   auto& of_kind = texts_[std::string(kind)];
-  const std::size_t number = of_kind.size() + 1;
-  std::string& known = of_kind[in_small_letters(original)];
-  if (known.empty()) known = fmt::format("{} {}", kind, number);
+  std::string& known = of_kind[original];
+  if (known.empty()) known = fmt::format("{} {}", kind, of_kind.size());
+  stands_for(original, known);
+  return known;
+}
+
+std::string Pseudonyms::patient_name(const std::string& original) {
+  const std::string known = text("Patient", in_small_letters(original));
   stands_for(original, known);
   return known;
 }
 
 std::string Pseudonyms::patient_id(const std::string& original, const std::string& issuer) {
-  std::string known = text("ANON", original + "\\" + issuer);
+  auto& by_issuer = ids_[original];
+  auto same = by_issuer.find(issuer);
+  if (same == by_issuer.end() && issuer.empty()) same = by_issuer.begin();
+  if (same == by_issuer.end() && by_issuer.size() == 1) same = by_issuer.find("");
+  const std::string known = same == by_issuer.end() ? fmt::format("ANON {}", ++patients_) : same->second;
+  by_issuer.emplace(issuer, known);
   stands_for(original, known);
   stands_for(issuer, known);
+  return known;
+}
+
+std::string Pseudonyms::birth_date(const std::string& original) {
+  constexpr std::chrono::year_month_day kFirst(std::chrono::year(1850) / 1 / 1);
+  std::string& known = birth_dates_[original];
+  if (known.empty()) known = text_of(std::chrono::sys_days(kFirst) + std::chrono::days(birth_dates_.size() - 1), "");
+  stands_for(original, known);
   return known;
 }
 
@@ -78,19 +102,20 @@ std::string Pseudonyms::date(const std::string& original) const {
   const std::chrono::year_month_day found(year(std::stoi(digits.substr(0, 4))),
                                           month(static_cast<unsigned>(std::stoi(digits.substr(4, 2)))),
                                           day(static_cast<unsigned>(std::stoi(digits.substr(6, 2)))));
-  if (!found.ok()) return "";
-  const std::chrono::year_month_day moved(std::chrono::sys_days(found) - std::chrono::days(days_));
-  return fmt::format("{:04}{}{:02}{}{:02}{}", static_cast<int>(moved.year()), separator,
-                     static_cast<unsigned>(moved.month()), separator, static_cast<unsigned>(moved.day()),
-                     original.substr(end));
+  static const std::regex time("([T ]?[0-9]{2}(:?[0-9]{2}(:?[0-9]{2}(\\.[0-9]{1,6})?)?)?)?([+-][0-9]{2}:?[0-9]{2})?");
+  if (!found.ok() || !std::regex_match(original.begin() + static_cast<std::ptrdiff_t>(end), original.end(), time))
+    return "";
+  return text_of(std::chrono::sys_days(found) - std::chrono::days(days_), separator) + original.substr(end);
 }
 
 std::string Pseudonyms::in(std::string sentence) const {
+  if (const auto whole = originals_.find(sentence); whole != originals_.end()) return whole->second;
   // The longest first: one may be part of another.
+  constexpr std::size_t kShortest = 3;
   std::vector<std::pair<std::string_view, std::string_view>> all(originals_.begin(), originals_.end());
-  std::ranges::stable_sort(all, std::greater(), [](const auto& pair) { return pair.first.size(); });
+  std::ranges::sort(all, std::greater(), [](const auto& pair) { return std::pair(pair.first.size(), pair.first); });
   for (const auto& [original, by] : all)
-    if (!original.empty()) replace_word(sentence, original, by);
+    if (original.size() >= kShortest) replace_word(sentence, original, by);
   return sentence;
 }
 

@@ -29,9 +29,15 @@ inline constexpr const char* kIecFixedFrameUid = "1.2.840.10008.1.4.3.1";
 // Which frame the registration takes to the CT: the treatment frame, or the room's own axes.
 enum class RegistrationSource { kTreatment, kIecFixed };
 
+// What ContentLabel and ContentDescription say of an accepted pose, of one that a person must review, and of one that
+// was set by hand.
+inline constexpr const char *kLabelOfAccepted = "SETUP_2D3D", *kLabelOfReview = "SETUP_REVIEW",
+                            *kLabelOfHand = "SETUP_BY_HAND", *kReviewDescription = "NOT ACCEPTED: REVIEW",
+                            *kHandDescription = "SET BY HAND: REVIEW";
+
 struct SpatialRegistrationOptions {
-  std::string content_label = "SETUP_2D3D";  // CS
-  std::string content_description;           // LO
+  std::string content_label = kLabelOfAccepted;  // CS
+  std::string content_description;               // LO
   RegistrationSource source = RegistrationSource::kTreatment;
 };
 

@@ -139,6 +139,34 @@ TEST_F(BundleCommandTest, TheResultIsFoundAgainFromIt) {
   EXPECT_EQ(again["views"][0]["label"], bundled["views"][0]["label"]);
 }
 
+TEST_F(BundleCommandTest, AnotherCtOrObjectIsRefused) {
+  const auto refused = [&] {
+    const CommandOutcome outcome =
+        run_command({"bundle", path("Featherstone"), study_.path().string(), "-o", path("bundle")});
+    EXPECT_EQ(outcome.exit_status, 1);
+    EXPECT_FALSE(std::filesystem::exists(path("bundle")));
+    return outcome.err;
+  };
+  const std::filesystem::path object = path("Featherstone") + "/spatial_registration.dcm";
+  std::filesystem::remove(object);
+  std::filesystem::copy_file(testdata("registrations/HFS/spatial_registration.dcm"), object);
+  EXPECT_THAT(refused(), HasSubstr("is not the registration object of the result"));
+  for (int k = 0; k < 36; ++k)
+    edit(study_.ct_slice(k), [](DicomItem dataset) { dataset.put(DCM_RescaleIntercept, -1000.0); });
+  EXPECT_THAT(refused(), HasSubstr("the CT is not that which was registered: its SHA-256 is another"));
+}
+
+TEST_F(BundleCommandTest, WordsOfPeopleAreLeftOut) {
+  edit(study_.image(1), [](DicomItem dataset) { dataset.put(DCM_AcquisitionTime, "113000"); });
+  ASSERT_NE(run_command({"register", study_.path().string(), "-o", path("allowed"), "--allow",
+                         "time-span=Featherstone coughed"})
+                .exit_status,
+            1);
+  ASSERT_EQ(run_command({"bundle", path("allowed"), study_.path().string(), "-o", path("bundle")}).exit_status, 0);
+  expect_tells_nothing(path("bundle"));
+  EXPECT_THAT(bytes_of(path("bundle/result/result.json")), HasSubstr("(allowed by time-span)"));
+}
+
 TEST_F(BundleCommandTest, AnotherStudyIsRefused) {
   edit(study_.image(1), [](DicomItem dataset) { dataset.put(DCM_GantryAngle, 91.0); });
   const CommandOutcome changed =

@@ -11,6 +11,8 @@
 #include "base/sha256.h"
 #include "base/text_file.h"
 #include "base/version.h"
+#include "io/dicom/ct_series.h"
+#include "io/objects/spatial_registration.h"
 #include "io/report/result_folder.h"
 #include "workflow/deidentify/deidentified_result.h"
 
@@ -21,6 +23,13 @@ namespace {
 void check_is_the_same(const std::filesystem::path& file, const std::string& sha256) {
   if (!sha256.empty() && sha256_of_file(file) != sha256)
     throw Error(fmt::format("{}: is not the file that was registered: its SHA-256 is another", file.string()));
+}
+
+void check_is_the_ct(const std::vector<std::filesystem::path>& files, const std::string& sha256) {
+  Notes none;
+  if (sha256.empty() || read_ct_series(files, {{"gaps", "as registered"}}, none, {}).sha256 == sha256) return;
+  throw Error(fmt::format("{}: the CT is not that which was registered: its SHA-256 is another",
+                          files.front().parent_path().string()));
 }
 
 void expect_found(bool is_found, std::string_view what, const std::string& uid) {
@@ -46,6 +55,7 @@ StudyFiles named_files(const SetupResult& result, const StudyFiles& study) {
   for (const StudyFiles::Ct& ct : study.cts)
     if (ct.series_instance_uid == result.ct_series_uid) files.cts.push_back(ct);
   expect_found(!files.cts.empty(), "CT", result.ct_series_uid);
+  check_is_the_ct(files.cts.front().files, result.ct_sha256);
   files.images = images_of(result, study.images);
   files.other_xrays = images_of(result, study.other_xrays);
   for (const SetupResult::View& view : result.views) {
@@ -109,9 +119,14 @@ std::string read_me(const SetupResult& result) {
 DeidentifiedFiles write_bundle(const BundleOptions& options, Observer& observer) {
   SetupResult result = read_result(options.result);
   StudyFiles files = registered_files(result, scan_study(options.study));
-  if (const auto registration = options.result / kRegistrationFile; std::filesystem::exists(registration))
+  if (const auto registration = options.result / kRegistrationFile; std::filesystem::exists(registration)) {
+    if (read_spatial_registration(registration).sop_instance_uid != result.spatial_registration_uid)
+      throw Error(fmt::format("{}: is not the registration object of the result", registration.string()));
     files.registrations.push_back(registration);
-  OutputFolder output(options.output, options.overwrite);
+  }
+  std::vector<std::filesystem::path> inputs = options.study;
+  inputs.push_back(options.result);
+  OutputFolder output(options.output, options.overwrite, inputs);
   Pseudonyms pseudonyms;
   const DeidentifiedFiles written = deidentify_study(files, output.path() / "study", pseudonyms, observer);
   result = deidentified(std::move(result), pseudonyms);

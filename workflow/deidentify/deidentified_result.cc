@@ -1,15 +1,22 @@
 #include "workflow/deidentify/deidentified_result.h"
 
+#include <algorithm>
 #include <string>
 #include <vector>
 
 namespace isoshift {
 namespace {
 
+// "... (allowed by KEY: REASON)": why a person allowed what a check forbids, in words of that person.
+std::string without_reason(const std::string& message) {
+  const std::size_t begin = message.find("(allowed by "), end = message.find(": ", std::min(begin, message.size()));
+  return end == std::string::npos ? message : message.substr(0, end) + ")";
+}
+
 // Nobody knows what the name of a folder tells.
 void replace_in(std::vector<std::string>& messages, const Pseudonyms& pseudonyms) {
   for (std::string& message : messages) {
-    message = pseudonyms.in(message);
+    message = without_reason(pseudonyms.in(message));
     if (message.find('/') != std::string::npos || message.find(".dcm") != std::string::npos)
       message = "a message that names a file";
   }
@@ -25,13 +32,14 @@ void replace_uid(std::string& uid, Pseudonyms& pseudonyms) {
 
 Identity deidentified(const Identity& identity, Pseudonyms& pseudonyms) {
   Identity replaced{.character_set = identity.character_set,
-                    .patient_name = identity.patient_name,
                     .study_instance_uid = identity.study_instance_uid,
                     .study_date = pseudonyms.date(identity.study_date),
                     .study_time = identity.study_time};
   if (!identity.patient_id.empty())
     replaced.patient_id = pseudonyms.patient_id(identity.patient_id, identity.patient_id_issuer);
-  replace_name(replaced.patient_name, "Patient", pseudonyms);
+  if (!identity.patient_name.empty()) replaced.patient_name = pseudonyms.patient_name(identity.patient_name);
+  if (!identity.patient_birth_date.empty())
+    replaced.patient_birth_date = pseudonyms.birth_date(identity.patient_birth_date);
   replace_uid(replaced.study_instance_uid, pseudonyms);
   return replaced;
 }

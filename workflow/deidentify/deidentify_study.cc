@@ -36,7 +36,7 @@ DeidentifiedFiles deidentify_study(const StudyFiles& files, const std::filesyste
     if (sources.empty()) continue;
     std::filesystem::create_directories(folder / name);
     for (const std::filesystem::path& source : sources) {
-      DicomFile file = DicomFile::read(source, DicomFile::Extent::kWhole);
+      const DicomFile file = DicomFile::read(source, DicomFile::Extent::kWhole);
       const DicomItem dataset = file.dataset();
       const std::filesystem::path target = fmt::format("{}/{:05}.dcm", name, ++written.count[name]);
       if (dataset.has_value(DCM_PixelData)) {
@@ -44,8 +44,7 @@ DeidentifiedFiles deidentify_study(const StudyFiles& files, const std::filesyste
         if (says == BurntIn::kYes) written.burnt_in.push_back(target);
         if (says == BurntIn::kUnknown) ++written.may_be_burnt_in[name];
       }
-      deidentify(dataset, pseudonyms);
-      file.write(folder / target);
+      deidentified(file, pseudonyms).write(folder / target);
       pseudonyms.stands_for(source.string(), target.string());
       pseudonyms.stands_for(source.filename().string(), target.filename().string());
       pseudonyms.stands_for(source.stem().string(), target.stem().string());
@@ -57,6 +56,7 @@ DeidentifiedFiles deidentify_study(const StudyFiles& files, const std::filesyste
 
 std::vector<std::string> pixel_warnings(const DeidentifiedFiles& written) {
   std::vector<std::string> warnings;
+  warnings.reserve(written.burnt_in.size());
   for (const std::filesystem::path& file : written.burnt_in)
     warnings.push_back(
         fmt::format("{}: text is burnt into its pixels ({} is YES)", file.string(), described(DCM_BurnedInAnnotation)));

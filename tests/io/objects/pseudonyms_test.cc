@@ -12,10 +12,17 @@ TEST(Pseudonyms, AreTheSameForTheSame) {
   EXPECT_NE(uid, "1.2.3");
   EXPECT_EQ(pseudonyms.uid("1.2.3"), uid);
   EXPECT_NE(pseudonyms.uid("1.2.4"), uid);
-  EXPECT_EQ(pseudonyms.text("Patient", "Smith^John"), "Patient 1");
-  EXPECT_EQ(pseudonyms.text("Patient", "SMITH^JOHN"), "Patient 1");
-  EXPECT_EQ(pseudonyms.text("Patient", "Smith^Jane"), "Patient 2");
-  EXPECT_EQ(pseudonyms.text("Machine", "Smith^John"), "Machine 1");
+  EXPECT_EQ(pseudonyms.text("Machine", "TB1"), "Machine 1");
+  EXPECT_EQ(pseudonyms.text("Machine", "TB2"), "Machine 2");
+  EXPECT_EQ(pseudonyms.text("Machine", "TB1"), "Machine 1");
+  EXPECT_EQ(pseudonyms.text("Structure", "PTV"), "Structure 1");
+  EXPECT_EQ(pseudonyms.text("Structure", "ptv"), "Structure 2");
+  EXPECT_EQ(pseudonyms.patient_name("Smith^John"), "Patient 1");
+  EXPECT_EQ(pseudonyms.patient_name("SMITH^JOHN"), "Patient 1");
+  EXPECT_EQ(pseudonyms.patient_name("Smith^Jane"), "Patient 2");
+  EXPECT_EQ(pseudonyms.birth_date("19570301"), "18500101");
+  EXPECT_EQ(pseudonyms.birth_date("19570302"), "18500102");
+  EXPECT_EQ(pseudonyms.birth_date("19570301"), "18500101");
   EXPECT_NE(Pseudonyms().uid("1.2.3"), uid);
 }
 
@@ -24,7 +31,11 @@ TEST(Pseudonyms, AnIdOfTwoIssuersIsOfTwoPatients) {
   EXPECT_EQ(pseudonyms.patient_id("7", "St. Elsewhere"), "ANON 1");
   EXPECT_EQ(pseudonyms.patient_id("7", "Princeton"), "ANON 2");
   EXPECT_EQ(pseudonyms.patient_id("7", "St. Elsewhere"), "ANON 1");
-  EXPECT_EQ(pseudonyms.in("7 (Princeton)"), "ANON 1 (ANON 2)");
+  EXPECT_EQ(pseudonyms.patient_id("8", ""), "ANON 3");
+  EXPECT_EQ(pseudonyms.patient_id("8", "Princeton"), "ANON 3");
+  EXPECT_EQ(pseudonyms.patient_id("8", "St. Elsewhere"), "ANON 4");
+  EXPECT_EQ(pseudonyms.patient_id("9", "Princeton"), "ANON 5");
+  EXPECT_EQ(pseudonyms.patient_id("9", ""), "ANON 5");
 }
 
 TEST(Pseudonyms, DatesMoveTogetherAndKeepTheirForm) {
@@ -42,13 +53,15 @@ TEST(Pseudonyms, DatesMoveTogetherAndKeepTheirForm) {
 
 TEST(Pseudonyms, ReplaceWordsOfSentences) {
   Pseudonyms pseudonyms;
-  pseudonyms.text("Image", "KV");
-  pseudonyms.text("Image", "KV_G090");
+  pseudonyms.text("Image", "KV1");
+  pseudonyms.text("Image", "KV1_G090");
+  pseudonyms.text("Image", "0");
   pseudonyms.uid("1.2.3");
   pseudonyms.stands_for("exported/Smith/a.dcm", "CT/00001.dcm");
-  EXPECT_EQ(pseudonyms.in("exported/Smith/a.dcm: KV_G090, KV and kV 1.2.3"),
-            "CT/00001.dcm: Image 2, Image 1 and kV " + pseudonyms.uid("1.2.3"));
-  EXPECT_EQ(pseudonyms.in("MKV"), "MKV");
+  EXPECT_EQ(pseudonyms.in("exported/Smith/a.dcm: KV1_G090, KV1 and kv1 at 0 1.2.3"),
+            "CT/00001.dcm: Image 2, Image 1 and kv1 at 0 " + pseudonyms.uid("1.2.3"));
+  EXPECT_EQ(pseudonyms.in("MKV1"), "MKV1");
+  EXPECT_EQ(pseudonyms.in("0"), "Image 3");
 }
 
 }  // namespace
