@@ -43,6 +43,7 @@ void run_track(TrackFlags& flags, Console& console) {
 
 }  // namespace
 
+// NOLINTNEXTLINE(readability-function-size): long because the command has many flags, one after the other
 void add_track_command(CLI::App& app, Console& console, int&) {
   auto flags = std::make_shared<TrackFlags>();
   TrackOptions& options = flags->track;

@@ -239,7 +239,7 @@ void replace_in(DicomItem& item, Pseudonyms& pseudonyms) {
   }
 }
 
-void copy(const DcmTagKey& tag, const DicomItem& from, DicomItem to) {
+void copy(const DcmTagKey& tag, const DicomItem& from, const DicomItem& to) {
   DcmElement* copied = nullptr;
   if (from.dcmtk().findAndGetElement(tag, copied, OFFalse, OFTrue).bad() || to.dcmtk().insert(copied).bad())
     throw Error(fmt::format("{}: {} cannot be copied", from.where(), described(tag)));

@@ -244,9 +244,8 @@ void take_named_structures(const fs::path& named, const std::vector<StudyFiles::
       notes.left_aside.push_back(fmt::format("{}: an RT Structure Set that was not named", other.file.string()));
 }
 
-// The parts among scanned files, of which a person may have named some.
-StudyParts chosen(StudyFiles files, std::vector<StudyFiles::Plan> other_plans, const StudyParts& named,
-                  bool takes_other_xrays, Notes& notes) {
+// X-rays that are not RT Images are X-rays like others where a machine profile supplies their geometry.
+void take_other_xrays(StudyFiles& files, bool takes_other_xrays) {
   for (const StudyFiles::Image& xray : files.other_xrays) {
     if (takes_other_xrays)
       files.images.push_back(xray);
@@ -255,6 +254,9 @@ StudyParts chosen(StudyFiles files, std::vector<StudyFiles::Plan> other_plans, c
           fmt::format("{}: an X-ray that is not an RT Image; a machine profile can supply its geometry: {}",
                       xray.file.string(), option("machine", "FILE")));
   }
+}
+
+void check_is_there(const StudyFiles& files, const StudyParts& named) {
   if (files.cts.empty())
     throw Error(
         fmt::format("no CT series found ({}).\n"
@@ -266,7 +268,33 @@ StudyParts chosen(StudyFiles files, std::vector<StudyFiles::Plan> other_plans, c
                                                       : "For X-rays of other classes their geometry is needed: " +
                                                             option("machine", "FILE")));
   if (!named.plan.empty() && files.plans.empty()) throw Error(fmt::format("{}: holds no RT Plan", named.plan.string()));
+}
 
+void choose_images(const std::vector<StudyFiles::Image>& all, const StudyFiles::Plan* plan,
+                   const std::vector<StudyFiles::Plan>& other_plans, bool are_named, StudyParts& parts, Notes& notes) {
+  // An image of another plan that lies here too belongs to that one. So may one of a plan that is not here, where two
+  // or more images are of the plan; else it is a matter for checks.
+  const auto of_plan =
+      plan == nullptr ? 0 : std::ranges::count(all, plan->sop_instance_uid, &StudyFiles::Image::plan_uid);
+  for (const StudyFiles::Image& image : all) {
+    const bool is_of_other =
+        std::ranges::find(other_plans, image.plan_uid, &StudyFiles::Plan::sop_instance_uid) != other_plans.end();
+    const bool is_stray = of_plan >= 2 && !image.plan_uid.empty() && image.plan_uid != plan->sop_instance_uid;
+    if (is_of_other && !are_named)
+      notes.left_aside.push_back(fmt::format("{}: an X-ray of another plan", image.file.string()));
+    else if (is_stray && !are_named)
+      notes.left_aside.push_back(
+          fmt::format("{}: an X-ray of a plan that is not here ({})", image.file.string(), image.plan_uid));
+    else
+      parts.images.push_back(image.file);
+  }
+}
+
+// The parts among scanned files, of which a person may have named some.
+StudyParts chosen(StudyFiles files, std::vector<StudyFiles::Plan> other_plans, const StudyParts& named,
+                  bool takes_other_xrays, Notes& notes) {
+  take_other_xrays(files, takes_other_xrays);
+  check_is_there(files, named);
   StudyParts parts;
   notes.left_aside = files.left_aside;
   for (const fs::path& registration : files.registrations)
@@ -294,22 +322,7 @@ StudyParts chosen(StudyFiles files, std::vector<StudyFiles::Plan> other_plans, c
     take_named_structures(named.structures, files.structures, parts, notes);
   else
     choose_structures(files.structures, plan, ct, parts, notes);
-  // An image of another plan that lies here too belongs to that one. So may one of a plan that is not here, where two
-  // or more images are of the plan; else it is a matter for checks.
-  const auto of_plan =
-      plan == nullptr ? 0 : std::ranges::count(files.images, plan->sop_instance_uid, &StudyFiles::Image::plan_uid);
-  for (const StudyFiles::Image& image : files.images) {
-    const bool is_of_other =
-        std::ranges::find(other_plans, image.plan_uid, &StudyFiles::Plan::sop_instance_uid) != other_plans.end();
-    const bool is_stray = of_plan >= 2 && !image.plan_uid.empty() && image.plan_uid != plan->sop_instance_uid;
-    if (is_of_other && named.images.empty())
-      notes.left_aside.push_back(fmt::format("{}: an X-ray of another plan", image.file.string()));
-    else if (is_stray && named.images.empty())
-      notes.left_aside.push_back(
-          fmt::format("{}: an X-ray of a plan that is not here ({})", image.file.string(), image.plan_uid));
-    else
-      parts.images.push_back(image.file);
-  }
+  choose_images(files.images, plan, other_plans, !named.images.empty(), parts, notes);
   if (parts.images.empty())
     throw Error(
         fmt::format("no X-ray found refers to {} ({}).\n"
