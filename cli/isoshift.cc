@@ -96,21 +96,28 @@ void check_command(const CLI::App& app, std::span<const char* const> words) {
     throw UsageError(fmt::format("{} belongs behind the command: isoshift {} ... {}", first, *command, first));
 }
 
+// "--site: " for the value of a flag.
+std::string flag_before(std::span<const char* const> words, std::size_t n) {
+  const std::string_view before = n > 0 ? words[n - 1] : "";
+  return before.starts_with('-') ? std::string(before) + ": " : "";
+}
+
 // An empty value comes from a variable of a script that is unset: what it was meant to switch on would be left out. No
 // limit holds for what is not a number.
 void check_words(std::span<const char* const> words) {
   for (std::size_t n = 0; n < words.size(); ++n) {
-    std::string word = words[n];
-    if (word.empty() || (word.starts_with("--") && word.ends_with('=')))
-      throw UsageError(
-          fmt::format("an argument is empty{}", n > 0 ? fmt::format(" (after {})", words[n - 1]) : ": the first"));
-    std::ranges::transform(word, word.begin(), [](unsigned char c) { return std::tolower(c); });
-    std::ranges::replace(word, '=', ',');
-    std::istringstream parts(word);
-    for (std::string part; std::getline(parts, part, ',');)
-      for (const char* const none : {"nan", "inf", "infinity"})
-        if (part.substr(part.find_first_not_of("+-") == 1 ? 1 : 0) == none)
-          throw UsageError(fmt::format("{} is not a finite number (a file of this name is ./{})", words[n], words[n]));
+    const std::string_view word = words[n];
+    const std::size_t equals = word.starts_with("--") ? word.find('=') : word.npos;
+    const std::string flag = equals == word.npos ? flag_before(words, n) : std::string(word.substr(0, equals)) + ": ";
+    const std::string_view value = equals == word.npos ? word : word.substr(equals + 1);
+    if (value.empty()) throw UsageError(flag + "the argument is empty");
+    std::istringstream parts(std::string(value.substr(value.find('=') + 1)));  // LABEL=NUMBER
+    for (std::string part; std::getline(parts, part, ',');) {
+      std::string number = part.substr(part.starts_with('-') || part.starts_with('+') ? 1 : 0);
+      std::ranges::transform(number, number.begin(), [](unsigned char c) { return std::tolower(c); });
+      if (number == "nan" || number == "inf" || number == "infinity")
+        throw UsageError(fmt::format("{}{} is not a finite number (a file of this name is ./{})", flag, part, part));
+    }
   }
 }
 

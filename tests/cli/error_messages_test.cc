@@ -67,10 +67,10 @@ TEST_F(ErrorMessagesTest, ArgumentsThatAreEmptyOrNoNumber) {
     EXPECT_EQ(outcome.exit_status, 2);
     return outcome.err;
   };
-  EXPECT_THAT(error_with({"--site", ""}), HasSubstr("an argument is empty (after --site)"));
-  EXPECT_THAT(error_with({"--machine="}), HasSubstr("an argument is empty (after "));
-  EXPECT_THAT(error_with({"--sid", "nan"}), HasSubstr("nan is not a finite number"));
-  EXPECT_THAT(error_with({"--isocenter=1,-Inf,2"}), HasSubstr("--isocenter=1,-Inf,2 is not a finite number"));
+  EXPECT_THAT(error_with({"--site", ""}), HasSubstr("--site: the argument is empty"));
+  EXPECT_THAT(error_with({"--machine="}), HasSubstr("--machine: the argument is empty"));
+  EXPECT_THAT(error_with({"--sid", "nan"}), HasSubstr("--sid: nan is not a finite number"));
+  EXPECT_THAT(error_with({"--isocenter=1,-Inf,2"}), HasSubstr("--isocenter: -Inf is not a finite number"));
   EXPECT_FALSE(std::filesystem::exists(study_.output()));
 }
 
@@ -85,10 +85,9 @@ TEST_F(ErrorMessagesTest, TwoCtSeries) {
 }
 
 TEST(ReleaseCommandTest, TheNameOfWhoReleasesIsOneLineOfText) {
-  for (const auto& [name, why] :
-       {std::pair("", "expected the name of the person"), std::pair("  ", "expected the name"),
-        std::pair("J. Doe\nverdict accepted", "holds a line break"),
-        std::pair("J. \xff\xfe", "is not valid UTF-8 text")}) {
+  for (const auto& [name, why] : {std::pair("", "the argument is empty"), std::pair("  ", "expected the name"),
+                                  std::pair("J. Doe\nverdict accepted", "holds a line break"),
+                                  std::pair("J. \xff\xfe", "is not valid UTF-8 text")}) {
     const CommandOutcome outcome = run_command({"release", "3fa94c1e02b7", "--by", name});
     EXPECT_EQ(outcome.exit_status, 2) << name;
     EXPECT_THAT(outcome.err, HasSubstr(std::string("--by: ") + why));
