@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
+#include "base/text_file.h"
 #include "io/study/study_files.h"
 #include "tests/support/pose_near.h"
 #include "tests/support/small_study.h"
@@ -19,11 +20,6 @@ namespace {
 
 using testing::HasSubstr;
 using testing::Not;
-
-std::string bytes_of(const std::filesystem::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), {}};
-}
 
 class DeidentifyCommandTest : public testing::Test {
  protected:
@@ -50,7 +46,7 @@ class DeidentifyCommandTest : public testing::Test {
     std::size_t files = 0;
     for (const std::filesystem::path& file : files_below({folder})) {
       ++files;
-      const std::string bytes = file.string().substr(folder.string().size()) + bytes_of(file);
+      const std::string bytes = file.string().substr(folder.string().size()) + text_of_file(file);
       for (const char* told : {"Featherst", "Adalgunde", "4711-0815", "St. Elsewhere", "QUINCY7"})
         EXPECT_EQ(bytes.find(told), std::string::npos) << file << " tells " << told;
       for (const std::string& uid : uids_) EXPECT_EQ(bytes.find(uid), std::string::npos) << file << " tells " << uid;
@@ -124,15 +120,16 @@ TEST_F(BundleCommandTest, TheResultIsFoundAgainFromIt) {
       run_command({"bundle", path("Featherstone"), study_.path().string(), "-o", path("bundle")});
   ASSERT_EQ(done.exit_status, 0) << done.err;
   expect_tells_nothing(path("bundle"));
-  EXPECT_THAT(bytes_of(path("bundle/versions.txt")), testing::AllOf(HasSubstr("isoshift "), HasSubstr("libdcmdata")));
-  EXPECT_THAT(bytes_of(path("bundle/README.txt")), HasSubstr("--seed 3"));
+  EXPECT_THAT(text_of_file(path("bundle/versions.txt")),
+              testing::AllOf(HasSubstr("isoshift "), HasSubstr("libdcmdata")));
+  EXPECT_THAT(text_of_file(path("bundle/README.txt")), HasSubstr("--seed 3"));
   const Eigen::Isometry3d found = read_setup_error(path("Featherstone/result.json"));
   EXPECT_THAT(read_setup_error(path("bundle/result/result.json")), PoseNear(found, 1e-9, 1e-9));
   ASSERT_EQ(run_command({"register", path("bundle/study"), "-o", path("again"), "--seed", "3"}).exit_status, 0);
   EXPECT_THAT(read_setup_error(path("again/result.json")), PoseNear(found, 1e-9, 1e-9));
   // Study and result belong together.
-  const auto again = nlohmann::json::parse(bytes_of(path("again/result.json")));
-  const auto bundled = nlohmann::json::parse(bytes_of(path("bundle/result/result.json")));
+  const auto again = nlohmann::json::parse(text_of_file(path("again/result.json")));
+  const auto bundled = nlohmann::json::parse(text_of_file(path("bundle/result/result.json")));
   EXPECT_EQ(again["references"]["images"], bundled["references"]["images"]);
   EXPECT_EQ(again["references"]["ct_series"], bundled["references"]["ct_series"]);
   EXPECT_EQ(again["patient"]["id"], bundled["patient"]["id"]);
@@ -164,7 +161,7 @@ TEST_F(BundleCommandTest, WordsOfPeopleAreLeftOut) {
             1);
   ASSERT_EQ(run_command({"bundle", path("allowed"), study_.path().string(), "-o", path("bundle")}).exit_status, 0);
   expect_tells_nothing(path("bundle"));
-  EXPECT_THAT(bytes_of(path("bundle/result/result.json")), HasSubstr("(allowed by time-span)"));
+  EXPECT_THAT(text_of_file(path("bundle/result/result.json")), HasSubstr("(allowed by time-span)"));
 }
 
 TEST_F(BundleCommandTest, AnotherStudyIsRefused) {

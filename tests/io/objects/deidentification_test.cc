@@ -11,6 +11,7 @@
 #include <fstream>
 #include <sstream>
 
+#include "base/text_file.h"
 #include "io/dicom/decode.h"
 #include "tests/support/small_study.h"
 #include "tests/support/temporary_folder.h"
@@ -184,8 +185,7 @@ TEST(Deidentification, FilesHoldNothingElse) {
     EXPECT_EQ(decode_frame(after, pixel_format(after.dataset()), 0),
               decode_frame(before, pixel_format(before.dataset()), 0))
         << source;
-    std::ifstream stream(written, std::ios::binary);
-    const std::string bytes{std::istreambuf_iterator<char>(stream), {}};
+    const std::string bytes = text_of_file(written);
     EXPECT_THAT(bytes, Not(HasSubstr("Smith")));
     EXPECT_THAT(bytes, Not(HasSubstr(patient)));
     std::filesystem::remove(spoiled);
