@@ -196,9 +196,11 @@ std::vector<std::uint8_t> decompressed_frame(const DicomFile& file, int frame) {
     throw Error(fmt::format("{}: {} is missing", where, described(DCM_PixelData)));
   auto& pixels = dynamic_cast<DcmPixelData&>(*element);
   const E_TransferSyntax syntax = dataset.getOriginalXfer();
-  const std::vector<Uint8> stream = frame_stream(pixels, dataset, frame, format.frames);
-  if (is_jpeg2000(syntax)) return decoded_jpeg2000(stream, format, where);
-  if (syntax != EXS_RLELossless) check_jpeg_size(stream, format, where);
+  if (syntax != EXS_RLELossless) {
+    const std::vector<Uint8> stream = frame_stream(pixels, dataset, frame, format.frames);
+    if (is_jpeg2000(syntax)) return decoded_jpeg2000(stream, format, where);
+    check_jpeg_size(stream, format, where);
+  }
   Uint32 fragment = 0;  // found by the decoder
   OFString color_model;
   std::vector<std::uint8_t> bytes(size + size % 2);  // what DCMTK asks for, too: pixel_format() allows one sample only

@@ -17,8 +17,8 @@ struct BundleOptions {
 
 // Writes into `output`: study/, the CT, the plan, its structure set and the X-rays that the result names,
 // de-identified; result/, the result and its reports under the same pseudonyms; versions.txt; README.txt, which says
-// how the study is registered again. Throws Error if one of these objects is not in `study`, or an X-ray or the plan is
-// another file than that which was registered.
+// how the study is registered again. Throws Error if one of these objects is not in `study`, or the CT, an X-ray or the
+// plan is another file than that which was registered.
 DeidentifiedFiles write_bundle(const BundleOptions& options, Observer& observer);
 
 }  // namespace isoshift
