@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "io/report/canvas.h"
+
 namespace isoshift {
 namespace {
 
@@ -70,11 +72,11 @@ void ConsoleObserver::show(std::string_view line) {
 void ConsoleObserver::say(std::string_view line) {
   bar_.reset();
   if (std::exchange(shows_line_, false)) console_.err << kClearedLine;
-  console_.err << line << std::endl;
+  console_.err << printable_lines(line) << std::endl;
 }
 
 void print_warnings(const std::vector<std::string>& warnings, Console& console) {
-  for (const std::string& warning : warnings) console.err << "warning: " << warning << "\n";
+  for (const std::string& warning : warnings) console.err << "warning: " << printable_lines(warning) << "\n";
 }
 
 }  // namespace isoshift

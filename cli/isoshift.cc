@@ -6,11 +6,14 @@
 
 #include <algorithm>
 #include <cctype>
+#include <charconv>
+#include <cstdint>
 #include <exception>
 #include <span>
 #include <sstream>
 #include <string>
 #include <string_view>
+#include <type_traits>
 #include <vector>
 
 #include "base/error.h"
@@ -33,24 +36,29 @@ constexpr const char* kDescription =
 constexpr const char* kFooter = "\nExit status: 0 accepted (or done), 1 failed, 2 usage, 3 review, 4 rejected.";
 
 // Names of files and sessions may hold what a terminal would obey.
-std::string printable_lines(std::string_view text) {
-  std::string lines;
-  for (std::size_t begin = 0; begin <= text.size();) {
-    const std::size_t end = std::min(text.find('\n', begin), text.size());
-    lines += printable(text.substr(begin, end - begin)) + (end < text.size() ? "\n" : "");
-    begin = end + 1;
-  }
-  return lines;
-}
-
 int say(Console& console, const std::exception& error, int status) {
   console.err << "error: " << printable_lines(error.what()) << "\n";
   return status;
 }
 
-}  // namespace
+template <class Number>
+std::string check_whole_number(const std::string& word) {
+  Number number{};
+  const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), number);
+  if (error == std::errc() && fmt::format("{}", number) == word) return {};
+  return fmt::format("{}: expected a whole number{} in decimal digits", word,
+                     std::is_signed_v<Number> ? "" : " from 0 on");
+}
 
-namespace {
+// CLI11 reads 010 as 8, and takes what is too large, or negative where that cannot be, for the largest number.
+void expect_whole_numbers(CLI::App& command) {
+  for (CLI::Option* option : command.get_options()) {
+    const std::string type = option->get_type_name();
+    const std::string_view kind = std::string_view(type).substr(0, type.find(':'));
+    if (kind == "UINT") option->check(CLI::Validator(&check_whole_number<std::uint64_t>, ""));
+    if (kind == "INT" || kind == "N") option->check(CLI::Validator(&check_whole_number<std::int64_t>, ""));
+  }
+}
 
 void add_commands(CLI::App& app, Console& console, int& exit_status) {
   app.footer(kFooter);
@@ -80,6 +88,7 @@ void add_commands(CLI::App& app, Console& console, int& exit_status) {
   add_audit_command(app, console, exit_status);
   add_audit_setup_command(app, console, exit_status);
   add_bench_command(app, console, exit_status);
+  for (CLI::App* command : app.get_subcommands({})) expect_whole_numbers(*command);
 }
 
 // CLI11 would say only that a command is missing, or of what stands before it that the command lacks it.

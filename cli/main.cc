@@ -29,7 +29,9 @@ void end_cleanly_on_signals() {
   sigaction(SIGHUP, nullptr, &hang_up);
   if (hang_up.sa_handler != SIG_IGN) sigaddset(&signals, SIGHUP);
   pthread_sigmask(SIG_BLOCK, &signals, nullptr);  // inherited by every thread made later
-  ::signal(SIGPIPE, SIG_IGN);                     // who writes to a pipe, or to a peer that went away, reports that
+  // Who writes to a pipe or to a peer that went away, or beyond the limit of a file's size, reports that.
+  ::signal(SIGPIPE, SIG_IGN);
+  ::signal(SIGXFSZ, SIG_IGN);
   std::thread([] {
     int signal = 0;
     do {

@@ -3,7 +3,7 @@
 install(FILES packaging/isoshift-watch.service packaging/isoshift-serve.service DESTINATION lib/systemd/system)
 install(FILES packaging/watch.json packaging/site.json packaging/gpu.conf DESTINATION share/doc/isoshift/examples)
 install(FILES README.md LICENSE CHANGELOG.md DESTINATION share/doc/isoshift)
-install(DIRECTORY docs/ DESTINATION share/doc/isoshift/docs FILES_MATCHING PATTERN "*.md" PATTERN "*.json")
+install(DIRECTORY docs/ DESTINATION share/doc/isoshift/docs FILES_MATCHING PATTERN "*.md" PATTERN "*.json" PATTERN "*.png" PATTERN "*.svg")
 
 set(CPACK_GENERATOR DEB)
 set(CPACK_PACKAGING_INSTALL_PREFIX /usr)

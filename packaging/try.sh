@@ -1,5 +1,5 @@
 #!/bin/bash
-# Installs a package of isoshift in a fresh Debian and uses it there: try.sh 12|13 [PACKAGE.deb]. Without a package, what is
+# Installs the packages of isoshift in a fresh Debian and uses them there: try.sh 12|13 [PACKAGE.deb]. Without a package, what is
 # committed goes through ./dev demo in a fresh Debian of that release, and the package is made there; it is kept in
 # build/debian-RELEASE. Needs root, debootstrap and a mirror.
 set -euo pipefail
@@ -48,3 +48,12 @@ inside man isoshift-register | head -n 4
 inside isoshift phantom -o /demo/study
 inside isoshift register /demo/study -o /demo/result --truth /demo/study/truth.json
 inside python3 /usr/share/doc/python3-isoshift/examples/register.py /demo/study
+
+# Another program, with the libraries.
+cp "$(dirname "$package")"/libisoshift-dev_*.deb "$root/libisoshift-dev.deb"
+cp -r tests/consumer "$root/consumer"
+inside apt-get install -y -qq --no-install-recommends cmake g++ ninja-build /libisoshift-dev.deb >/dev/null 2>&1
+inside cmake -S /consumer -B /consumer/build -G Ninja -DCMAKE_BUILD_TYPE=Release >/dev/null
+inside cmake --build /consumer/build
+inside /consumer/build/consumer /demo/study /demo/object.dcm
+inside isoshift check /demo/object.dcm --plan /demo/study/RTPLAN.dcm

@@ -112,9 +112,7 @@ void add_evaluate_command(CLI::App& app, Console& console, int&) {
   command->add_option("--starts", flags->starts, "How many starts")->type_name("N");
   command->add_option("--distance", flags->distance_mm, "bins: the largest mTRE at the start; paper: the translation")
       ->type_name("MM");
-  command->add_option("--start-seed", flags->start_seed, "Seed of the random starts")
-      ->check(CLI::NonNegativeNumber)
-      ->capture_default_str();
+  command->add_option("--start-seed", flags->start_seed, "Seed of the random starts")->capture_default_str();
   command
       ->add_option(
           "--jobs", options.jobs,

@@ -14,6 +14,7 @@
 #include "geometry/rotation.h"
 #include "io/objects/registration_check.h"
 #include "io/objects/registration_meaning.h"
+#include "io/report/canvas.h"
 #include "io/study/session_choice.h"
 #include "io/study/study.h"
 #include "registration/gpu_check.h"
@@ -241,7 +242,7 @@ class Inspection {
     if (as_json_)
       files_.push_back(description.json());
     else
-      console_.out << description.text() << "\n";
+      console_.out << printable_lines(description.text()) << "\n";
   }
 
   // What cannot be read is refused, and the next file is looked at.
@@ -268,9 +269,11 @@ class Inspection {
       console_.out << json.dump(2, ' ', false, Json::error_handler_t::replace) << "\n";
       return;
     }
-    if (sessions.size() > 1) console_.out << fmt::format("{}\n\n", fmt::join(described(sessions), "\n"));
-    for (const std::string& file : files.left_aside) console_.out << "left aside: " << file << "\n";
-    for (const std::string& reason : files.unreadable) console_.out << "unreadable: " << reason << "\n";
+    std::string text;
+    if (sessions.size() > 1) text += fmt::format("{}\n\n", fmt::join(described(sessions), "\n"));
+    for (const std::string& file : files.left_aside) text += "left aside: " + file + "\n";
+    for (const std::string& reason : files.unreadable) text += "unreadable: " + reason + "\n";
+    console_.out << printable_lines(text);
   }
 
   std::size_t unreadable() const { return unreadable_; }

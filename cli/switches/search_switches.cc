@@ -34,7 +34,6 @@ void add_search_switches(CLI::App& command, SearchRequest& options) {
   command
       .add_option("--seed", options.seed,
                   "Seed of the random choice of compared pixels and of candidates; nothing else is random")
-      ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
 }
 

@@ -96,13 +96,13 @@ std::vector<Uint8> frame_stream(DcmPixelData& pixels, const DcmDataset& dataset,
   return stream;
 }
 
-void check_jpeg_size(std::span<const Uint8> stream, const PixelFormat& format, const std::string& where) {
-  if (const auto size = jpeg_size(stream); size && *size != std::pair(format.columns, format.rows))
-    throw Error(fmt::format("{}: its compressed pixels are {} x {}, {} and {} say {} x {}", where, size->first,
-                            size->second, described(DCM_Columns), described(DCM_Rows), format.columns, format.rows));
-}
-
 }  // namespace
+
+void expect_size(const PixelFormat& format, std::pair<std::int64_t, std::int64_t> size, const std::string& where) {
+  if (size.first != format.columns || size.second != format.rows)
+    throw Error(fmt::format("{}: its compressed pixels are {} x {}, {} and {} say {} x {}", where, size.first,
+                            size.second, described(DCM_Columns), described(DCM_Rows), format.columns, format.rows));
+}
 
 PixelFormat pixel_format(const DicomItem& dataset) {
   PixelFormat format;
@@ -199,7 +199,7 @@ std::vector<std::uint8_t> decompressed_frame(const DicomFile& file, int frame) {
   if (syntax != EXS_RLELossless) {
     const std::vector<Uint8> stream = frame_stream(pixels, dataset, frame, format.frames);
     if (is_jpeg2000(syntax)) return decoded_jpeg2000(stream, format, where);
-    check_jpeg_size(stream, format, where);
+    if (const auto announced = jpeg_size(stream)) expect_size(format, *announced, where);
   }
   Uint32 fragment = 0;  // found by the decoder
   OFString color_model;

@@ -2,6 +2,8 @@
 // Pixel data in, checked pixels out. Compressed pixels are decoded by a child process (decoder_process.h).
 
 #include <cstdint>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include "io/dicom/dicom_dataset.h"
@@ -21,6 +23,10 @@ struct PixelFormat {
   std::size_t pixels_per_frame() const { return static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows); }
   std::size_t bytes_per_frame() const { return pixels_per_frame() * static_cast<std::size_t>(bits_allocated / 8); }
 };
+
+// Throws Error beginning with `where` if compressed pixels, columns and rows of them, have another size than the
+// format.
+void expect_size(const PixelFormat& format, std::pair<std::int64_t, std::int64_t> size, const std::string& where);
 
 // Reads and checks the format: 8 or 16 bits allocated, one sample, HighBit = BitsStored - 1, at most 8192 x 8192 pixels
 // and 20000 frames.

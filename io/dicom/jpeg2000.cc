@@ -113,9 +113,7 @@ void check_is_of(const PixelFormat& format, const opj_image_t& image, const std:
   if (image.numcomps != 1)
     throw Error(fmt::format("{}: its compressed pixels have {} components, expected 1", where, image.numcomps));
   const opj_image_comp_t& pixels = image.comps[0];
-  if (pixels.w != static_cast<OPJ_UINT32>(format.columns) || pixels.h != static_cast<OPJ_UINT32>(format.rows))
-    throw Error(fmt::format("{}: its compressed pixels are {} x {}, {} and {} say {} x {}", where, pixels.w, pixels.h,
-                            described(DCM_Columns), described(DCM_Rows), format.columns, format.rows));
+  expect_size(format, {pixels.w, pixels.h}, where);
   if ((pixels.sgnd != 0) != format.is_signed)
     throw Error(fmt::format("{}: its compressed pixels are {}, {} says {}", where,
                             pixels.sgnd != 0 ? "signed" : "unsigned", described(DCM_PixelRepresentation),

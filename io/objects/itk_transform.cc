@@ -57,8 +57,11 @@ Written written_in(const std::filesystem::path& path) {
       if (found) throw Error(fmt::format("{}: holds several transforms, expected one", name));
       found = Written{.kind = kind->substr(0, kind->find('_')), .parameters = {}, .fixed_parameters = {}};
     } else if (const auto numbers = value_of("Parameters:"); numbers && found) {
+      if (!found->parameters.empty()) throw Error(fmt::format("{}: has two lines of Parameters, expected one", name));
       found->parameters = numbers_in(*numbers, name + ": Parameters");
     } else if (const auto fixed = value_of("FixedParameters:"); fixed && found) {
+      if (!found->fixed_parameters.empty())
+        throw Error(fmt::format("{}: has two lines of FixedParameters, expected one", name));
       found->fixed_parameters = numbers_in(*fixed, name + ": FixedParameters");
     }
   }

@@ -4,6 +4,7 @@
 #include <cairo-svg.h>
 #include <pango/pangocairo.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <functional>
@@ -219,6 +220,16 @@ std::string printable(std::string_view text) {
       line.append(at, static_cast<std::size_t>(g_utf8_next_char(at) - at));
   }
   return line;
+}
+
+std::string printable_lines(std::string_view text) {
+  std::string lines;
+  for (std::size_t begin = 0; begin <= text.size();) {
+    const std::size_t end = std::min(text.find('\n', begin), text.size());
+    lines += printable(text.substr(begin, end - begin)) + (end < text.size() ? "\n" : "");
+    begin = end + 1;
+  }
+  return lines;
 }
 
 }  // namespace isoshift

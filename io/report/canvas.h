@@ -84,5 +84,7 @@ class Canvas {
 
 // Makes text from files safe to show: valid UTF-8, on one line, without control characters.
 std::string printable(std::string_view text);
+// The same of every line of a text.
+std::string printable_lines(std::string_view text);
 
 }  // namespace isoshift

@@ -1,11 +1,13 @@
 #pragma once
-// Names that the writer and the reader of result.json share.
+// What the writer and the reader of result.json share.
 
 #include <array>
+#include <nlohmann/json.hpp>
 #include <string_view>
 #include <utility>
 
 #include "setup/identity.h"
+#include "setup/setup_result.h"
 
 namespace isoshift {
 
@@ -27,5 +29,8 @@ inline constexpr std::array<std::pair<const char*, std::string Identity::*>, 12>
 // Names of angles end with their unit: radians inside the program, degrees in files.
 inline constexpr std::string_view kRad = "_rad";
 inline constexpr std::string_view kDeg = "_deg";
+
+// The parts setup_error and couch_shift, which say the same in several forms.
+nlohmann::ordered_json shift_json(const SetupResult& report);
 
 }  // namespace isoshift

@@ -249,7 +249,8 @@ std::optional<Finding> small_finding(const XrayImage& xray, const UprightXray& u
 Finding find_in(const Upright& upright, const FieldEdges& edges, const Eigen::Vector2d& isocenter_upright_px) {
   Finding finding{.sides = measured(upright, edges.best())};
   const Sides& sides = finding.sides;
-  const bool is_anatomy = may_be_rod(sides) || is_beside(sides, isocenter_upright_px, upright.xray.mm);
+  const bool is_aside = is_beside(sides, isocenter_upright_px, upright.xray.mm);
+  const bool is_anatomy = is_aside || may_be_rod(sides);
   if (sides_clear(sides) > 0 && !is_anatomy) {
     finding.doubt = doubt_about(sides);
     return finding;
@@ -259,7 +260,9 @@ Finding find_in(const Upright& upright, const FieldEdges& edges, const Eigen::Ve
   };
   if (is_anatomy && std::ranges::any_of(sides, is_edge_of_collimator)) {
     finding.doubt = "a collimator's edge leaves the isocenter out";
-    if (std::ranges::all_of(sides, [&](const Side& side) { return side.is_open() || is_edge_of_collimator(side); }))
+    // Beside the isocenter there may be nothing but air.
+    if (!is_aside &&
+        std::ranges::all_of(sides, [&](const Side& side) { return side.is_open() || is_edge_of_collimator(side); }))
       return finding;
     finding.sides = measured(upright, edges.whole());
     return finding;

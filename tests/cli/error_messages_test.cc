@@ -46,6 +46,10 @@ TEST_F(ErrorMessagesTest, NamesCannotSteerATerminal) {
   EXPECT_EQ(outcome.exit_status, 1);
   EXPECT_THAT(outcome.err, testing::Not(HasSubstr("\x1b")));
   EXPECT_THAT(outcome.err, HasSubstr("no [2Jstudy"));
+  std::filesystem::copy(study_.plan(), study_.path() / "a\x1b[31mplan.dcm");
+  const std::string listing = run_command({"inspect", study_.path().string()}).out;
+  EXPECT_THAT(listing, testing::Not(HasSubstr("\x1b")));
+  EXPECT_THAT(listing, HasSubstr("a [31mplan.dcm"));
 }
 
 TEST_F(ErrorMessagesTest, WhatStandsBeforeTheCommand) {
@@ -72,6 +76,18 @@ TEST_F(ErrorMessagesTest, ArgumentsThatAreEmptyOrNoNumber) {
   EXPECT_THAT(error_with({"--sid", "nan"}), HasSubstr("--sid: nan is not a finite number"));
   EXPECT_THAT(error_with({"--isocenter=1,-Inf,2"}), HasSubstr("--isocenter: -Inf is not a finite number"));
   EXPECT_FALSE(std::filesystem::exists(study_.output()));
+}
+
+TEST_F(ErrorMessagesTest, WholeNumbersAreDecimal) {
+  const auto error_with = [](const std::string& flag, const std::string& number) {
+    const CommandOutcome outcome = run_command({"phantom", "-o", "unused", flag, number});
+    EXPECT_EQ(outcome.exit_status, 2) << flag << " " << number;
+    return outcome.err;
+  };
+  for (const char* number : {"-1", "010", "0x10", "18446744073709551616", "1.5"})
+    EXPECT_THAT(error_with("--seed", number),
+                HasSubstr(fmt::format("--seed: {}: expected a whole number from 0 on in decimal digits", number)));
+  EXPECT_THAT(error_with("--fractions", "07"), HasSubstr("--fractions: 07: expected a whole number in decimal digits"));
 }
 
 TEST_F(ErrorMessagesTest, TwoCtSeries) {

@@ -76,11 +76,10 @@ int run(std::uint64_t count, std::uint64_t first_seed) {
     }
     const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     slowest_s = std::max(slowest_s, seconds);
-    slow += seconds > 2.0 ? 1 : 0;
-    if (seconds > 11.0) {
-      std::cerr << fmt::format("seed {} ({}) took {:.1f} s\n", seed, original.name, seconds);
-      return 1;
-    }
+    if (seconds <= 2.0) continue;
+    ++slow;
+    std::cerr << fmt::format("seed {} ({}) took {:.1f} s\n", seed, original.name, seconds);
+    if (seconds > 11.0) return 1;
   }
   use_decoder({});  // ends those that wait, so that their memory is known
   std::cout << fmt::format(

@@ -93,6 +93,21 @@ TEST(IrradiatedField, AnOpenFieldIsTheWholeReceptor) {
   }
 }
 
+// A flat chest, seen edge-on, is as straight and as dark beyond as a collimator; there is nothing to compare before it.
+TEST(IrradiatedField, AStripOfAirBesideAFlatPatientIsNotWhatIsCompared) {
+  XrayImage xray = xray_of(opened({.body = CollimatedXray::Body::kNone}));
+  constexpr double kChestColumn = 50.3;
+  for (int row = 0; row < xray.values.rows; ++row)
+    for (int column = 0; column < xray.values.columns; ++column)
+      xray.values.at(column, row) *=
+          1.0F / (1.0F + 9.0F / (1.0F + std::exp(static_cast<float>(kChestColumn - column))));
+  const IrradiatedField field = field_of(xray);
+  EXPECT_THAT(field.doubt, HasSubstr("leaves the isocenter out"));
+  ASSERT_EQ(field.corners_px.size(), 4U);
+  for (const Eigen::Vector2d& corner : field.corners_px)
+    for (int axis = 0; axis < 2; ++axis) EXPECT_NEAR(std::abs(corner[axis] - 255.5), 256.0, 1e-6);
+}
+
 TEST(IrradiatedField, ABallInASmallFieldDoesNotHideIt) {
   CollimatedXray scene{.body = CollimatedXray::Body::kBall, .lower_mm = {-10, -10}, .upper_mm = {10, 10}};
   const XrayImage xray = xray_of(scene);

@@ -81,6 +81,10 @@ TEST_F(ItkTransform, WhatIsNoRigidTransformIsNamed) {
   const std::string first = "#Insight Transform File V1.0\n";
   EXPECT_THAT(refusal(first), HasSubstr("a.tfm: holds no transform"));
   EXPECT_THAT(refusal(itk_transform(pose_) + itk_transform(pose_)), HasSubstr("a.tfm: holds several transforms"));
+  EXPECT_THAT(refusal(itk_transform(pose_) + "Parameters: 1 0 0 0 1 0 0 0 1 0 0 0\n"),
+              HasSubstr("a.tfm: has two lines of Parameters, expected one"));
+  EXPECT_THAT(refusal(itk_transform(pose_) + "FixedParameters: 1 2 3\n"),
+              HasSubstr("a.tfm: has two lines of FixedParameters, expected one"));
   EXPECT_THAT(refusal(first + "Transform: BSplineTransform_double_3_3\nParameters: 1\n"),
               HasSubstr("a.tfm: is a BSplineTransform, expected a rigid transform"));
   EXPECT_THAT(refusal(first + "Transform: AffineTransform_double_3_3\nParameters: 1 2 x\n"),

@@ -21,6 +21,7 @@ namespace {
 
 using testing::HasSubstr;
 using testing::Not;
+using testing::ThrowsMessage;
 
 std::string text_of(const SetupResult& report) { return text_report(report_page(report)); }
 
@@ -131,6 +132,27 @@ TEST_F(ResultFolderTest, ABodyWhoseSigmaIsNoNumberIsNotDetermined) {
   EXPECT_TRUE(json["bodies"][0]["sigma_mm"][2].is_null());
   EXPECT_EQ(json["bodies"][0]["is_determined"], false);
   EXPECT_FALSE(report_from_json(json.dump(), "result.json").bodies[0].is_determined());
+}
+
+// Whatever number of the shift is edited, the others still say what was found.
+TEST_F(ResultFolderTest, AShiftThatWasChangedByHandIsRefused) {
+  const auto json = nlohmann::json::parse(json_report(bent_report(Verdict::kAccepted)));
+  for (const char* place : {"/setup_error/translation_mm/0", "/setup_error/known_translation_mm/1",
+                            "/setup_error/rotation_deg/rz", "/couch_shift/vertical_mm", "/couch_shift/pitch_deg"}) {
+    auto changed = json;
+    auto& number = changed[nlohmann::json::json_pointer(place)];
+    number = number.get<double>() + 0.01;
+    EXPECT_THAT([&] { report_from_json(changed.dump(), "result.json"); },
+                ThrowsMessage<Error>(HasSubstr("the file was changed after it was made")))
+        << place;
+  }
+  auto turned = json, scaled = json;
+  turned["setup_error"]["rotation_matrix"] = {{1, 0, 0}, {0, 0, -1}, {0, 1, 0}};
+  EXPECT_THAT([&] { report_from_json(turned.dump(), "result.json"); },
+              ThrowsMessage<Error>(HasSubstr("the file was changed after it was made")));
+  scaled["setup_error"]["rotation_matrix"][0] = {2, 0, 0};
+  EXPECT_THAT([&] { report_from_json(scaled.dump(), "result.json"); },
+              ThrowsMessage<Error>(HasSubstr("result.json: setup_error: rotation_matrix is no rotation")));
 }
 
 TEST_F(ResultFolderTest, ThePdfIsADicomObjectToo) {
