@@ -16,6 +16,7 @@ import isoshift
 
 BATCHES = (1, 4, 16, 64)
 ROUNDS = 7
+CALLS = 5  # of each round; their median counts
 
 program, folder, output = sys.argv[1:]
 study = isoshift.load_study(folder)
@@ -34,15 +35,20 @@ def in_python():
     renderer.render(study.views, poses_of(1))
     for count in BATCHES:
         poses = poses_of(count)
-        begin = time.perf_counter()
-        renderer.render(study.views, poses)
-        times.append(time.perf_counter() - begin)
+        seconds = []
+        for _ in range(CALLS):
+            begin = time.perf_counter()
+            renderer.render(study.views, poses)
+            seconds.append(time.perf_counter() - begin)
+        times.append(statistics.median(seconds))
     return times
 
 
 def in_cpp():
-    lines = subprocess.run([program, folder, *map(str, BATCHES)], check=True, capture_output=True, text=True).stdout
-    return [float(line.split()[1]) for line in lines.splitlines()]
+    counts = [str(count) for count in BATCHES for _ in range(CALLS)]
+    lines = subprocess.run([program, folder, *counts], check=True, capture_output=True, text=True).stdout
+    seconds = [float(line.split()[1]) for line in lines.splitlines()]
+    return [statistics.median(seconds[n:n + CALLS]) for n in range(0, len(seconds), CALLS)]
 
 
 rounds = [(in_cpp(), in_python()) for _ in range(ROUNDS)]
@@ -56,5 +62,5 @@ for n, count in enumerate(BATCHES):
           f"ratio {rows[-1]['ratio']:.3f}")
 views = [{"columns": view.columns, "rows": view.rows} for view in study.views]
 with open(output, "w", encoding="utf-8") as file:
-    json.dump({"views": views, "rounds": ROUNDS, "batches": rows}, file, indent=1)
+    json.dump({"views": views, "rounds": ROUNDS, "calls": CALLS, "batches": rows}, file, indent=1)
     file.write("\n")

@@ -16,6 +16,7 @@ import evaluation
 import founding_paper
 import markdown
 import motion
+import python_module
 import renderers
 import scout
 import stereoscopic
@@ -28,6 +29,7 @@ PAGES = {"docs/commands/commission.md": commission.TABLES,
          "docs/evaluation.md": evaluation.TABLES,
          "docs/founding-paper.md": founding_paper.TABLES,
          "docs/motion.md": motion.TABLES,
+         "docs/python.md": python_module.TABLES,
          "docs/renderers.md": renderers.TABLES,
          "docs/stereoscopic.md": stereoscopic.TABLES}
 
