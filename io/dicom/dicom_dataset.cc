@@ -53,6 +53,18 @@ void make_printable(std::string& text) {
 
 bool is_text_vr(DcmEVR vr) { return vr == EVR_DS || vr == EVR_IS; }
 
+// The values of an element, separated by backslashes. DCMTK, asked for them as an array, would look through all of a
+// text once for each value.
+std::optional<std::string> values_of(DcmElement& element) {
+  char* text = nullptr;
+  Uint32 length = 0;
+  if (element.isaString() && element.getString(text, length).good())
+    return text == nullptr ? std::string() : std::string(text, length);
+  OFString values;
+  if (element.getOFStringArray(values).bad()) return std::nullopt;
+  return values;
+}
+
 }  // namespace
 
 std::string described(const DcmTagKey& key) {
@@ -73,10 +85,10 @@ bool DicomItem::has_value(const DcmTagKey& tag) const { return item_->tagExistsW
 std::vector<std::string> DicomItem::texts(const DcmTagKey& tag) const {
   DcmElement* element = nullptr;
   if (!has_value(tag) || item_->findAndGetElement(tag, element).bad()) return {};
-  OFString whole;
-  if (element->getOFStringArray(whole).bad()) throw Error(fmt::format("{}: {} is not text", where_, described(tag)));
+  const std::optional<std::string> whole = values_of(*element);
+  if (!whole) throw Error(fmt::format("{}: {} is not text", where_, described(tag)));
   std::vector<std::string> values;
-  std::string_view rest = whole;
+  std::string_view rest = *whole;
   for (;;) {
     const auto separator = rest.find('\\');
     make_printable(values.emplace_back(trimmed(rest.substr(0, separator))));
@@ -95,9 +107,9 @@ std::optional<std::string> DicomItem::text(const DcmTagKey& tag) const {
 std::optional<std::string> DicomItem::raw_text(const DcmTagKey& tag) const {
   DcmElement* element = nullptr;
   if (!has_value(tag) || item_->findAndGetElement(tag, element).bad()) return std::nullopt;
-  OFString whole;
-  if (element->getOFStringArray(whole).bad()) throw Error(fmt::format("{}: {} is not text", where_, described(tag)));
-  const std::string_view value = trimmed(whole);
+  const std::optional<std::string> whole = values_of(*element);
+  if (!whole) throw Error(fmt::format("{}: {} is not text", where_, described(tag)));
+  const std::string_view value = trimmed(*whole);
   if (value.empty()) return std::nullopt;
   return std::string(value);
 }

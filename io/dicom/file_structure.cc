@@ -26,6 +26,7 @@ constexpr std::size_t kMaxDepth = 500;  // no object nests more than ten deep
 constexpr std::size_t kMaxElements = 1'500'000, kElementsOfAnySize = 100'000, kLeastMeanBytes = 16;
 constexpr std::uint64_t kMaxHeaderBytes = std::uint64_t{128} << 20;
 constexpr std::uint64_t kMaxInflatedBytes = std::uint64_t{64} << 20;
+constexpr std::uint32_t kMaxCharacterSetBytes = 1024;  // DCMTK's time grows with the square of their number
 constexpr std::uint32_t kUndefinedLength = 0xFFFFFFFF;
 constexpr std::uint64_t kUntilClosed = ~std::uint64_t{0};
 
@@ -267,6 +268,8 @@ class Walk {
     header_bytes_ += element.length;
     if (header_bytes_ > kMaxHeaderBytes)
       fail(fmt::format("has more than {} MiB besides its pixels", kMaxHeaderBytes >> 20));
+    if (element.tag == DCM_SpecificCharacterSet && element.length > kMaxCharacterSetBytes)
+      fail(fmt::format("{} has {} bytes, expected at most {}", named(element), element.length, kMaxCharacterSetBytes));
   }
 
   // PS3.5 6.2.2: what is in an element of unknown VR is implicit little endian.

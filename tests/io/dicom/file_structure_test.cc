@@ -164,6 +164,17 @@ TEST(FileStructure, ALargeValueBesidesThePixelsIsRefused) {
               HasSubstr("a.dcm: has more than 128 MiB besides its pixels"));
 }
 
+// DCMTK would look through all of it once for each of its values.
+TEST(FileStructure, ALongListOfCharacterSetsIsRefused) {
+  const std::string sets(2000, '\\');
+  EXPECT_THAT(error_of(explicit_little(shorter(0x0008, 0x0005, "CS", sets) + kSopClass)),
+              HasSubstr("SpecificCharacterSet (0008,0005) at byte 160 has 2000 bytes, expected at most 1024"));
+  const std::string in_item = shorter(0x0008, 0x0005, "CS", sets);
+  EXPECT_THAT(error_of(explicit_little(kSopClass + longer(0x300A, 0x00B0, "SQ", kUndefined) + item(kUndefined) +
+                                       in_item + kItemEnd + kSequenceEnd)),
+              HasSubstr("has 2000 bytes, expected at most 1024"));
+}
+
 TEST(FileStructure, ElementsThatEndBehindWhatIsAroundThemAreRefused) {
   EXPECT_THAT(error_of(explicit_little(longer(0x0008, 0x0016, "UN", 100))),
               HasSubstr("X.dcm: ends before what its elements announce"));
