@@ -13,7 +13,13 @@ install(EXPORT isoshift NAMESPACE isoshift:: FILE isoshift-targets.cmake DESTINA
 write_basic_package_version_file(isoshift-config-version.cmake COMPATIBILITY SameMinorVersion)
 install(FILES cmake/isoshift-config.cmake cmake/dependencies.cmake cmake/opencv.cmake
         ${PROJECT_BINARY_DIR}/isoshift-config-version.cmake DESTINATION ${package_files} COMPONENT development)
+# OpenCV is no part of the interface.
+set(on_opencv)
+foreach(header field_edges field_sides leaf_outline mat small_field)
+  list(APPEND on_opencv PATTERN "preprocess/${header}.h" EXCLUDE)
+endforeach()
 foreach(box base geometry setup bodies drr registration io/dicom io/config io/study io/objects)
-  install(DIRECTORY ${box}/ DESTINATION include/isoshift/${box} COMPONENT development FILES_MATCHING PATTERN "*.h")
+  install(DIRECTORY ${box}/ DESTINATION include/isoshift/${box} COMPONENT development FILES_MATCHING PATTERN "*.h"
+          ${on_opencv})
 endforeach()
 install(FILES ${PROJECT_BINARY_DIR}/base/version.h DESTINATION include/isoshift/base COMPONENT development)

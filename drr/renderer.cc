@@ -50,7 +50,7 @@ bool is_splatting(RendererKind kind) {
 
 RenderResult Renderer::render_with_derivatives(std::span<const XrayView>, std::span<const Eigen::Isometry3d>,
                                                const PixelSet&) {
-  throw std::logic_error(fmt::format("the renderer {} has no derivatives", to_string(kind())));
+  throw UsageError(fmt::format("the renderer {} has no derivatives", to_string(kind())));
 }
 
 double default_sigma_mm(SplatOptions::Wobble wobble, double largest_spacing_mm, const XrayView& view) {

@@ -142,7 +142,7 @@ class Renderer {
                               const PixelSet& pixels) = 0;
 
   // The same, and every line integral's derivatives, from the same walk along the ray (docs/algorithms.md,
-  // "Derivatives"). Throws std::logic_error if this renderer has none.
+  // "Derivatives"). Throws UsageError if this renderer has none.
   virtual RenderResult render_with_derivatives(std::span<const XrayView> views,
                                                std::span<const Eigen::Isometry3d> room_from_patient,
                                                const PixelSet& pixels);

@@ -28,6 +28,9 @@ fresh_debian() {
   mount -t proc proc "$root/proc"  # bash in ./dev reads from /dev/fd
 }
 inside() { chroot "$root" env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin HOME=/root DEBIAN_FRONTEND=noninteractive LC_ALL=C.UTF-8 "$@"; }
+install_inside() {
+  inside apt-get install -y -qq --no-install-recommends "$@" >"$root/apt.log" 2>&1 || { tail -n 20 "$root/apt.log" >&2; exit 1; }
+}
 
 if [ -z "$package" ]; then
   fresh_debian
@@ -42,7 +45,7 @@ fresh_debian
 cp "$package" "$root/isoshift.deb"
 cp "$(dirname "$package")"/python3-isoshift_*.deb "$root/python3-isoshift.deb"
 inside apt-get update -qq
-inside apt-get install -y -qq --no-install-recommends man-db /isoshift.deb /python3-isoshift.deb >/dev/null 2>&1
+install_inside man-db /isoshift.deb /python3-isoshift.deb
 inside isoshift --version
 inside man isoshift-register | head -n 4
 inside isoshift phantom -o /demo/study
@@ -52,7 +55,7 @@ inside python3 /usr/share/doc/python3-isoshift/examples/register.py /demo/study
 # Another program, with the libraries.
 cp "$(dirname "$package")"/libisoshift-dev_*.deb "$root/libisoshift-dev.deb"
 cp -r tests/consumer "$root/consumer"
-inside apt-get install -y -qq --no-install-recommends cmake g++ ninja-build /libisoshift-dev.deb >/dev/null 2>&1
+install_inside cmake g++ ninja-build /libisoshift-dev.deb
 inside cmake -S /consumer -B /consumer/build -G Ninja -DCMAKE_BUILD_TYPE=Release >/dev/null
 inside cmake --build /consumer/build
 inside /consumer/build/consumer /demo/study /demo/object.dcm

@@ -120,15 +120,19 @@ void bind_drr(py::module_& module) {
       module, "Renderer",
       "Digitally reconstructed radiographs of one CT: line integrals of attenuation (dimensionless) from the focal "
       "spot to the centers of pixels, in batches of poses and views.")
-      .def(py::init(&renderer_of), py::arg("ct"), py::kw_only(), py::arg("kind") = "cpu",
+      .def(py::init(&renderer_of), py::arg("ct"), py::kw_only(), py::arg("renderer") = "cpu",
            py::arg("megavoltage") = false, py::arg("attenuation") = "physical", py::arg("threshold_hu") = -540.0,
            py::arg("gl") = py::none(),
-           "kind: cpu, raycast (OpenGL), auto (which of both this computer has), the oracles siddon and trilinear, or "
+           "renderer: cpu, raycast (OpenGL), auto (which of both this computer has), the oracles siddon and trilinear, "
+           "or "
            "the founding paper's. megavoltage: views of both beam qualities can be rendered. gl: hardware or software, "
            "for kinds that use OpenGL; None: hardware.")
-      .def_property_readonly("device", &Renderer::device)
-      .def_property_readonly("kind", [](const Renderer& self) { return std::string(to_string(self.kind())); })
-      .def_property_readonly("has_derivatives", &Renderer::has_derivatives)
+      .def_property_readonly("device", &Renderer::device, "What renders: the CPU and its instructions, or a GPU.")
+      .def_property_readonly(
+          "kind", [](const Renderer& self) { return std::string(to_string(self.kind())); },
+          "The argument renderer; of auto, what was chosen.")
+      .def_property_readonly("has_derivatives", &Renderer::has_derivatives,
+                             "Whether render_with_derivatives() and Objective.models() can be called.")
       .def("render", &render, py::arg("views"), py::arg("room_from_patient"), py::arg("pixels") = Pixels(),
            "Poses of shape (4, 4) or (P, 4, 4) make one float32 array per view, of shape (P, rows, columns). pixels: "
            "per view the indices row * columns + column of the pixels that are rendered; the arrays are then of "

@@ -19,6 +19,7 @@ std::vector<Eigen::Isometry3d> poses_from(const Poses& array) {
   for (std::size_t n = 0; n < count; ++n) {
     Eigen::Affine3d affine;
     affine.matrix() = Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(array.data() + 16 * n);
+    if (!affine.matrix().allFinite()) throw py::value_error(fmt::format("pose {} is not finite", n));
     const bool is_affine = affine.matrix().row(3) == Eigen::RowVector4d(0, 0, 0, 1);
     const auto rigid = is_affine ? as_rigid(affine) : std::nullopt;
     if (!rigid) throw py::value_error(fmt::format("pose {} is not a rigid motion", n));
@@ -28,7 +29,8 @@ std::vector<Eigen::Isometry3d> poses_from(const Poses& array) {
 }
 
 Eigen::Isometry3d pose_from(const Poses& array) {
-  if (array.ndim() != 2) throw py::value_error("a pose has the shape (4, 4)");
+  if (array.ndim() != 2 || array.shape(0) != 4 || array.shape(1) != 4)
+    throw py::value_error("one pose is expected, of the shape (4, 4)");
   return poses_from(array).front();
 }
 
@@ -47,9 +49,16 @@ namespace {
 XrayView view_of_carm(double gantry_deg, double sad_mm, double sid_mm, int columns, int rows, double pixel_mm,
                       bool is_megavoltage) {
   check_size(columns, rows);
-  const bool is_possible = std::isfinite(gantry_deg) && std::isfinite(sid_mm) && pixel_mm > 0.0 &&
-                           std::isfinite(pixel_mm) && sad_mm > 0.0 && sid_mm > sad_mm;
-  if (!is_possible) throw py::value_error("pixel_mm and sad_mm are positive, sid_mm is larger than sad_mm");
+  constexpr double kLongestMm = 1e5, kLeastPixelMm = 1e-3, kLargestPixelMm = 1e2;
+  const auto expect = [](bool is_possible, const char* name, double value, const std::string& expected) {
+    if (!is_possible) throw py::value_error(fmt::format("{} is {}, expected {}", name, value, expected));
+  };
+  expect(std::isfinite(gantry_deg), "gantry_deg", gantry_deg, "a finite number");
+  expect(sad_mm >= 1.0 && sad_mm <= kLongestMm, "sad_mm", sad_mm, fmt::format("1 to {:g}", kLongestMm));
+  expect(sid_mm > sad_mm && sid_mm <= kLongestMm, "sid_mm", sid_mm,
+         fmt::format("more than sad_mm, at most {:g}", kLongestMm));
+  expect(pixel_mm >= kLeastPixelMm && pixel_mm <= kLargestPixelMm, "pixel_mm", pixel_mm,
+         fmt::format("{:g} to {:g}", kLeastPixelMm, kLargestPixelMm));
   const CarmGeometry geometry{.sad_mm = sad_mm,
                               .gantry_angle_rad = rad_from_deg(gantry_deg),
                               .receptor_translation_mm = Eigen::Vector3d(0.0, 0.0, sad_mm - sid_mm),
@@ -68,14 +77,16 @@ void bind_geometry(py::module_& module) {
       module, "XrayView",
       "The camera of an X-ray in the room (IEC 61217 fixed, mm, origin at the isocenter). Pixel centers "
       "lie at integer (column, row).")
-      .def_readonly("columns", &XrayView::columns)
-      .def_readonly("rows", &XrayView::rows)
+      .def_readonly("columns", &XrayView::columns, "The width of the image, pixels.")
+      .def_readonly("rows", &XrayView::rows, "The height of the image, pixels.")
       .def_property_readonly(
           "pixel_from_room", [](const XrayView& view) { return view.pixel_from_room; },
           "The projection, shape (3, 4): homogeneous (column, row, 1) of a room point.")
       .def_property_readonly(
           "source_room_mm", [](const XrayView& view) { return view.source_room_mm; }, "The focal spot, shape (3,).")
-      .def_property_readonly("is_megavoltage", [](const XrayView& view) { return view.beam == Beam::kMegavoltage; })
+      .def_property_readonly(
+          "is_megavoltage", [](const XrayView& view) { return view.beam == Beam::kMegavoltage; },
+          "Whether the treatment beam made the image.")
       .def(
           "project", [](const XrayView& view, const Eigen::Vector3d& room_mm) { return view.project(room_mm); },
           py::arg("room_mm"), "(column, row) of a room point, or None at or behind the source.")

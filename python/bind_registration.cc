@@ -1,7 +1,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
+#include <filesystem>
 #include <map>
 #include <memory>
 #include <optional>
@@ -18,24 +20,36 @@
 #include "registration/similarity/similarity.h"
 #include "workflow/observer.h"
 #include "workflow/register/register_study.h"
+#include "workflow/register/setup_result_of.h"
 
 namespace isoshift::python {
 namespace {
 
 SimilarityKind kind_from(const std::string& name) {
   const auto kind = similarity_kind_from(name);
-  if (!kind) throw UsageError(fmt::format("there is no similarity {}", name));
+  if (!kind) {
+    std::string known;
+    for (const SimilarityKind other : kSimilarityKinds) known += fmt::format(" {}", to_string(other));
+    throw UsageError(fmt::format("there is no similarity {}; expected one of:{}", name, known));
+  }
   return *kind;
 }
 
 std::unique_ptr<Objective> objective_of(Renderer& renderer, const std::vector<FixedImage>& images, const Poses& about,
                                         const std::string& similarity, double pixel_fraction, std::size_t min_pixels,
                                         std::uint64_t seed) {
+  if (images.empty()) throw UsageError("images: expected at least one");
+  if (!(pixel_fraction > 0.0 && pixel_fraction <= 1.0))
+    throw UsageError(fmt::format("pixel_fraction is {}, expected more than 0, at most 1", pixel_fraction));
   const ObjectiveOptions options{
       .similarity = kind_from(similarity), .pixel_fraction = pixel_fraction, .min_pixels = min_pixels, .seed = seed};
   const Eigen::Isometry3d pose = pose_from(about);
   const py::gil_scoped_release released;
-  return std::make_unique<Objective>(renderer, images, pose, options);
+  auto objective = std::make_unique<Objective>(renderer, images, pose, options);
+  const RenderResult drrs = objective->render(std::span(&pose, 1));
+  for (std::size_t view = 0; view < images.size(); ++view)
+    require_not_empty(drrs.line_integrals(0, view), name_of_view(images[view].label, view));
+  return objective;
 }
 
 // What work does on several poses, without Python's lock.
@@ -55,7 +69,8 @@ double similarity_of(const std::string& kind, const py::array_t<float, py::array
   const SimilarityKind known = kind_from(kind);
   if (known == SimilarityKind::kGradientCorrelation)
     throw UsageError("gradient-correlation compares neighbors: Objective computes it");
-  if (xray.size() != drr.size()) throw py::value_error("both lists have as many pixels");
+  const bool is_alike = xray.ndim() == drr.ndim() && std::equal(xray.shape(), xray.shape() + xray.ndim(), drr.shape());
+  if (!is_alike) throw py::value_error("xray and drr have the same shape");
   const std::vector<float> fixed(xray.data(), xray.data() + xray.size());
   const std::span<const float> moving(drr.data(), static_cast<std::size_t>(drr.size()));
   if (moving.empty()) throw py::value_error("the lists hold no pixel");
@@ -66,11 +81,16 @@ double similarity_of(const std::string& kind, const py::array_t<float, py::array
 }
 
 SetupResult register_for_python(const LoadedStudy& loaded, RegisterOptions options, std::optional<Start> start) {
+  const auto begin = std::chrono::steady_clock::now();
   options.registration.settle();
   SharedWork none;
   Observer nobody;
   const py::gil_scoped_release released;
-  SetupResult result = register_loaded(loaded.study, options, {}, std::move(start), none, nobody);
+  const std::optional<SiteRules> site = chosen_site(named_site(options.site), options.anatomy);
+  SetupResult result = register_loaded(loaded.study, options, site, std::move(start), none, nobody);
+  result.seconds_load = loaded.seconds;
+  result.seconds_total =
+      loaded.seconds + std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   result.warnings = loaded.notes.warnings;
   if (const auto failure = options.registration.rendering.failed_gpu())
     result.warnings.push_back(fmt::format("{}; rendered on the CPU instead", *failure));
@@ -115,31 +135,40 @@ void bind_result(py::module_& module) {
           "Of the motion between the setup error found and the true one, shape (6, 6): translation (mm), rotation "
           "vector "
           "(rad). None if the images do not determine the pose.")
-      .def_readonly("warnings", &SetupResult::warnings)
-      .def("as_dict", &json_of, "result.json as a dict.")
-      .def("__str__", [](const SetupResult& result) { return text_report(report_page(result)); });
+      .def_property_readonly(
+          "warnings", [](const SetupResult& result) { return texts_of(result.warnings); }, "What a person should know.")
+      .def("as_dict", &json_of,
+           "result.json as a dict. references.spatial_registration is None: write_spatial_registration() returns it.")
+      .def("__str__", [](const SetupResult& result) { return text_of(text_report(report_page(result))); });
 }
 
 void bind_register(py::module_& module) {
   module.def(
       "register",
       [](const LoadedStudy& study, const std::string& preset, const std::string& dof, const std::string& target,
-         const std::string& renderer, std::uint64_t seed, const std::optional<Poses>& start_setup_error, bool search) {
+         const std::string& renderer, const std::optional<std::string>& gl, const std::filesystem::path& site,
+         const std::string& anatomy, std::uint64_t seed, const std::optional<Poses>& start_setup_error, bool search) {
         RegisterOptions options;
         options.registration.search.preset = preset;
         options.registration.search.dof = dof;
         options.registration.search.seed = seed;
         options.registration.search.is_searched = search;
         options.registration.rendering.renderer = renderer;
+        options.registration.rendering.gl = gl;
         options.target = target;
+        options.site = site;
+        options.anatomy = anatomy;
         std::optional<Start> start;
         if (start_setup_error) start = Start{.setup_error = pose_from(*start_setup_error), .set_by = "Python"};
         return register_for_python(study, std::move(options), std::move(start));
       },
       py::arg("study"), py::kw_only(), py::arg("preset") = "setup", py::arg("dof") = "rigid", py::arg("target") = "",
-      py::arg("renderer") = "auto", py::arg("seed") = 1, py::arg("start_setup_error") = py::none(),
-      py::arg("search") = true,
-      "Find the setup error of a study, as isoshift register does. search: false judges the start and searches none.");
+      py::arg("renderer") = "auto", py::arg("gl") = py::none(), py::arg("site") = "", py::arg("anatomy") = "",
+      py::arg("seed") = 1, py::arg("start_setup_error") = py::none(), py::arg("search") = true,
+      "Find the setup error of a study, as isoshift register does. preset: setup, fast or paper. dof: rigid or "
+      "translation. target: a structure, or isocenter. renderer, gl: as of Renderer. site: a site file; anatomy: one "
+      "of its anatomies. start_setup_error: where the search begins, shape (4, 4), as SetupResult.setup_error (the "
+      "identity: as planned). search: false judges the start and searches none.");
   module.def(
       "write_spatial_registration",
       [](const LoadedStudy& loaded, const SetupResult& result, const std::filesystem::path& path, bool for_review,
@@ -167,8 +196,9 @@ void bind_register(py::module_& module) {
 
 void bind_registration(py::module_& module) {
   py::class_<FixedImage>(module, "FixedImage", "An X-ray as it is compared with DRRs.")
-      .def_readonly("view", &FixedImage::view)
-      .def_readonly("label", &FixedImage::label)
+      .def_readonly("view", &FixedImage::view, "Its camera.")
+      .def_property_readonly(
+          "label", [](const FixedImage& image) { return text_of(image.label); }, "That of the X-ray.")
       .def_property_readonly(
           "line_integral",
           [](const py::object& self) { return python::array_of(self.cast<const FixedImage&>().line_integral, self); },
@@ -185,15 +215,21 @@ void bind_registration(py::module_& module) {
           py::arg("factor"), "Blocks of factor x factor pixels, averaged.");
   module.def(
       "prepare", [](const XrayImage& xray) { return prepare(xray); }, py::arg("xray"),
-      py::call_guard<py::gil_scoped_release>(), "Line integrals and irradiated field of an X-ray.");
+      py::call_guard<py::gil_scoped_release>(),
+      "The line integrals of an X-ray, made of its intensities, and the irradiated field that is found in it.");
   module.def("similarity", &similarity_of, py::arg("kind"), py::arg("xray"), py::arg("drr"),
-             "How alike two equally long lists of pixels are: ncc, src, mi or nmi.");
+             "How alike the pixels of two arrays of one shape are, more is better: ncc or src (at most 1), mi (natural "
+             "logarithms) or nmi (1 to 2). Histograms have the range of drr.");
   py::class_<Objective>(module, "Objective",
                         "How well DRRs at some poses match X-rays. Poses of shape (4, 4) or (P, 4, 4).")
       .def(py::init(&objective_of), py::arg("renderer"), py::arg("images"), py::arg("about"), py::kw_only(),
            py::arg("similarity") = "src", py::arg("pixel_fraction") = 1.0, py::arg("min_pixels") = 1000,
            py::arg("seed") = 1, py::keep_alive<1, 2>(),
-           "images: what prepare() made. about: a pose near those to come.")
+           "images: what prepare() made. similarity: src, ncc, mi, nmi or gradient-correlation; more is better. about: "
+           "a "
+           "pose within some centimeters of those to come: gradients are compared where its DRRs have strong ones, and "
+           "histograms (src, mi, nmi) have the range of its DRRs. pixel_fraction: the share of the field's pixels that "
+           "is compared, and min_pixels the least number of them in every view; seed draws them.")
       .def(
           "values",
           [](Objective& self, const Poses& poses) {
@@ -215,8 +251,9 @@ void bind_registration(py::module_& module) {
             return models;
           },
           py::arg("room_from_patient"),
-          "Per pose the value, its gradient, shape (6,), and its curvature, shape (6, 6) or (0, 0): by the patient's "
-          "translation (mm) and rotation (rad) in the room, about the isocenter.");
+          "Per pose the value, its gradient, shape (6,), and its curvature, shape (6, 6): by the patient's translation "
+          "(mm) and rotation (rad) in the room, about the isocenter. mi and nmi have no curvature, shape (0, 0). The "
+          "gradient of src is that of the ranks as they stand.");
   bind_result(module);
   bind_register(module);
 }

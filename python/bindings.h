@@ -8,6 +8,8 @@
 #include <pybind11/stl/filesystem.h>
 
 #include <Eigen/Geometry>
+#include <string>
+#include <string_view>
 #include <vector>
 
 #include "geometry/image.h"
@@ -21,7 +23,12 @@ namespace py = pybind11;
 struct LoadedStudy {
   Study study;
   Notes notes;
+  double seconds = 0.0;  // that took
 };
+
+// Texts may hold the names of files, whose bytes need not be UTF-8: what is not is written as \\xNN.
+py::str text_of(std::string_view text);
+py::list texts_of(const std::vector<std::string>& texts);
 
 void bind_geometry(py::module_& module);
 void bind_study(py::module_& module);

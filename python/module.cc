@@ -2,15 +2,57 @@
 
 #include <pybind11/pybind11.h>
 
+#include <exception>
+#include <string>
+#include <string_view>
+#include <vector>
+
 #include "base/error.h"
 #include "base/version.h"
 #include "io/dicom/decoder_process.h"
 #include "python/bindings.h"
 
+namespace isoshift::python {
+
+py::str text_of(std::string_view text) {
+  PyObject* decoded = PyUnicode_DecodeUTF8(text.data(), static_cast<Py_ssize_t>(text.size()), "backslashreplace");
+  if (decoded == nullptr) throw py::error_already_set();
+  return py::reinterpret_steal<py::str>(decoded);
+}
+
+py::list texts_of(const std::vector<std::string>& texts) {
+  py::list list;
+  for (const std::string& text : texts) list.append(text_of(text));
+  return list;
+}
+
+namespace {
+
+// The classes of the module live as long as the interpreter.
+PyObject *error_class = nullptr, *usage_error_class = nullptr;
+
+void translate(std::exception_ptr thrown) {
+  try {
+    if (thrown) std::rethrow_exception(thrown);
+  } catch (const UsageError& error) {
+    PyErr_SetObject(usage_error_class, text_of(error.what()).ptr());
+  } catch (const Error& error) {
+    PyErr_SetObject(error_class, text_of(error.what()).ptr());
+  }
+}
+
+void bind_errors(py::module_& module) {
+  error_class = py::exception<Error>(module, "Error", PyExc_RuntimeError).inc_ref().ptr();
+  usage_error_class = py::exception<UsageError>(module, "UsageError", error_class).inc_ref().ptr();
+  py::register_exception_translator(&translate);
+}
+
+}  // namespace
+}  // namespace isoshift::python
+
 PYBIND11_MODULE(_isoshift, module) {
   namespace py = pybind11;
-  const auto error = py::register_exception<isoshift::Error>(module, "Error", PyExc_RuntimeError);
-  py::register_exception<isoshift::UsageError>(module, "UsageError", error.ptr());
+  isoshift::python::bind_errors(module);
   module.attr("__version__") = isoshift::kVersion;
   module.def("use_decoder", &isoshift::use_decoder, py::arg("program"),
              "Name the program isoshift, which decodes compressed pixels in a process of their own.");

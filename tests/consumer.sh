@@ -11,6 +11,9 @@ if grep -rn -e '-W[a-z]' -e "$source" -e "$build" "$work/prefix/lib/cmake"; then
   echo "error: the installed package names what only the build may know" >&2
   exit 1
 fi
+# Every header that is installed can be included.
+(cd "$work/prefix/include/isoshift" && find . -name '*.h' -printf '#include "%P"\n' | sort) >"$work/headers.cc"
+g++ -std=c++20 -fsyntax-only -I "$work/prefix/include/isoshift" -isystem /usr/include/eigen3 "$work/headers.cc"
 cmake -S "$source/tests/consumer" -B "$work/build" -G Ninja -DCMAKE_PREFIX_PATH="$work/prefix" -DCMAKE_BUILD_TYPE=Release >"$work/log" 2>&1 &&
   cmake --build "$work/build" >>"$work/log" 2>&1 || { cat "$work/log" >&2; exit 1; }
 cp -r "$source/testdata/small/1" "$work/study"

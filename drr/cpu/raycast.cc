@@ -10,6 +10,7 @@
 #include "base/option_name.h"
 #include "base/parallel.h"
 #include "drr/cpu/march.h"
+#include "drr/of_beam.h"
 
 namespace isoshift {
 namespace {
@@ -231,7 +232,7 @@ PlaneLattice<T> RaycastCpuRenderer::PackedVolume::lattice(int main_axis) const {
 
 void RaycastCpuRenderer::integrate(std::span<const VoxelRay> rays, Beam beam, std::span<float> line_integrals,
                                    std::span<RayGradient> gradients) const {
-  const PackedVolume& volume = volumes_.at(beam);
+  const PackedVolume& volume = of_beam(volumes_, beam);
   std::ranges::fill(line_integrals, 0.0F);
   std::ranges::fill(gradients, RayGradient());
   if (volume.size.isZero()) return;

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "drr/cpu/cell_walk.h"
+#include "drr/of_beam.h"
 
 namespace isoshift {
 namespace {
@@ -27,7 +28,7 @@ SiddonRenderer::SiddonRenderer(const Volume<float>& ct_hu, const AttenuationMode
 
 void SiddonRenderer::integrate(std::span<const VoxelRay> rays, Beam beam, std::span<float> line_integrals,
                                std::span<RayGradient>) const {
-  const Volume<float>& volume = attenuation_per_mm_.at(beam);
+  const Volume<float>& volume = of_beam(attenuation_per_mm_, beam);
   std::ranges::transform(rays, line_integrals.begin(),
                          [&](const VoxelRay& ray) { return static_cast<float>(line_integral(ray, volume)); });
 }

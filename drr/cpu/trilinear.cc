@@ -5,6 +5,7 @@
 #include "base/parallel.h"
 #include "drr/cpu/cell_walk.h"
 #include "drr/interpolation.h"
+#include "drr/of_beam.h"
 
 namespace isoshift {
 namespace {
@@ -78,7 +79,7 @@ TrilinearRenderer::TrilinearRenderer(AttenuationByBeam attenuation_per_mm)
 
 void TrilinearRenderer::integrate(std::span<const VoxelRay> rays, Beam beam, std::span<float> line_integrals,
                                   std::span<RayGradient> gradients) const {
-  const Volume<float>& volume = attenuation_per_mm_.at(beam);
+  const Volume<float>& volume = of_beam(attenuation_per_mm_, beam);
   const auto voxel_at = [&](const Eigen::Vector3i& at) { return voxel_or_zero(volume, at); };
   std::ranges::transform(rays, line_integrals.begin(), [&](const VoxelRay& ray) {
     return static_cast<float>(line_integral(ray, volume.size, voxel_at));

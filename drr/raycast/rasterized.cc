@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "drr/camera.h"
+#include "drr/of_beam.h"
 #include "drr/raycast/between_faces.frag.h"
 #include "drr/raycast/bounding_faces.h"
 #include "drr/raycast/faces.frag.h"
@@ -113,7 +114,7 @@ RenderResult RasterizedRaycaster::render(std::span<const XrayView> views,
 }
 
 void RasterizedRaycaster::draw_faces(const XrayView& view, const Eigen::Isometry3d& room_from_patient, bool front) {
-  const Structure& structure = structures_.at(view.beam);
+  const Structure& structure = of_beam(structures_, view.beam);
   RenderTarget& target = front ? front_ : back_;
   target.resize_and_use(view.columns, view.rows);
   target.clear(front ? 1.0F : 0.0F);
@@ -138,11 +139,11 @@ void RasterizedRaycaster::draw_line_integrals(const XrayView& view, const Eigen:
   const int rows = (static_cast<int>(count) + columns - 1) / columns;
   const std::uint32_t none = 0;
   pixels_.upload(std::as_bytes(has_list ? pixel_list : std::span(&none, 1)));
-  const AttenuationTexture& attenuation = attenuation_.at(view.beam);
+  const AttenuationTexture& attenuation = of_beam(attenuation_, view.beam);
 
   result_.resize_and_use(columns, rows);
   integral_program_.use();
-  structures_.at(view.beam).vertices.bind();  // any will do: none of its attributes is read
+  of_beam(structures_, view.beam).vertices.bind();  // any will do: none of its attributes is read
   attenuation.texture.bind(kAttenuation);
   front_.bind(kFront);
   back_.bind(kBack);

@@ -5,11 +5,13 @@
 #include <algorithm>
 #include <array>
 #include <limits>
+#include <tuple>
 
 #include "base/error.h"
 #include "base/option_name.h"
 #include "drr/camera.h"
 #include "drr/occupied_blocks.h"
+#include "drr/of_beam.h"
 #include "drr/raycast/raycast.comp.h"
 
 namespace isoshift {
@@ -184,7 +186,7 @@ void RaycastGlRenderer::upload_views(std::span<const XrayView> views, const std:
                                      const PixelSet& pixels) {
   std::vector<GlView> gl_views;
   for (std::size_t v = 0; v < views.size(); ++v) {
-    attenuation_.at(views[v].beam);  // a beam that was not prepared is a logic error
+    std::ignore = of_beam(attenuation_, views[v].beam);
     const bool in_squares = pixels.of_view.empty() && views[v].columns % 8 == 0 && views[v].rows % 8 == 0;
     gl_views.push_back({.first_pixel = static_cast<std::uint32_t>(begins[v]),
                         .columns = static_cast<std::uint32_t>(views[v].columns),

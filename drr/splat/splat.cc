@@ -10,6 +10,7 @@
 #include "base/error.h"
 #include "base/option_name.h"
 #include "drr/camera.h"
+#include "drr/of_beam.h"
 #include "drr/splat/splat.frag.h"
 #include "drr/splat/splat.vert.h"
 
@@ -139,7 +140,7 @@ RenderResult SplatRenderer::render(std::span<const XrayView> views,
 }
 
 void SplatRenderer::draw(const XrayView& view, const Eigen::Isometry3d& room_from_patient) {
-  Voxels& voxels = voxels_.at(view.beam);
+  Voxels& voxels = of_beam(voxels_, view.beam);
   const Receptor receptor(view);
   const double sigma_mm = options_.sigma_mm.value_or(
       default_sigma_mm(options_.wobble, patient_from_voxel_.linear().colwise().norm().maxCoeff(), view));

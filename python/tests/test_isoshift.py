@@ -182,7 +182,7 @@ def test_what_cannot_be_is_an_error(folder, study, renderer, tmp_path):
     with pytest.raises(ValueError, match="pose 0 is not a rigid motion"):
         renderer.render(study.views, 2 * np.eye(4))
     with pytest.raises(isoshift.UsageError, match="renderer=gpu: there is no such renderer"):
-        isoshift.Renderer(study.ct, kind="gpu")
+        isoshift.Renderer(study.ct, renderer="gpu")
     for nonsense in ({"preset": "best"}, {"dof": "Rigid"}, {"renderer": "gpu"}):
         with pytest.raises(isoshift.UsageError):
             isoshift.register(study, **nonsense)
@@ -206,6 +206,60 @@ def test_numbers_that_mean_nothing_are_errors(study):
                      *(lambda kind=kind: isoshift.similarity(kind, numbers, nan) for kind in ("ncc", "src", "mi", "nmi"))):
         with pytest.raises(ValueError):
             nonsense()
+
+
+def test_views_and_comparisons_that_cannot_be_are_errors(study, renderer):
+    pose, images = study.planned_room_from_patient, [isoshift.prepare(xray) for xray in study.xrays]
+    with pytest.raises(isoshift.UsageError, match="images: expected at least one"):
+        isoshift.Objective(renderer, [], pose)
+    for share in (-1, 0, 2, float("nan"), float("inf")):
+        with pytest.raises(isoshift.UsageError, match="pixel_fraction is"):
+            isoshift.Objective(renderer, images, pose, pixel_fraction=share)
+    away = np.array(pose)
+    away[0, 3] += 1e5
+    with pytest.raises(isoshift.Error, match="KV_G000: the DRR is empty"):
+        isoshift.Objective(renderer, images, away)
+    siddon = isoshift.Renderer(study.ct, renderer="siddon")
+    with pytest.raises(isoshift.UsageError, match="the renderer siddon has no derivatives"):
+        siddon.render_with_derivatives(study.views, pose)
+    with pytest.raises(isoshift.UsageError, match="a view is megavoltage"):
+        renderer.render([isoshift.carm_view(0, is_megavoltage=True, columns=16, rows=16)], pose)
+    for nonsense, name in (({"pixel_mm": 1e-300}, "pixel_mm"), ({"sad_mm": 1e-300}, "sad_mm"), ({"sid_mm": 900}, "sid_mm")):
+        with pytest.raises(ValueError, match=f"{name} is"):
+            isoshift.carm_view(0, **nonsense)
+    with pytest.raises(ValueError, match="gantry_deg is nan"):
+        isoshift.carm_view(float("nan"))
+
+
+def test_pixels_of_ones_own_are_compared(study, renderer):
+    pose = study.planned_room_from_patient
+    images = []
+    for view, drr in zip(study.views, renderer.render(study.views, pose)):
+        images.append(isoshift.prepare(isoshift.XrayImage(view, 1e4 * np.exp(-drr[0]), label="own")))
+    assert images[0].label == "own" and not isoshift.XrayImage(study.views[0], drr[0]).is_line_integral
+    poses = np.array([pose, moved(study, (3, 0, 0)), moved(study, (0, 0, -3))])
+    values = isoshift.Objective(renderer, images, pose, similarity="ncc").values(poses)
+    assert values.argmax() == 0 and values[0] > 0.99
+    for nonsense in (drr[0][1:], np.full_like(drr[0], np.nan), -1 - drr[0]):
+        with pytest.raises(ValueError, match="values: expected"):
+            isoshift.XrayImage(study.views[0], nonsense)
+
+
+def test_names_of_files_need_not_be_utf_8(folder, tmp_path):
+    with pytest.raises(isoshift.Error, match=r"st\\xff: no such file"):
+        isoshift.load_study(os.fsdecode(os.fsencode(tmp_path) + b"/st\xff"))
+    copy = tmp_path / "study"
+    subprocess.run(["cp", "-r", folder, copy], check=True)
+    with open(os.fsencode(copy) + b"/not\xffes.txt", "w", encoding="ascii") as file:
+        file.write("no DICOM")
+    assert any("not\\xffes.txt" in text for text in isoshift.load_study(copy).left_aside)
+
+
+def test_a_site_decides_and_times_are_told(study):
+    result = isoshift.register(study, site=SOURCE / "testdata" / "config" / "site" / "linac.json").as_dict()
+    assert result["site"] is not None and isoshift.register(study).as_dict()["site"] is None
+    seconds = result["seconds"]
+    assert 0 < seconds["load"] < seconds["total"] and seconds["register"] < seconds["total"]
 
 
 def test_an_object_is_of_the_study_of_its_result(study, tmp_path):

@@ -5,6 +5,7 @@
 
 #include <cmath>
 
+#include "base/error.h"
 #include "drr/renderer.h"
 #include "tests/drr/test_views.h"
 #include "tests/support/gpu.h"
@@ -138,7 +139,7 @@ TEST(Derivatives, ARendererWithoutThemSaysSo) {
   const auto siddon = make_renderer(RendererKind::kSiddon, smooth_volume(), kAll, kBothBeams);
   EXPECT_FALSE(siddon->has_derivatives());
   const auto pose = Eigen::Isometry3d::Identity();
-  EXPECT_THROW(siddon->render_with_derivatives(three_views(), std::span(&pose, 1), PixelSet::all()), std::logic_error);
+  EXPECT_THROW(siddon->render_with_derivatives(three_views(), std::span(&pose, 1), PixelSet::all()), UsageError);
 }
 
 }  // namespace
