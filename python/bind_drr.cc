@@ -123,10 +123,9 @@ void bind_drr(py::module_& module) {
       .def(py::init(&renderer_of), py::arg("ct"), py::kw_only(), py::arg("renderer") = "cpu",
            py::arg("megavoltage") = false, py::arg("attenuation") = "physical", py::arg("threshold_hu") = -540.0,
            py::arg("gl") = py::none(),
-           "renderer: cpu, raycast (OpenGL), auto (which of both this computer has), the oracles siddon and trilinear, "
-           "or "
-           "the founding paper's. megavoltage: views of both beam qualities can be rendered. gl: hardware or software, "
-           "for kinds that use OpenGL; None: hardware.")
+           "renderer: cpu, raycast (OpenGL), auto (which of both this computer has), the oracles siddon and "
+           "trilinear, or the founding paper's. megavoltage: views of both beam qualities can be rendered. gl: "
+           "hardware or software, for renderers that use OpenGL; None: hardware.")
       .def_property_readonly("device", &Renderer::device, "What renders: the CPU and its instructions, or a GPU.")
       .def_property_readonly(
           "kind", [](const Renderer& self) { return std::string(to_string(self.kind())); },

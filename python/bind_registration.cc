@@ -133,8 +133,7 @@ void bind_result(py::module_& module) {
             return result.uncertainty->covariance;
           },
           "Of the motion between the setup error found and the true one, shape (6, 6): translation (mm), rotation "
-          "vector "
-          "(rad). None if the images do not determine the pose.")
+          "vector (rad). None if the images do not determine the pose.")
       .def_property_readonly(
           "warnings", [](const SetupResult& result) { return texts_of(result.warnings); }, "What a person should know.")
       .def("as_dict", &json_of,
@@ -225,11 +224,10 @@ void bind_registration(py::module_& module) {
       .def(py::init(&objective_of), py::arg("renderer"), py::arg("images"), py::arg("about"), py::kw_only(),
            py::arg("similarity") = "src", py::arg("pixel_fraction") = 1.0, py::arg("min_pixels") = 1000,
            py::arg("seed") = 1, py::keep_alive<1, 2>(),
-           "images: what prepare() made. similarity: src, ncc, mi, nmi or gradient-correlation; more is better. about: "
-           "a "
-           "pose within some centimeters of those to come: gradients are compared where its DRRs have strong ones, and "
-           "histograms (src, mi, nmi) have the range of its DRRs. pixel_fraction: the share of the field's pixels that "
-           "is compared, and min_pixels the least number of them in every view; seed draws them.")
+           "images: what prepare() made. similarity: src, ncc, mi, nmi or gradient-correlation; more is better. "
+           "about: a pose within some centimeters of those to come: gradients are compared where its DRRs have "
+           "strong ones, and histograms (src, mi, nmi) have the range of its DRRs. pixel_fraction: the share of the "
+           "field's pixels that is compared, and min_pixels the least number of them in every view; seed draws them.")
       .def(
           "values",
           [](Objective& self, const Poses& poses) {

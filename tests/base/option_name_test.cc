@@ -12,6 +12,8 @@ TEST(OptionName, IsThatOfAnArgumentOrOfAFlag) {
   EXPECT_EQ(option("couch-angle", "DEG"), "couch_angle_deg");
   EXPECT_EQ(option("isocenter", "X,Y,Z"), "isocenter=X,Y,Z");
   EXPECT_EQ(option("assume-centered"), "assume_centered");
+  EXPECT_EQ(option("sid", "1500"), "sid_mm=1500");
+  EXPECT_EQ(option("image", "FILE"), "images=FILE");
   name_options(OptionStyle::kFlags);
 }
 
