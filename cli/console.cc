@@ -72,7 +72,7 @@ void ConsoleObserver::show(std::string_view line) {
 void ConsoleObserver::say(std::string_view line) {
   bar_.reset();
   if (std::exchange(shows_line_, false)) console_.err << kClearedLine;
-  console_.err << printable_lines(line) << std::endl;
+  console_.err << printable_lines(line) << "\n" << std::flush;
 }
 
 void print_warnings(const std::vector<std::string>& warnings, Console& console) {

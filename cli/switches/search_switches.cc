@@ -8,6 +8,7 @@ namespace {
 template <class Kinds>
 std::vector<std::string> names_of(const Kinds& kinds) {
   std::vector<std::string> names;
+  names.reserve(kinds.size());
   for (const auto kind : kinds) names.emplace_back(to_string(kind));
   return names;
 }
