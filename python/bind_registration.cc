@@ -191,9 +191,7 @@ void bind_register(py::module_& module) {
       "warnings. Raises Error for a result that may not be written.");
 }
 
-}  // namespace
-
-void bind_registration(py::module_& module) {
+void bind_fixed_image(py::module_& module) {
   py::class_<FixedImage>(module, "FixedImage", "An X-ray as it is compared with DRRs.")
       .def_readonly("view", &FixedImage::view, "Its camera.")
       .def_property_readonly(
@@ -216,6 +214,9 @@ void bind_registration(py::module_& module) {
       "prepare", [](const XrayImage& xray) { return prepare(xray); }, py::arg("xray"),
       py::call_guard<py::gil_scoped_release>(),
       "The line integrals of an X-ray, made of its intensities, and the irradiated field that is found in it.");
+}
+
+void bind_objective(py::module_& module) {
   module.def("similarity", &similarity_of, py::arg("kind"), py::arg("xray"), py::arg("drr"),
              "How alike the pixels of two arrays of one shape are, more is better: ncc or src (at most 1), mi (natural "
              "logarithms) or nmi (1 to 2). Histograms have the range of drr.");
@@ -252,6 +253,13 @@ void bind_registration(py::module_& module) {
           "Per pose the value, its gradient, shape (6,), and its curvature, shape (6, 6): by the patient's translation "
           "(mm) and rotation (rad) in the room, about the isocenter. mi and nmi have no curvature, shape (0, 0). The "
           "gradient of src is that of the ranks as they stand.");
+}
+
+}  // namespace
+
+void bind_registration(py::module_& module) {
+  bind_fixed_image(module);
+  bind_objective(module);
   bind_result(module);
   bind_register(module);
 }

@@ -31,9 +31,10 @@ Paths paths_from(const PathOrPaths& given) {
 // What a person allows, as the program's --allow says it.
 std::vector<std::string> allowances(const std::map<std::string, std::string>& allow) {
   std::vector<std::string> texts;
+  texts.reserve(allow.size());
   for (const auto& [key, reason] : allow) {
     if (key.find('=') != key.npos) throw UsageError(fmt::format("allow: no check has the key \"{}\"", key));
-    texts.push_back(key + "=" + reason);
+    texts.push_back(fmt::format("{}={}", key, reason));
   }
   return texts;
 }
@@ -69,9 +70,7 @@ py::array_t<float> voxels_of(const py::object& self) {
                                       hu.voxels.data(), self));
 }
 
-}  // namespace
-
-void bind_study(py::module_& module) {
+void bind_images(py::module_& module) {
   py::class_<CtSeries, std::shared_ptr<CtSeries>>(module, "CtSeries", "The planning CT.")
       .def_property_readonly("hu", &voxels_of, "Hounsfield units, float32, shape (slices, rows, columns).")
       .def_property_readonly(
@@ -93,6 +92,9 @@ void bind_study(py::module_& module) {
       .def_property_readonly(
           "is_line_integral", [](const XrayImage& xray) { return xray.meaning == XrayImage::Meaning::kLineIntegral; },
           "Whether values grow with the attenuation along the ray, and not with the intensity.");
+}
+
+void bind_loaded_study(py::module_& module) {
   py::class_<LoadedStudy, std::shared_ptr<LoadedStudy>>(
       module, "Study", "CT, plan and X-rays of one setup, read and checked as the program does.")
       .def_property_readonly(
@@ -111,6 +113,7 @@ void bind_study(py::module_& module) {
           "views",
           [](const LoadedStudy& loaded) {
             std::vector<XrayView> views;
+            views.reserve(loaded.study.xrays.size());
             for (const XrayImage& xray : loaded.study.xrays) views.push_back(xray.view);
             return views;
           },
@@ -131,6 +134,13 @@ void bind_study(py::module_& module) {
       .def_property_readonly(
           "left_aside", [](const LoadedStudy& loaded) { return texts_of(loaded.notes.left_aside); },
           "Files that were not used, and why.");
+}
+
+}  // namespace
+
+void bind_study(py::module_& module) {
+  bind_images(module);
+  bind_loaded_study(module);
   module.def(
       "load_study",
       [](const std::filesystem::path& folder, const PathOrPaths& ct, const PathOrPaths& images,

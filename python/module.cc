@@ -31,7 +31,7 @@ namespace {
 // The classes of the module live as long as the interpreter.
 PyObject *error_class = nullptr, *usage_error_class = nullptr;
 
-void translate(std::exception_ptr thrown) {
+void translate(std::exception_ptr thrown) {  // NOLINT(performance-unnecessary-value-param): pybind11 calls it so
   try {
     if (thrown) std::rethrow_exception(thrown);
   } catch (const UsageError& error) {
