@@ -22,7 +22,7 @@ set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_NAME libisoshift-dev)
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_SECTION libdevel)
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_DEPENDS
     "libcairo2-dev, libceres-dev, libcsv-dev, libdcmtk-dev, libeigen3-dev, libepoxy-dev, libfmt-dev, libhwy-dev, \
-libnlopt-cxx-dev, libnlopt-dev, libopencv-imgproc-dev, libopenjp2-7-dev, libpango1.0-dev, libseccomp-dev, libssl-dev, libtbb-dev, \
+libnlopt-cxx-dev, libnlopt-dev, libopencv-imgproc-dev, libopenjp2-7-dev, libpango1.0-dev, libseccomp-dev, libssl-dev, libtbb-dev, libtiff-dev, \
 nlohmann-json3-dev, pkg-config, zlib1g-dev")
 if(ISOSHIFT_PYTHON)
   list(APPEND CPACK_COMPONENTS_ALL python)

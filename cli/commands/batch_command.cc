@@ -49,7 +49,7 @@ int print(const BatchSummary& summary, bool as_json, Console& console) {
 int scan(const BatchOptions& options, Console& console) {
   ConsoleObserver observer(console);
   const std::vector<BatchCase> cases = cases_of(options, observer);
-  replace_text(options.output, manifest_csv(cases));
+  write_text(options.output, manifest_csv(cases));
   console.out << fmt::format("{}: {} cases\n", options.output.string(), cases.size());
   return kExitAccepted;
 }

@@ -135,8 +135,9 @@ RtImage read_frame(const std::filesystem::path& path, const DicomItem& d, const 
   image.reported_values_origin = d.text(DCM_ReportedValuesOrigin);
   image.fraction_number = d.number(DCM_FractionNumber);
   image.patient_position = d.text(DCM_PatientPosition);
-  for (const DicomItem& plan : d.items(DCM_ReferencedRTPlanSequence))
-    image.plan_sop_instance_uid = plan.uid(DCM_ReferencedSOPInstanceUID);
+  // The first counts, as where files are chosen (StudyFiles).
+  if (const auto plans = d.items(DCM_ReferencedRTPlanSequence); !plans.empty())
+    image.plan_sop_instance_uid = plans.front().uid(DCM_ReferencedSOPInstanceUID);
   if (const auto number = d.number(DCM_ReferencedBeamNumber)) image.beam_number = static_cast<int>(*number);
   read_acquisition_time(d, image);
   const std::optional<double> offset_s = frame_offset_s(d, frame);

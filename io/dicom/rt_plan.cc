@@ -74,6 +74,9 @@ RtPlan read_rt_plan(const std::filesystem::path& path) {
     if (is_ion && beam.text(DCM_PatientSupportType) == "CHAIR")
       throw Error(fmt::format("{}: {} is CHAIR, expected TABLE", beam.where(), described(DCM_PatientSupportType)));
     plan.beams.push_back(read_beam(beam, is_ion ? DCM_IonControlPointSequence : DCM_ControlPointSequence, dataset));
+    if (std::ranges::count(plan.beams, plan.beams.back().number, &RtPlan::Beam::number) > 1)
+      throw Error(
+          fmt::format("{}: {} {} occurs twice", beam.where(), described(DCM_BeamNumber), plan.beams.back().number));
   }
   for (const DicomItem& reference : dataset.items(DCM_DoseReferenceSequence)) {
     const auto roi_number = reference.number(DCM_ReferencedROINumber);

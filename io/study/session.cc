@@ -210,6 +210,16 @@ std::vector<Finding> switch_doubts(std::span<const RtImage> images, const RtImag
   return doubts;
 }
 
+std::vector<Finding> profile_doubts(const RtImage& image, const RtImage& by_profile) {
+  std::vector<Finding> doubts;
+  for (const TableReadOut& read_out : table_read_outs())
+    if (table_change(read_out, by_profile.table, image.table))
+      doubts.push_back({"table-moved", fmt::format("the machine profile contradicts {}: {} is {}, by the profile {}",
+                                                   image.label, described(read_out.tag), *(image.table.*read_out.value),
+                                                   *(by_profile.table.*read_out.value))});
+  return doubts;
+}
+
 std::vector<Finding> session_doubts(std::span<const RtImage> images, double max_span_s) {
   if (images.size() < 2) return {};
   std::vector<Finding> doubts = setting_doubts(images);

@@ -248,6 +248,7 @@ std::vector<RtImage> read_images(const std::vector<std::filesystem::path>& paths
   for (RtImage& image : images) {
     RtImage by_profile = request.machine ? with_machine(image, *request.machine, request.switches, notes) : image;
     image.pixel_from_room = by_profile.pixel_from_room;  // only the profile tells which views are the same
+    if (request.machine) std::ranges::move(profile_doubts(image, by_profile), std::back_inserter(said.doubts));
     supplied.push_back(with_switches(std::move(by_profile), request.switches, notes));
   }
   // By what was measured: neither a switch nor a profile hides a move of the table.

@@ -214,6 +214,15 @@ void choose_structures(const std::vector<StudyFiles::Structures>& all, const Stu
                        const StudyFiles::Ct& ct, StudyParts& parts, Notes& notes) {
   const auto candidates = candidates_of(all, plan, ct);
   if (candidates.size() == 1) parts.structures = candidates.front()->file;
+  const bool is_planned = plan != nullptr && !plan->structure_set_uid.empty() && !candidates.empty();
+  if (is_planned && candidates.front()->sop_instance_uid != plan->structure_set_uid)
+    notes.warnings.push_back(fmt::format("{}: the RT Structure Set to which the plan refers is not there ({})",
+                                         plan->file.string(), plan->structure_set_uid));
+  else if (is_planned && !is_drawn_on(ct, *candidates.front()))
+    parts.doubts.push_back(
+        fmt::format("the RT Structure Set of the plan, {}, was not drawn on this CT: the plan may "
+                    "have been made on another one",
+                    candidates.front()->file.string()));
   for (const StudyFiles::Structures& structures : all) {
     if (structures.file == parts.structures) continue;
     std::string reason = "an RT Structure Set that was not drawn on the CT";

@@ -42,6 +42,7 @@ TruthErrors beside_truth(const TrackRecord& record) {
 }
 
 Json errors_json(const PredictionScore& errors) {
+  if (errors.samples == 0) return {{"median_mm", nullptr}, {"rmse_mm", nullptr}, {"p95_mm", nullptr}, {"samples", 0}};
   return {{"median_mm", errors.median_mm},
           {"rmse_mm", errors.rmse_mm},
           {"p95_mm", errors.p95_mm},
@@ -191,6 +192,11 @@ std::string track_text(const Json& track) {
     for (const auto& [key, words] : {std::pair("measured", "measured"), std::pair("predicted", "predicted"),
                                      std::pair("hold_last", "hold-last")}) {
       const Json& errors = track["beside_truth"][key];
+      if (errors["samples"] == 0) {
+        text +=
+            fmt::format("{:<10} beside the truth: not compared; the truth does not tell of the second half\n", words);
+        continue;
+      }
       text += fmt::format("{:<10} beside the truth: median {:.2f}, RMSE {:.2f}, 95th percentile {:.2f} mm\n", words,
                           errors["median_mm"].get<double>(), errors["rmse_mm"].get<double>(),
                           errors["p95_mm"].get<double>());

@@ -32,7 +32,10 @@ class TrackRun {
     inputs.push_back(options_.follow);
     inputs.insert(inputs.end(), options_.phases.begin(), options_.phases.end());
     OutputFolder output(options_.output, options_.overwrite, inputs);
-    if (!options_.truth.empty()) record_.truth = read_motion_trace(options_.truth, notes_);
+    if (!options_.truth.empty()) {
+      record_.truth = read_motion_trace(options_.truth, notes_);
+      if (record_.truth.empty()) throw Error(fmt::format("{}: holds no position", options_.truth.string()));
+    }
     StudyOptions named = options_.study;
     if (is_filled()) named.parts.images = {options_.follow};
     StudyRequest request = named.request();
