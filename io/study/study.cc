@@ -253,7 +253,7 @@ std::vector<RtImage> read_images(const std::vector<std::filesystem::path>& paths
   }
   // By what was measured: neither a switch nor a profile hides a move of the table.
   said.findings = session_findings(images, notes);
-  said.doubts = session_doubts(images, request.max_span_s);
+  std::ranges::move(session_doubts(images, request.max_span_s), std::back_inserter(said.doubts));
   std::ranges::move(switch_doubts(images, request.switches), std::back_inserter(said.doubts));
   return supplied;
 }

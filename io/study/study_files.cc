@@ -510,7 +510,7 @@ StudyParts find_parts(const StudyParts& named, bool takes_other_xrays, Notes& no
   std::vector<std::string> doubts;
   if (named.session.is_made()) files = files_of_session(named.session, std::move(files), takes_other_xrays, doubts);
   StudyParts parts = chosen(std::move(files), std::move(other_plans), named, takes_other_xrays, notes);
-  parts.doubts = std::move(doubts);
+  std::ranges::move(doubts, std::back_inserter(parts.doubts));
   return parts;
 }
 

@@ -11,6 +11,7 @@
 #include "base/error.h"
 #include "base/output_folder.h"
 #include "base/process.h"
+#include "base/text_file.h"
 #include "geometry/imager_error.h"
 #include "tests/support/small_study.h"
 #include "tests/support/testdata.h"
@@ -188,6 +189,11 @@ TEST_F(BatchCommandTest, ScanWritesTheManifestThatBatchReads) {
   EXPECT_EQ(found[0].parts.images.size(), 2U);
   EXPECT_EQ(found[1].parts.images[0], exported() / "1" / "RTIMAGE" / "F02" / "KV_G000.dcm");
   EXPECT_EQ(found[2].parts.plan, exported() / "2" / "RTPLAN.dcm");
+  const fs::path plan = exported() / "2" / "RTPLAN.dcm";
+  const std::string before = text_of_file(plan);
+  for (const fs::path& there : {manifest, plan})
+    EXPECT_EQ(run_command({"batch", "--scan", exported().string(), "-o", there.string()}).exit_status, 1);
+  EXPECT_EQ(text_of_file(plan), before);
 }
 
 // X-rays that come late, or a file that is replaced, change what a case is: its earlier result does not stand for it.
@@ -260,6 +266,7 @@ TEST_F(BatchCommandTest, AManifestIsOfTheXraysThatWereScanned) {
   run_command({"batch", manifest.string(), "-o", results().string(), "--preset", "fast"});
   ASSERT_EQ(summary()["cases"].size(), 1U);
   EXPECT_THAT(summary()["cases"][0]["error"].get<std::string>(), HasSubstr("are not those for which the manifest"));
+  fs::remove(manifest);
   ASSERT_EQ(run_command({"batch", "--scan", exported().string(), "-o", manifest.string()}).exit_status, 0);
   run_command({"batch", manifest.string(), "-o", results().string(), "--preset", "fast"});
   EXPECT_EQ(summary()["cases"][0].value("error", ""), "");

@@ -90,6 +90,19 @@ TEST_F(TrackCommandTest, FollowsTheTargetAndPredictsIt) {
             0);
 }
 
+// Of another time, or of none.
+TEST_F(TrackCommandTest, ATruthThatDoesNotTellIsNotCompared) {
+  const std::filesystem::path truth = own_ / "truth.csv";
+  std::ofstream(truth) << "t_s,x_mm,y_mm,z_mm\n1000,50,50,50\n1001,50,50,50\n";
+  EXPECT_TRUE(track({"--truth", truth.string()})["beside_truth"]["measured"]["rmse_mm"].is_null());
+  const auto run = [&](const std::string& folder) {
+    return run_command({"track", study().string(), "-o", (own_ / folder).string(), "--truth", truth.string()});
+  };
+  EXPECT_THAT(run("again").out, HasSubstr("measured   beside the truth: not compared"));
+  std::ofstream(truth) << "t_s,x_mm,y_mm,z_mm\n";
+  EXPECT_THAT(run("none").err, HasSubstr("truth.csv: holds no"));
+}
+
 TEST_F(TrackCommandTest, ThePhasesOfThe4dCtTeachTheModel) {
   std::vector<std::string> more = {"--predictor", "model", "--phases"};
   for (int phase = 0; phase < 4; ++phase) more.push_back((study() / "PHASES" / fmt::format("{:02}", phase)).string());

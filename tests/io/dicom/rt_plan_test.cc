@@ -41,6 +41,13 @@ TEST_F(RtPlanTest, ReadsIsocenterPositionAndCouchOfEveryBeam) {
   EXPECT_THAT(common_isocenter(plan, plan.beams), VectorNear(Eigen::Vector3d(-12.5, 38, -410), 1e-12));
 }
 
+TEST_F(RtPlanTest, TwoBeamsOfOneNumberAreRefused) {
+  edit(study_.plan(), [](DicomItem plan) {
+    plan.items(DCM_BeamSequence)[1].put(DCM_BeamNumber, plan.items(DCM_BeamSequence)[0].required_text(DCM_BeamNumber));
+  });
+  EXPECT_THAT(error_of([](const RtPlan&) {}), HasSubstr("BeamNumber (300A,00C0) 1 occurs twice"));
+}
+
 TEST_F(RtPlanTest, ReadsWhatThePrescriptionSpeaksOf) {
   EXPECT_TRUE(read_rt_plan(study_.plan()).dose_references.empty());
   edit(study_.plan(), [](DicomItem plan) {

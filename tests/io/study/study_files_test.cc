@@ -155,6 +155,28 @@ TEST_F(StudyFilesTest, TakesTheOnlyStructureSetDrawnOnTheCt) {
               Contains(study_.structures().string() + ": an RT Structure Set that was not drawn on the CT"));
 }
 
+TEST_F(StudyFilesTest, AStructureSetOfThePlanThatIsAbsentOrDrawnOnAnotherCtIsToldOf) {
+  draw(study_, {{"Spine", {}}});
+  edit(study_.plan(), [](DicomItem d) {
+    d.append_item(DCM_ReferencedStructureSetSequence).put(DCM_ReferencedSOPInstanceUID, "1.2.3.5");
+  });
+  StudyParts parts = find();
+  EXPECT_EQ(parts.structures, study_.structures());
+  EXPECT_TRUE(parts.doubts.empty());
+  EXPECT_THAT(notes_.warnings, Contains(study_.plan().string() +
+                                        ": the RT Structure Set to which the plan refers is not there (1.2.3.5)"));
+  edit(study_.structures(), [](DicomItem d) {
+    d.put(DCM_SOPInstanceUID, "1.2.3.5");
+    d.append_item(DCM_ReferencedFrameOfReferenceSequence)
+        .append_item(DCM_RTReferencedStudySequence)
+        .append_item(DCM_RTReferencedSeriesSequence)
+        .put(DCM_SeriesInstanceUID, "1.2.3");
+  });
+  parts = find();
+  ASSERT_EQ(parts.doubts.size(), 1U);
+  EXPECT_THAT(parts.doubts.front(), HasSubstr("was not drawn on this CT: the plan may have been made on another one"));
+}
+
 TEST_F(StudyFilesTest, OfSeveralStructureSetsThePlanOrAPersonDecides) {
   draw(study_, {{"Spine", {}}});
   const std::filesystem::path second = study_.path() / "RTSTRUCT2.dcm", copy = study_.path() / "copy.dcm";
