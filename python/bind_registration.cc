@@ -38,9 +38,6 @@ SimilarityKind kind_from(const std::string& name) {
 std::unique_ptr<Objective> objective_of(Renderer& renderer, const std::vector<FixedImage>& images, const Poses& about,
                                         const std::string& similarity, double pixel_fraction, std::size_t min_pixels,
                                         std::uint64_t seed) {
-  if (images.empty()) throw UsageError("images: expected at least one");
-  if (!(pixel_fraction > 0.0 && pixel_fraction <= 1.0))
-    throw UsageError(fmt::format("pixel_fraction is {}, expected more than 0, at most 1", pixel_fraction));
   const ObjectiveOptions options{
       .similarity = kind_from(similarity), .pixel_fraction = pixel_fraction, .min_pixels = min_pixels, .seed = seed};
   const Eigen::Isometry3d pose = pose_from(about);

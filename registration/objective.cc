@@ -136,6 +136,9 @@ void for_each_view(std::span<const FixedImage> images, const auto& work) {
 Objective::Objective(Renderer& renderer, std::span<const FixedImage> images, const Eigen::Isometry3d& about,
                      const ObjectiveOptions& options)
     : renderer_(renderer), similarity_(options.similarity) {
+  if (images.empty()) throw UsageError("images: expected at least one");
+  if (!(options.pixel_fraction > 0.0 && options.pixel_fraction <= 1.0))
+    throw UsageError(fmt::format("pixel_fraction is {}, expected more than 0, at most 1", options.pixel_fraction));
   const bool of_gradients = similarity_ == SimilarityKind::kGradientCorrelation;
   compared_.resize(images.size());
   for_each_view(images,

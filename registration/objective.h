@@ -29,7 +29,8 @@ inline Eigen::Map<const PixelJacobian> pixel_jacobian(std::span<const MotionDeri
 
 class Objective {
  public:
-  // Compares inside each image's field. Borrows the renderer. Throws Error for a field of fewer than 100 pixels.
+  // Compares inside each image's field. Borrows the renderer. Throws Error for a field of fewer than 100 pixels,
+  // and UsageError without images, or for a pixel_fraction that is not in (0, 1].
   // `about` is near the poses to come: gradients are compared where they are strong there, and histograms have the
   // range of the DRR there.
   Objective(Renderer& renderer, std::span<const FixedImage> images, const Eigen::Isometry3d& about,
