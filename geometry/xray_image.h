@@ -2,6 +2,7 @@
 // An X-ray image as registration sees it: a camera and pixel values of known meaning.
 
 #include <Eigen/Core>
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
@@ -27,6 +28,7 @@ struct XrayImage {
   std::string label;
   XrayView view;
   Image<float> values;
+  std::optional<Image<std::uint8_t>> padding;  // 1 where there is no pixel; its value is as if blocked
   Meaning meaning = Meaning::kIntensity;
   double collimator_angle_rad = 0.0;  // how the field's edges are turned in the image, counter-clockwise as displayed
   std::optional<DeclaredAperture> declared_aperture;

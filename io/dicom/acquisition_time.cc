@@ -34,6 +34,15 @@ std::optional<std::string> date_digits(const RtImage& image) {
   return digits && digits->size() == 8 ? digits : std::nullopt;
 }
 
+std::optional<std::chrono::sys_days> day_of(const RtImage& image) {
+  const auto date = date_digits(image);
+  if (!date) return std::nullopt;
+  const std::chrono::year_month_day day(std::chrono::year(number_in(*date, 0, 4)),
+                                        std::chrono::month(static_cast<unsigned>(number_in(*date, 4, 2))),
+                                        std::chrono::day(static_cast<unsigned>(number_in(*date, 6, 2))));
+  return day.ok() ? std::optional(std::chrono::sys_days(day)) : std::nullopt;
+}
+
 // "101500", without the fraction. A time without seconds (PS3.5 6.2) does not tell how far two X-rays are apart.
 std::optional<std::string> time_digits(const RtImage& image) {
   if (!image.acquisition_time) return std::nullopt;
@@ -72,16 +81,14 @@ void read_acquisition_time(const DicomItem& dataset, RtImage& image) {
     image.acquisition_time = dataset.text(DCM_ContentTime);
   }
   image.utc_offset_min = utc_offset_min(offset);
+  if (!image.utc_offset_min) image.invalid_utc_offset = offset;
 }
 
 std::optional<double> acquisition_seconds(const RtImage& image) {
-  const auto date = date_digits(image), time = time_digits(image);
-  if (!date || !time) return std::nullopt;
-  const std::chrono::year_month_day day(std::chrono::year(number_in(*date, 0, 4)),
-                                        std::chrono::month(static_cast<unsigned>(number_in(*date, 4, 2))),
-                                        std::chrono::day(static_cast<unsigned>(number_in(*date, 6, 2))));
-  if (!day.ok()) return std::nullopt;
-  const double days = static_cast<double>(std::chrono::sys_days(day).time_since_epoch().count());
+  const auto day = day_of(image);
+  const auto time = time_digits(image);
+  if (!day || !time) return std::nullopt;
+  const double days = static_cast<double>(day->time_since_epoch().count());
   double fraction = 0.0;
   if (const auto point = image.acquisition_time->find('.'); point != std::string::npos) {
     const char *begin = image.acquisition_time->data() + point,
@@ -91,6 +98,16 @@ std::optional<double> acquisition_seconds(const RtImage& image) {
   const double minutes =
       (days * 24 + number_in(*time, 0, 2)) * 60 + number_in(*time, 2, 2) - image.utc_offset_min.value_or(0);
   return minutes * 60 + number_in(*time, 4, 2) + fraction + image.frame_offset_s;
+}
+
+std::string why_time_is_unknown(const RtImage& image) {
+  const auto why = [](const DcmTagKey& tag, const std::optional<std::string>& found, const char* expected) {
+    return found ? fmt::format("{} is \"{}\", expected {}", described(tag), *found, expected)
+                 : fmt::format("{} is missing", described(tag));
+  };
+  if (!image.acquisition_time || !time_digits(image)) return why(DCM_AcquisitionTime, image.acquisition_time, "HHMMSS");
+  if (!day_of(image)) return why(DCM_AcquisitionDate, image.acquisition_date, "YYYYMMDD");
+  return why(DCM_AcquisitionTime, image.acquisition_time, "HHMMSS.FFFFFF");
 }
 
 std::string acquired(const RtImage& image) {

@@ -126,7 +126,11 @@ PixelFormat pixel_format(const DicomItem& dataset) {
   format.bits_allocated = static_cast<int>(allocated);
   format.bits_stored = static_cast<int>(stored);
   expect(dataset, DCM_HighBit, stored - 1);
-  format.is_signed = dataset.required_number(DCM_PixelRepresentation) != 0;
+  const double representation = dataset.required_number(DCM_PixelRepresentation);
+  if (representation != 0 && representation != 1)
+    throw Error(fmt::format("{}: {} is {}, expected 0 (unsigned) or 1 (signed)", dataset.where(),
+                            described(DCM_PixelRepresentation), representation));
+  format.is_signed = representation == 1;
   return format;
 }
 

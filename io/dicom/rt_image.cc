@@ -12,6 +12,7 @@
 
 #include "base/error.h"
 #include "io/dicom/decode.h"
+#include "io/dicom/pixel_padding.h"
 
 namespace isoshift {
 namespace {
@@ -23,14 +24,16 @@ class Exposures {
  public:
   Exposures(const DicomItem& dataset, int frames) : items_(dataset.items(DCM_ExposureSequence)) {
     frame_numbers_.resize(items_.size());
-    if (frames > 1)
-      std::ranges::transform(items_, frame_numbers_.begin(),
-                             [](const DicomItem& item) { return item.number(DCM_ReferencedFrameNumber); });
+    std::ranges::transform(items_, frame_numbers_.begin(),
+                           [](const DicomItem& item) { return item.number(DCM_ReferencedFrameNumber); });
+    tell_frames_apart_ = frames > 1 && name_frames();
   }
 
   bool name_frames() const {
     return std::ranges::any_of(frame_numbers_, [](const auto& number) { return number.has_value(); });
   }
+  // Whether frames differ in what the exposures say. Else the top level says the same.
+  bool tell_frames_apart() const { return tell_frames_apart_; }
   std::vector<DicomItem> of(int frame) const {
     std::vector<DicomItem> items;
     for (std::size_t n = 0; n < items_.size(); ++n)
@@ -40,15 +43,16 @@ class Exposures {
 
  private:
   std::vector<DicomItem> items_;
-  std::vector<std::optional<double>> frame_numbers_;  // which frame each names, if there are several
+  std::vector<std::optional<double>> frame_numbers_;  // which frame each names
+  bool tell_frames_apart_;
 };
 
 // A dataset as one frame sees it: the exposure's value where it has one, else the top level's. Several exposures must
-// agree.
+// agree. If the top level does not, and the exposures do not tell frames apart, that is a contradiction.
 class FrameAttributes {
  public:
-  FrameAttributes(DicomItem dataset, std::vector<DicomItem> exposures)
-      : dataset_(std::move(dataset)), exposures_(std::move(exposures)) {}
+  FrameAttributes(DicomItem dataset, std::vector<DicomItem> exposures, bool tell_frames_apart)
+      : dataset_(std::move(dataset)), exposures_(std::move(exposures)), tell_frames_apart_(tell_frames_apart) {}
 
   std::optional<double> number(const DcmTagKey& tag) const {
     std::optional<double> agreed;
@@ -65,18 +69,32 @@ class FrameAttributes {
     return agreed ? agreed : dataset_.number(tag);
   }
 
+  // A number that frames may differ in.
+
+  std::optional<double> read_out(const DcmTagKey& tag) {
+    const std::optional<double> value = number(tag), of_all = dataset_.number(tag);
+    if (!tell_frames_apart_ && of_all && std::abs(*value - *of_all) > kMaxReadOutNoise)
+      contradictions_.push_back(fmt::format("{}: {} is {}, and {} in its {}, which was used", dataset_.where(),
+                                            described(tag), *of_all, *value, described(DCM_ExposureSequence)));
+    return value;
+  }
+
   // A read-out of more than a turn is no angle.
-  std::optional<double> angle_deg(const DcmTagKey& tag) const {
-    const std::optional<double> value_deg = number(tag);
+  std::optional<double> angle_deg(const DcmTagKey& tag) {
+    const std::optional<double> value_deg = read_out(tag);
     if (value_deg && std::abs(*value_deg) > 360.0)
       throw Error(
           fmt::format("{}: {} is {} degrees, expected -360 to 360", dataset_.where(), described(tag), *value_deg));
     return value_deg;
   }
 
+  const std::vector<std::string>& contradictions() const { return contradictions_; }
+
  private:
   DicomItem dataset_;
   std::vector<DicomItem> exposures_;
+  bool tell_frames_apart_;
+  std::vector<std::string> contradictions_;  // between exposures and the top level
 };
 
 template <int N>
@@ -118,10 +136,10 @@ JawOpenings jaws_of(const std::vector<DicomItem>& exposures) {
 }
 
 RtImage read_frame(const std::filesystem::path& path, const DicomItem& d, const PixelFormat& format, int frame,
-                   std::vector<DicomItem> exposures) {
+                   const Exposures& exposures) {
   RtImage image;
-  image.jaws = jaws_of(exposures);
-  const FrameAttributes attributes(d, std::move(exposures));
+  image.jaws = jaws_of(exposures.of(frame));
+  FrameAttributes attributes(d, exposures.of(frame), exposures.tell_frames_apart());
   image.path = path;
   image.identity = read_identity(d);
   image.sop_class_uid = d.required_uid(DCM_SOPClassUID);
@@ -144,6 +162,7 @@ RtImage read_frame(const std::filesystem::path& path, const DicomItem& d, const 
   image.frame_offset_s = offset_s.value_or(0.0);
   image.has_own_time = offset_s.has_value();
   image.kvp = attributes.number(DCM_KVP);
+  if (image.kvp && *image.kvp <= 0.0) image.kvp.reset();  // of programs that do not know it
 
   image.plane = d.text(DCM_RTImagePlane);
   image.sad_mm = d.number(DCM_RadiationMachineSAD);
@@ -158,9 +177,10 @@ RtImage read_frame(const std::filesystem::path& path, const DicomItem& d, const 
   image.collimator_angle_deg = attributes.angle_deg(DCM_BeamLimitingDeviceAngle);
   image.table = read_table_read_outs(
       [&](const TableReadOut& read_out) {
-        return read_out.is_angle ? attributes.angle_deg(read_out.tag) : attributes.number(read_out.tag);
+        return read_out.is_angle ? attributes.angle_deg(read_out.tag) : attributes.read_out(read_out.tag);
       },
       image.reported_values_origin);
+  image.contradictions = attributes.contradictions();
   image.isocenter_mm = vector_of<3>(d, DCM_IsocenterPosition);
 
   for (const auto& [keyword, tag] : kEquipmentAttributes)
@@ -189,6 +209,25 @@ double collimator_angle_on_image_rad(const RtImage& image) {
   return is_mirrored ? -on_receptor_rad : on_receptor_rad;
 }
 
+// Pixels that the file says are none get the darkest value of the others.
+void put_padding(const PixelPadding& padding, const std::vector<std::int32_t>& stored_values, XrayImage& xray) {
+  std::vector<float>& values = xray.values.pixels;
+  Image<std::uint8_t> mask(xray.values.columns, xray.values.rows);
+  std::ranges::transform(stored_values, mask.pixels.begin(),
+                         [&](std::int32_t stored) { return padding.holds(stored); });
+  if (std::ranges::count(mask.pixels, 1) == 0) return;
+  const bool is_intensity = xray.meaning == XrayImage::Meaning::kIntensity;
+  std::optional<float> darkest;
+  for (std::size_t n = 0; n < values.size(); ++n)
+    if (mask.pixels[n] == 0 && (!darkest || (is_intensity ? values[n] < *darkest : values[n] > *darkest)))
+      darkest = values[n];
+  if (!darkest)
+    throw Error(fmt::format("{}: all pixels are padding ({})", xray.label, described(DCM_PixelPaddingValue)));
+  for (std::size_t n = 0; n < values.size(); ++n)
+    if (mask.pixels[n] != 0) values[n] = *darkest;
+  xray.padding = std::move(mask);
+}
+
 }  // namespace
 
 const std::map<std::string, DcmTagKey, std::less<>> kEquipmentAttributes = {
@@ -215,12 +254,11 @@ std::vector<RtImage> read_rt_images(const DicomFile& file, Notes& notes) {
   const Exposures exposures(dataset, format.frames);
   std::vector<RtImage> images;
   for (int frame = 0; frame < format.frames; ++frame) {
-    std::vector<DicomItem> of_frame = exposures.of(frame);
-    if (exposures.name_frames() && of_frame.empty())
+    if (exposures.name_frames() && exposures.of(frame).empty())
       notes.warnings.push_back(fmt::format("{}: frame {} was left aside: no item of {} tells its geometry",
                                            path.string(), frame + 1, described(DCM_ExposureSequence)));
     else
-      images.push_back(read_frame(path, dataset, format, frame, std::move(of_frame)));
+      images.push_back(read_frame(path, dataset, format, frame, exposures));
   }
   for (RtImage& image : images) {
     image.sha256 = file.sha256();
@@ -266,11 +304,17 @@ XrayImage read_xray_image(const DicomFile& file, const RtImage& image, const Xra
   // smallest one that can be stored.
   const bool rises = *image.intensity_sign * slope > 0.0;
   const double dark = *image.intensity_sign > 0 ? 0.0 : format.max_stored_value();
+  if (is_linear && !rises && *image.intensity_sign > 0 && std::ranges::min(stored_values) < 0)
+    throw Error(fmt::format(
+        "{}: {} is LIN and its sign 1, {} is {}, and pixels are negative: which of them stands for no intensity is "
+        "not known",
+        image.path.string(), described(DCM_PixelIntensityRelationship), described(DCM_RescaleSlope), slope));
   std::ranges::transform(stored_values, xray.values.pixels.begin(), [&](std::int32_t stored) {
     const double rescaled = slope * stored + intercept;
     if (!is_linear) return static_cast<float>(rises ? -rescaled : rescaled);
     return static_cast<float>(rises ? rescaled : std::abs(slope) * std::abs(stored - dark));
   });
+  put_padding(PixelPadding(file.dataset()), stored_values, xray);
   return xray;
 }
 

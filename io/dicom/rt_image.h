@@ -54,6 +54,7 @@ struct RtImage {
   std::optional<std::string> acquisition_date;
   std::optional<std::string> acquisition_time;  // of the same attribute as the date
   std::optional<int> utc_offset_min;            // east of Greenwich; unset: the file does not say
+  std::string invalid_utc_offset;               // what it says instead, which no zone has
   double frame_offset_s = 0.0;                  // of a later frame, from the first one
   std::optional<double> kvp;
 
@@ -67,6 +68,7 @@ struct RtImage {
   std::optional<double> gantry_angle_deg, gantry_pitch_angle_deg, collimator_angle_deg;
   JawOpenings jaws;  // of the exposure
   TableReadOuts table;
+  std::vector<std::string> contradictions;      // of these, between the exposure, which counts, and the top level
   std::optional<Eigen::Vector3d> isocenter_mm;  // IsocenterPosition, in this image's own frame of reference
 
   std::map<std::string, std::string, std::less<>> equipment;   // what machine profiles tell images apart by, by keyword
@@ -137,6 +139,9 @@ Beam beam_of(const RtImage& image, Notes& notes);
 // When it was taken: seconds since an epoch, with fractions and, of frames of one file, their own times (FrameTime,
 // FrameTimeVector); nothing where date or time is absent or malformed.
 std::optional<double> acquisition_seconds(const RtImage& image);
+
+// Why there are no such seconds: "AcquisitionTime (0008,0032) is missing".
+std::string why_time_is_unknown(const RtImage& image);
 
 // The same for people, "2026-03-01 10:15:00"; empty where it is unknown.
 std::string acquired(const RtImage& image);

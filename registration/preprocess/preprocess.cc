@@ -88,10 +88,18 @@ void exclude_clipped(FixedImage& image) {
   }
 }
 
+// Takes out of the field where there is no pixel, with a rim.
+void exclude_padding(const Image<std::uint8_t>& padding, double rim_px, FixedImage& image) {
+  cv::Mat distance;
+  cv::distanceTransform(mat_of(padding) == 0, distance, cv::DIST_L2, cv::DIST_MASK_PRECISE);
+  mat_of(image.field).setTo(0, distance < rim_px);
+}
+
 // What can be compared of an image at full resolution, by its irradiated field.
 void put_field(FixedImage& image) {
   const double rim_px = std::max(1.0, (kRimMm + image.irradiated.keep_off_mm) * pixels_per_mm(image.view));
   image.field = mask_of(image.irradiated, image.view.columns, image.view.rows, rim_px);
+  if (image.padding) exclude_padding(*image.padding, rim_px, image);
   exclude_clipped(image);
 }
 
@@ -180,6 +188,7 @@ FixedImage prepare(const XrayImage& xray) {
                     xray.label, is_intensity ? "intensities" : "line integrals", darkest, brightest));
   FixedImage image;
   image.view = xray.view;
+  image.padding = xray.padding;
   image.label = xray.label;
   image.line_integral = line_integrals(xray);
   // The collimator of a line scan bounds no field: it shapes the fan.

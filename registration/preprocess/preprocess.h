@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -27,8 +28,9 @@ struct FixedImage {
   Image<float> line_integral;
   Image<std::uint8_t> field;  // 1 where pixels can be compared: off the sides of the irradiated field and off the rim
   IrradiatedField irradiated;
-  std::string label;             // of the X-ray; may be empty
-  int reduced_by = 1;            // pixels of the X-ray along the edge of a pixel
+  std::optional<Image<std::uint8_t>> padding;  // of the X-ray, at full resolution
+  std::string label;                           // of the X-ray; may be empty
+  int reduced_by = 1;                          // pixels of the X-ray along the edge of a pixel
   bool has_all_excluded = true;  // false: what is excluded would have left next to nothing, and is still in the field
 };
 

@@ -183,6 +183,8 @@ TEST_F(DecodeTest, FormatsThatAreNoneAreNamed) {
     }
     return "no error";
   };
+  EXPECT_THAT(error_of(DCM_PixelRepresentation, 2),
+              testing::HasSubstr("PixelRepresentation (0028,0103) is 2, expected 0 (unsigned) or 1 (signed)"));
   EXPECT_THAT(error_of(DCM_HighBit, 12), testing::HasSubstr("HighBit (0028,0102) is 12, expected 15"));
   EXPECT_THAT(error_of(DCM_SamplesPerPixel, 3), testing::HasSubstr("SamplesPerPixel (0028,0002) is 3, expected 1"));
   edit(study_.ct_slice(1), [&](DicomItem d) { d.put(DCM_SamplesPerPixel, 1); });

@@ -122,6 +122,24 @@ TEST_F(RtImageTest, TheExposuresAngleWinsOverTheTopLevels) {
   EXPECT_EQ(image.gantry_angle_deg, 12.5);
 }
 
+TEST_F(RtImageTest, AnExposureThatContradictsTheTopLevelIsToldOf) {
+  const RtImage image = changed([](DicomItem d) {
+    DicomItem exposure = d.items(DCM_ExposureSequence).front();
+    d.put(DCM_TableTopPitchAngle, 0.0);
+    exposure.put(DCM_TableTopPitchAngle, 2.0);
+    exposure.put(DCM_GantryAngle, 0.005);
+  });
+  EXPECT_EQ(image.table.pitch_deg, 2.0);
+  EXPECT_THAT(image.contradictions,
+              ElementsAre(HasSubstr("TableTopPitchAngle (300A,0140) is 0, and 2 in its ExposureSequence (3002,0030)")));
+}
+
+TEST_F(RtImageTest, AnExposureOfAnotherFrameIsNotTaken) {
+  edit(study_.image(0), [](DicomItem d) { d.items(DCM_ExposureSequence).front().put(DCM_ReferencedFrameNumber, "2"); });
+  EXPECT_TRUE(read_rt_images(study_.image(0), notes_).empty());
+  EXPECT_THAT(notes_.warnings, ElementsAre(HasSubstr("frame 1 was left aside")));
+}
+
 TEST_F(RtImageTest, AnglesAreModulo360) {
   const RtImage image = changed([](DicomItem d) {
     d.put(DCM_PatientSupportAngle, 359.998);
@@ -165,6 +183,54 @@ TEST_F(RtImageTest, ANegativeSlopeTurnsTheRescaledValue) {
   EXPECT_EQ(first_pixel(inverted), 100);
 }
 
+// Stored values fall with the rescaled ones, and may be above or below that of no intensity.
+TEST_F(RtImageTest, NegativePixelsWhoseZeroNobodyKnowsAreRefused) {
+  const auto negative = [](DicomItem d) {
+    d.put(DCM_PixelRepresentation, 1);
+    d.put(DCM_RescaleSlope, -1.0);
+    d.put_pixels(std::vector<std::uint16_t>(96 * 96, 65000));
+  };
+  EXPECT_THAT([&] { first_pixel(negative); },
+              testing::ThrowsMessage<Error>(HasSubstr("which of them stands for no intensity is not known")));
+}
+
+TEST_F(RtImageTest, PaddingIsNoPixel) {
+  const RtImage image = changed([](DicomItem d) {
+    std::vector<std::uint16_t> pixels(96 * 96, 1000);
+    pixels[5] = 65535;
+    pixels[6] = 400;
+    d.put_pixels(pixels);
+    d.put(DCM_PixelPaddingValue, 65535);
+  });
+  const auto read = [&] {
+    return read_xray_image(DicomFile::read(image.path, DicomFile::Extent::kWhole), image,
+                           xray_view(image, Beam::kKilovoltage, notes_));
+  };
+  const XrayImage xray = read();
+  EXPECT_EQ(xray.values.at(5, 0), 400.0F);
+  ASSERT_TRUE(xray.padding);
+  EXPECT_EQ(std::ranges::count(xray.padding->pixels, 1), 1);
+  EXPECT_EQ(xray.padding->at(5, 0), 1);
+  edit(study_.image(0), [](DicomItem d) {
+    d.put(DCM_PixelPaddingValue, 0);
+    d.put_pixels(std::vector<std::uint16_t>(96 * 96, 0));
+  });
+  EXPECT_THAT(read, testing::ThrowsMessage<Error>(HasSubstr("all pixels are padding (PixelPaddingValue (0028,0120))")));
+}
+
+TEST_F(RtImageTest, WhyATimeIsUnknownIsSaid) {
+  const auto why = [&](const DcmTagKey& tag, const char* value) {
+    return why_time_is_unknown(changed([&](DicomItem d) {
+      d.put(DCM_AcquisitionDate, "20260301");
+      d.put(DCM_AcquisitionTime, "101500");
+      d.put(tag, value);
+    }));
+  };
+  EXPECT_EQ(why(DCM_AcquisitionTime, "10 15"), "AcquisitionTime (0008,0032) is \"10 15\", expected HHMMSS");
+  EXPECT_EQ(why(DCM_AcquisitionDate, ""), "AcquisitionDate (0008,0022) is missing");
+  EXPECT_EQ(why(DCM_AcquisitionDate, "20260231"), "AcquisitionDate (0008,0022) is \"20260231\", expected YYYYMMDD");
+}
+
 TEST_F(RtImageTest, BeamQualityComesFromKvpElseFromTheImageType) {
   RtImage image = read_rt_images(study_.image(0), notes_).front();
   EXPECT_EQ(beam_of(image, notes_), Beam::kKilovoltage);
@@ -175,6 +241,10 @@ TEST_F(RtImageTest, BeamQualityComesFromKvpElseFromTheImageType) {
   image.image_type = "PORTAL";
   EXPECT_EQ(beam_of(image, notes_), Beam::kMegavoltage);
   EXPECT_THAT(notes_.warnings, ElementsAre(HasSubstr("taken as MV from image type PORTAL")));
+  EXPECT_FALSE(changed([](DicomItem d) {
+                 d.put(DCM_KVP, 0.0);
+                 d.items(DCM_ExposureSequence).front().put(DCM_KVP, 0.0);
+               }).kvp);
 }
 
 TEST_F(RtImageTest, PlannedAnglesAndDrrsAreFindings) {
