@@ -102,6 +102,7 @@ Description describe_rt_image(RtImage image, const std::optional<std::string>& p
     description.remark(Remark::kProfile,
                        "the imager's errors are not corrected; they widen the uncertainty of every registration");
   remark_all(image.jaws.problems, Remark::kNote, description);
+  remark_all(image.contradictions, Remark::kNote, description);
   for (const MissingAttribute& attribute : missing_attributes(image))
     description.remark(
         Remark::kMissing,
@@ -124,16 +125,19 @@ Description describe_plan(const RtPlan& plan) {
   Description description("RT Plan", plan.label, plan.path.string());
   description.show("approval", "approval_status", plan.approval_status,
                    plan.approval_status.empty() ? "missing" : plan.approval_status);
+  description.show("date", "plan_date", plan.made_on, plan.made_on.empty() ? "missing" : plan.made_on);
   description.add("frame of reference", "frame_of_reference_uid", plan.frame_of_reference_uid);
   for (const RtPlan::Beam& beam : plan.beams)
     description.append(fmt::format("beam {} \"{}\"", beam.number, beam.name), "beams",
                        {{"number", beam.number},
                         {"name", beam.name},
+                        {"machine", beam.machine},
                         {"isocenter_mm", json_value(beam.isocenter_patient_mm)},
                         {"patient_position", json_value(beam.patient_position)},
                         {"couch_angle_deg", json_value(beam.support_angle_deg)},
                         {"jaws_and_leaves", described(beam.jaws)}},
-                       fmt::format("isocenter {}, {}, couch {}; jaws and leaves {}",
+                       fmt::format("{}isocenter {}, {}, couch {}; jaws and leaves {}",
+                                   beam.machine.empty() ? "" : fmt::format("machine \"{}\", ", beam.machine),
                                    or_missing(beam.isocenter_patient_mm, "mm"), or_missing(beam.patient_position),
                                    or_missing(beam.support_angle_deg, "deg"), described(beam.jaws)));
   for (const RtPlan::Beam& beam : plan.beams) remark_all(beam.jaws.problems, Remark::kNote, description);
@@ -181,6 +185,8 @@ Description describe_ct(const StudyFiles::Ct& found, Console& console) {
                      fmt::format("({:.2f}) mm", fmt::join(last, ", ")));
     description.show("frame of reference", "frame_of_reference_uid", ct.frame_of_reference_uid,
                      ct.frame_of_reference_uid);
+    description.show("acquisition date", "acquisition_date", ct.acquired_on,
+                     ct.acquired_on.empty() ? "missing" : ct.acquired_on);
   } catch (const Error& error) {
     description.remark(Remark::kRefused, error.what());
   }

@@ -38,8 +38,9 @@ struct Slice {
   std::string sop_instance_uid;
   std::string frame_of_reference_uid;
   Identity identity;
-  bool is_lossy = false;  // compressed with loss
-  std::string sha256;     // of its file
+  std::string patient_position;  // as the file says it; may be empty
+  bool is_lossy = false;         // compressed with loss
+  std::string sha256;            // of its file
   std::vector<float> hu;
 };
 
@@ -105,6 +106,9 @@ Slice slice_at(const FrameGeometry& geometry, const DicomItem& dataset, const st
   slice.sop_instance_uid = dataset.required_uid(DCM_SOPInstanceUID);
   slice.frame_of_reference_uid = dataset.required_uid(DCM_FrameOfReferenceUID);
   slice.identity = read_identity(dataset);
+  slice.patient_position = dataset.text(DCM_PatientPosition).value_or("");
+  if (const auto modality = dataset.text(DCM_Modality); modality && *modality != "CT")
+    throw Error(fmt::format("{}: {} is {}, expected CT", where, described(DCM_Modality), *modality));
   slice.is_lossy = dataset.text(DCM_LossyImageCompression) == "01";
   slice.position_mm = Eigen::Vector3d(geometry.position.required_numbers(DCM_ImagePositionPatient, 3).data());
   const std::vector<double> orientation = geometry.orientation.required_numbers(DCM_ImageOrientationPatient, 6);
@@ -206,6 +210,10 @@ void check_same_lattice(const std::vector<Slice>& slices) {
   };
   for (const Slice& slice : slices) {
     if (slice.frame_of_reference_uid != first.frame_of_reference_uid) differs(slice, DCM_FrameOfReferenceUID);
+    if (slice.identity.study_instance_uid != first.identity.study_instance_uid) differs(slice, DCM_StudyInstanceUID);
+    if (!slice.patient_position.empty() && !first.patient_position.empty() &&
+        slice.patient_position != first.patient_position)
+      differs(slice, DCM_PatientPosition);
     if (slice.format.columns != first.format.columns) differs(slice, DCM_Columns);
     if (slice.format.rows != first.format.rows) differs(slice, DCM_Rows);
     if (slice.row_spacing_mm != first.row_spacing_mm || slice.column_spacing_mm != first.column_spacing_mm)
@@ -357,6 +365,13 @@ CtSeries read_ct_series(std::span<const std::filesystem::path> files, const Allo
   series.frame_of_reference_uid = header.required_uid(DCM_FrameOfReferenceUID);
   series.body_part_examined = header.text(DCM_BodyPartExamined).value_or("");
   series.patient_position = header.text(DCM_PatientPosition).value_or("");
+  series.acquired_on = header.text(DCM_AcquisitionDate).value_or(header.text(DCM_SeriesDate).value_or(""));
+  for (const std::string& type : header.texts(DCM_ImageType))
+    if (type == "MIP" || type == "MAX_IP" || type == "MINIP" || type == "MIN_IP")
+      notes.warnings.push_back(
+          fmt::format("the CT holds the largest or least of several values ({} says {}), not those of "
+                      "one moment",
+                      described(DCM_ImageType), type));
 
   std::vector<Slice> slices = read_slices(files, progress);
   if (std::ranges::any_of(slices, &Slice::is_lossy))

@@ -22,6 +22,7 @@ struct CtSeries {
   std::string frame_of_reference_uid;
   std::string body_part_examined;
   std::string patient_position;                // of the scan; annotation only (C.7.3.1.1.2)
+  std::string acquired_on;                     // AcquisitionDate, else SeriesDate; may be empty
   std::vector<std::string> sop_instance_uids;  // each once, in the order of the slices
   std::string sha256;  // of the SHA-256 of its files, hexadecimal, one after the other in that order
 };

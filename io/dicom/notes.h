@@ -25,8 +25,8 @@ struct AllowKey {
 inline constexpr AllowKey kAllowKeys[] = {
     {"patient-mismatch", "inputs of different patients"},
     {"for-mismatch", "plan or structures and CT in different frames of reference"},
-    {"plan-mismatch", "an X-ray that refers to another plan, or has another isocenter"},
-    {"planned-geometry", "angles that are planned or typed in, not measured (ReportedValuesOrigin)"},
+    {"plan-mismatch", "an X-ray that refers to another plan, or another isocenter than the plan's"},
+    {"planned-geometry", "a geometry that is planned or typed in, not measured (ReportedValuesOrigin)"},
     {"gaps", "a CT with missing slices or uneven spacing, interpolated"},
     {"drr", "an RT Image that is itself a DRR"},
     {"time-span", "views more than 10 minutes apart"},

@@ -28,6 +28,7 @@ RtPlan::Beam read_beam(const DicomItem& beam_item, const DcmTagKey& control_poin
   RtPlan::Beam beam;
   beam.number = static_cast<int>(beam_item.required_number(DCM_BeamNumber));
   beam.name = beam_item.text(DCM_BeamName).value_or("");
+  beam.machine = beam_item.text(DCM_TreatmentMachineName).value_or("");
   if (const auto points = beam_item.items(control_points); !points.empty()) {
     if (points.front().has_value(DCM_IsocenterPosition))
       beam.isocenter_patient_mm = Eigen::Vector3d(points.front().required_numbers(DCM_IsocenterPosition, 3).data());
@@ -41,14 +42,21 @@ RtPlan::Beam read_beam(const DicomItem& beam_item, const DcmTagKey& control_poin
   }
   const auto setup_number = beam_item.number(DCM_ReferencedPatientSetupNumber);
   std::set<std::optional<std::string>> positions;
-  for (const DicomItem& setup : plan.items(DCM_PatientSetupSequence)) {
+  const std::vector<DicomItem> setups = plan.items(DCM_PatientSetupSequence);
+  int found = 0;
+  for (const DicomItem& setup : setups) {
     if (setup_number && setup.number(DCM_PatientSetupNumber) != setup_number) continue;
+    ++found;
     positions.insert(setup.text(DCM_PatientPosition));
     const Eigen::Vector3d displacement_mm(setup.number(DCM_TableTopVerticalSetupDisplacement).value_or(0.0),
                                           setup.number(DCM_TableTopLongitudinalSetupDisplacement).value_or(0.0),
                                           setup.number(DCM_TableTopLateralSetupDisplacement).value_or(0.0));
     if (displacement_mm.norm() > beam.setup_displacement_mm.norm()) beam.setup_displacement_mm = displacement_mm;
   }
+  if (setup_number && !setups.empty() && found != 1)
+    throw Error(fmt::format("{}: {} is {}, a number that {} items of {} have, expected one", beam_item.where(),
+                            described(DCM_ReferencedPatientSetupNumber), *setup_number, found,
+                            described(DCM_PatientSetupSequence)));
   if (positions.size() == 1) beam.patient_position = *positions.begin();
   return beam;
 }
@@ -66,6 +74,7 @@ RtPlan read_rt_plan(const std::filesystem::path& path) {
   plan.sop_instance_uid = dataset.required_uid(DCM_SOPInstanceUID);
   plan.series_instance_uid = dataset.uid(DCM_SeriesInstanceUID).value_or("");
   plan.label = dataset.text(DCM_RTPlanLabel).value_or("");
+  plan.made_on = dataset.text(DCM_RTPlanDate).value_or("");
   plan.frame_of_reference_uid = dataset.uid(DCM_FrameOfReferenceUID);
   plan.approval_status = dataset.text(DCM_ApprovalStatus).value_or("");
   plan.geometry = dataset.text(DCM_RTPlanGeometry).value_or("");

@@ -17,6 +17,7 @@ struct RtPlan {
   struct Beam {
     int number = 0;
     std::string name;
+    std::string machine;                                  // TreatmentMachineName; may be empty
     std::optional<Eigen::Vector3d> isocenter_patient_mm;  // IsocenterPosition of the first control point
     std::optional<double> support_angle_deg;              // PatientSupportAngle of the first control point
     JawOpenings jaws;                                     // of the first control point
@@ -40,6 +41,7 @@ struct RtPlan {
   std::string sop_instance_uid;
   std::string series_instance_uid;
   std::string label;
+  std::string made_on;  // RTPlanDate; may be empty
   std::optional<std::string> frame_of_reference_uid;
   std::string approval_status;
   std::string geometry;  // RTPlanGeometry: PATIENT, or TREATMENT_DEVICE where there is no structure set

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <set>
 
 #include "base/error.h"
 
@@ -63,8 +64,12 @@ Structure& referred_structure(std::vector<Structure>& structures, const DicomIte
 
 void read_contours(const DicomItem& dataset, std::vector<Structure>& structures) {
   std::size_t contours = 0, points = 0;
+  std::set<int> drawn;
   for (const DicomItem& roi : dataset.items(DCM_ROIContourSequence)) {
     Structure& structure = referred_structure(structures, roi);
+    if (!drawn.insert(structure.number).second)
+      throw Error(fmt::format("{}: {} is {}, as in an earlier item; expected each number once", roi.where(),
+                              described(DCM_ReferencedROINumber), structure.number));
     for (const DicomItem& item : roi.items(DCM_ContourSequence)) {
       check_count(++contours, kMaxContours, dataset.where(), "contours");
       Contour contour = is_closed(item) ? read_contour(item) : Contour{};

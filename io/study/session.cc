@@ -103,7 +103,9 @@ std::optional<Finding> unknown_time_doubt(std::span<const RtImage> images, bool 
     const bool is_frame_known = image.has_own_time || is_table_known;  // frames of one file are of one exposure series
     if (!is_frame_known || !acquisition_seconds(image))
       return Finding{"time-span", fmt::format("{}: when it was taken is unknown ({}), and {}", image.label,
-                                              described(DCM_AcquisitionTime), unknown)};
+                                              acquisition_seconds(image) ? "a frame without a time of its own"
+                                                                         : why_time_is_unknown(image),
+                                              unknown)};
     if (image.utc_offset_min.has_value() != images.front().utc_offset_min.has_value())
       return Finding{"time-span",
                      fmt::format("{} and {}: only one of them says how far its time is from UTC ({}), and {}",
@@ -170,8 +172,9 @@ std::vector<Finding> session_findings(std::span<const RtImage> images, Notes& no
     }
     for (const RtImage& image : images)
       if (!value_of(image) && images.size() > 1)
-        notes.warnings.push_back(fmt::format("{}: {} is missing, so it could not be compared with the other views",
-                                             image.label, described(tag)));
+        notes.warnings.push_back(
+            fmt::format("{}: {}, so it could not be compared with the other views", image.label,
+                        tag == DCM_AcquisitionTime ? why_time_is_unknown(image) : described(tag) + " is missing"));
   };
 
   compare(
@@ -195,28 +198,41 @@ std::vector<Finding> session_findings(std::span<const RtImage> images, Notes& no
   return findings;
 }
 
-std::vector<Finding> switch_doubts(std::span<const RtImage> images, const RtImageSwitches& switches) {
+std::vector<Finding> replaced_doubts(const RtImage& image, const RtImage& by_profile, const RtImage& used) {
   std::vector<Finding> doubts;
-  const TableReadOuts supplied{.support_angle_deg = switches.couch_angle_deg,
-                               .pitch_deg = switches.couch_pitch_deg,
-                               .roll_deg = switches.couch_roll_deg};
-  for (const TableReadOut& read_out : table_read_outs())
-    for (const RtImage& image : images)
-      if (table_change(read_out, supplied, image.table))
-        doubts.push_back(
-            {"table-moved", fmt::format("{} contradicts {}: {} is {}",
-                                        option(option_for(read_out), fmt::to_string(*(supplied.*read_out.value))),
-                                        image.label, described(read_out.tag), *(image.table.*read_out.value))});
-  return doubts;
-}
-
-std::vector<Finding> profile_doubts(const RtImage& image, const RtImage& by_profile) {
-  std::vector<Finding> doubts;
-  for (const TableReadOut& read_out : table_read_outs())
-    if (table_change(read_out, by_profile.table, image.table))
-      doubts.push_back({"table-moved", fmt::format("the machine profile contradicts {}: {} is {}, by the profile {}",
-                                                   image.label, described(read_out.tag), *(image.table.*read_out.value),
-                                                   *(by_profile.table.*read_out.value))});
+  const auto doubt = [&](const char* key, const std::string& by, const DcmTagKey& tag, const auto& value) {
+    doubts.push_back({key, fmt::format("{} contradicts {}: {} is {}", by, image.label, described(tag), value)});
+  };
+  for (const TableReadOut& read_out : table_read_outs()) {
+    if (!table_change(read_out, used.table, image.table)) continue;
+    const double angle_deg = *(used.table.*read_out.value);
+    const bool is_of_profile = by_profile.table.*read_out.value == angle_deg;
+    doubt("table-moved",
+          is_of_profile ? fmt::format("the machine profile, which says {},", angle_deg)
+                        : option(option_for(read_out), fmt::to_string(angle_deg)),
+          read_out.tag, *(image.table.*read_out.value));
+  }
+  // A profile is there to correct these; a switch knows nothing of the machine.
+  constexpr double kSameMm = 0.5;
+  const auto differ = [](const auto& one, const auto& other) {
+    return one && other && std::abs(*one - *other) > kSameMm;
+  };
+  if (by_profile.gantry_angle_deg && used.gantry_angle_deg &&
+      std::abs(wrapped_rad(rad_from_deg(*used.gantry_angle_deg - *by_profile.gantry_angle_deg))) >
+          rad_from_deg(kMaxTableTurnDeg))
+    doubt("planned-geometry", option("gantry-angle", fmt::format("{}={}", image.label, *used.gantry_angle_deg)),
+          DCM_GantryAngle, *by_profile.gantry_angle_deg);
+  if (differ(used.sad_mm, by_profile.sad_mm))
+    doubt("planned-geometry", option("sad", fmt::to_string(*used.sad_mm)), DCM_RadiationMachineSAD, *by_profile.sad_mm);
+  if (differ(used.sid_mm, by_profile.sid_mm))
+    doubt("planned-geometry", option("sid", fmt::to_string(*used.sid_mm)), DCM_RTImageSID, *by_profile.sid_mm);
+  if (used.position_mm && by_profile.position_mm && (*used.position_mm - *by_profile.position_mm).norm() > kSameMm)
+    doubt("planned-geometry",
+          option("rt-image-position", fmt::format("{},{}", used.position_mm->x(), used.position_mm->y())),
+          DCM_RTImagePosition, fmt::format("{}\\{}", by_profile.position_mm->x(), by_profile.position_mm->y()));
+  if (used.patient_position && by_profile.patient_position && used.patient_position != by_profile.patient_position)
+    doubt("planned-geometry", option("patient-position", *used.patient_position), DCM_PatientPosition,
+          *by_profile.patient_position);
   return doubts;
 }
 

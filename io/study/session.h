@@ -37,9 +37,9 @@ std::vector<Finding> session_findings(std::span<const RtImage> images, Notes& no
 //   one view and missing in another.
 std::vector<Finding> session_doubts(std::span<const RtImage> images, double max_span_s);
 
-// What a person says by switches against what the X-rays say, and what a machine profile made of one says against it.
-std::vector<Finding> switch_doubts(std::span<const RtImage> images, const RtImageSwitches& switches);
-std::vector<Finding> profile_doubts(const RtImage& image, const RtImage& by_profile);
+// What a person says by switches against what an X-ray says, and what a machine profile says against its table angles.
+// `image`: as read; `by_profile`: with the profile; `used`: with the switches, too.
+std::vector<Finding> replaced_doubts(const RtImage& image, const RtImage& by_profile, const RtImage& used);
 
 // The differences between the table read-outs of `image` and `reference`, as far as both have them.
 std::vector<Finding> table_findings(const RtImage& image, const RtImage& reference);

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <iterator>
 #include <map>
 #include <set>
 #include <tuple>
@@ -13,6 +14,7 @@
 #include "base/error.h"
 #include "base/option_name.h"
 #include "io/dicom/decode.h"
+#include "io/study/contradictions.h"
 
 namespace isoshift {
 namespace {
@@ -246,15 +248,16 @@ std::vector<RtImage> read_images(const std::vector<std::filesystem::path>& paths
   std::vector<RtImage> supplied;
   supplied.reserve(images.size());
   for (RtImage& image : images) {
-    RtImage by_profile = request.machine ? with_machine(image, *request.machine, request.switches, notes) : image;
+    const RtImage by_profile = request.machine ? with_machine(image, *request.machine, request.switches, notes) : image;
+    for (const std::string& contradiction : image.contradictions)
+      said.doubts.push_back({"planned-geometry", contradiction});
     image.pixel_from_room = by_profile.pixel_from_room;  // only the profile tells which views are the same
-    if (request.machine) std::ranges::move(profile_doubts(image, by_profile), std::back_inserter(said.doubts));
-    supplied.push_back(with_switches(std::move(by_profile), request.switches, notes));
+    supplied.push_back(with_switches(by_profile, request.switches, notes));
+    std::ranges::move(replaced_doubts(image, by_profile, supplied.back()), std::back_inserter(said.doubts));
   }
   // By what was measured: neither a switch nor a profile hides a move of the table.
   said.findings = session_findings(images, notes);
   std::ranges::move(session_doubts(images, request.max_span_s), std::back_inserter(said.doubts));
-  std::ranges::move(switch_doubts(images, request.switches), std::back_inserter(said.doubts));
   return supplied;
 }
 
@@ -271,6 +274,11 @@ void check_images(const Study& study, const StudyRequest& request, Notes& notes)
   }
   check_nothing_missing(study.rt_images, refused);
   for (const RtImage& image : study.rt_images)
+    if (!image.invalid_utc_offset.empty())
+      notes.warnings.push_back(fmt::format("{}: {} is \"{}\", expected -1200 to +1400; its time was taken as local",
+                                           image.label, described(DCM_TimezoneOffsetFromUTC),
+                                           image.invalid_utc_offset));
+  for (const RtImage& image : study.rt_images)
     if (image.is_lossy)
       notes.warnings.push_back(
           fmt::format("{}: has been compressed with loss ({})", image.label, described(DCM_LossyImageCompression)));
@@ -278,6 +286,12 @@ void check_images(const Study& study, const StudyRequest& request, Notes& notes)
     if (image.is_rt_image() && !image.reported_values_origin)
       notes.warnings.push_back(fmt::format("{}: does not say whether its angles were measured ({} is missing)",
                                            image.label, described(DCM_ReportedValuesOrigin)));
+}
+
+// What is in doubt, and not allowed by a person, stands in the study.
+void doubt(const std::vector<Finding>& doubts, const Allowances& allowed, Study& study, Notes& notes) {
+  for (const Finding& doubt : not_allowed(doubts, allowed, notes))
+    study.doubts.push_back(fmt::format("{} ({})", doubt.message, option("allow", fmt::format("{}=REASON", doubt.key))));
 }
 
 // Whether the parts of the study belong together.
@@ -288,24 +302,40 @@ void check_together(const StudyRequest& request, const SaidOfSession& said, Stud
   std::ranges::copy(said.findings, std::back_inserter(findings));
   settle(findings, request.allowed, notes);
   study.doubts = request.parts.doubts;
-  for (const Finding& doubt : not_allowed(said.doubts, request.allowed, notes))
-    study.doubts.push_back(fmt::format("{} ({})", doubt.message, option("allow", fmt::format("{}=REASON", doubt.key))));
+  doubt(said.doubts, request.allowed, study, notes);
   check_one_patient_position(study);
 }
 
+constexpr double kSameIsocenterMm = 0.5;
+
 // An X-ray in the CT's frame of reference says where the machine's isocenter lay in it (docs/dicom.md, D2).
 void check_isocenter_of_images(const Study& study, const Allowances& allowed, Notes& notes) {
-  constexpr double kSameMm = 0.5;
   std::vector<Finding> findings;
   for (const RtImage& image : study.rt_images)
     if (image.isocenter_mm && image.frame_of_reference_uid == study.ct->frame_of_reference_uid &&
-        (*image.isocenter_mm - study.isocenter_patient_mm).norm() > kSameMm)
+        (*image.isocenter_mm - study.isocenter_patient_mm).norm() > kSameIsocenterMm)
       findings.push_back(
           {"plan-mismatch",
-           fmt::format("{}: {} is ({}) mm, that of the plan is ({}) mm in the same {}", image.path.string(),
+           fmt::format("{}: {} is ({}) mm, the planned one is ({}) mm in the same {}", image.path.string(),
                        described(DCM_IsocenterPosition), fmt::join(*image.isocenter_mm, ", "),
                        fmt::join(study.isocenter_patient_mm, ", "), described(DCM_FrameOfReferenceUID))});
   settle(findings, allowed, notes);
+}
+
+// An isocenter that a person supplies against the plan: with beams of several isocenters it is one of these.
+std::vector<Finding> isocenter_doubts(const Study& study, const std::vector<RtPlan::Beam>& beams) {
+  const RtPlan::Beam* other = nullptr;
+  for (const RtPlan::Beam& beam : beams) {
+    if (!beam.isocenter_patient_mm) continue;
+    if ((*beam.isocenter_patient_mm - study.isocenter_patient_mm).norm() <= kSameIsocenterMm) return {};
+    other = &beam;
+  }
+  if (other == nullptr) return {};
+  return {
+      {"plan-mismatch",
+       fmt::format("{} contradicts the plan: {} of beam {} is ({}) mm",
+                   option("isocenter", fmt::format("{}", fmt::join(study.isocenter_patient_mm, ","))),
+                   described(DCM_IsocenterPosition), other->number, fmt::join(*other->isocenter_patient_mm, ", "))}};
 }
 
 // How the patient was planned to lie: position, table, isocenter. `beams`: those of the plan that were imaged.
@@ -316,6 +346,8 @@ void place_patient(const StudyRequest& request, const std::vector<RtPlan::Beam>&
     study.isocenter_patient_mm = *request.isocenter_patient_mm;
     notes.overrides.push_back(fmt::format("{}: ({}) mm by {}", described(DCM_IsocenterPosition),
                                           fmt::join(study.isocenter_patient_mm, ", "), option("isocenter")));
+    doubt(isocenter_doubts(study, beams), request.allowed, study, notes);
+    check_isocenter_of_images(study, request.allowed, notes);
   } else if (study.plan) {
     study.isocenter_patient_mm = common_isocenter(*study.plan, beams);
     check_isocenter_of_images(study, request.allowed, notes);
@@ -385,6 +417,7 @@ Study load_study(const StudyRequest& request, Notes& notes, const Progress& prog
         read_xray_image(files.whole(image.path), image, xray_view(image, beam_of(image, notes), notes)));
   declare_planned_apertures(study, notes);
   check_isocenter(study);
+  std::ranges::move(contradictions_in(study), std::back_inserter(notes.warnings));
   return study;
 }
 

@@ -249,8 +249,8 @@ TEST_F(ErrorMessagesTest, AnIsocenterThatContradictsThePlan) {
   });
   const CommandOutcome outcome = register_study(study_);
   EXPECT_EQ(outcome.exit_status, 1);
-  EXPECT_THAT(outcome.err, StartsWith(fmt::format("error: {}: IsocenterPosition (300A,012C) is (0, 0, 5) mm, that of "
-                                                  "the plan is (",
+  EXPECT_THAT(outcome.err, StartsWith(fmt::format("error: {}: IsocenterPosition (300A,012C) is (0, 0, 5) mm, the "
+                                                  "planned one is (",
                                                   where(study_.image(1)))));
   EXPECT_THAT(outcome.err, HasSubstr("--allow plan-mismatch=REASON"));
 }

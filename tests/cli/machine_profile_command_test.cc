@@ -79,9 +79,9 @@ TEST_F(MachineProfileCommandTest, ACouchAngleAgainstTheMeasuredOneNeedsAReview) 
   write_text(path("couch.json"), Json{{"machine_profile", 1}, {"name", "Linac 3"}, {"images", {rule}}}.dump());
   const CommandOutcome outcome = register_with("couch", {"--machine", path("couch.json")});
   EXPECT_EQ(outcome.exit_status, kExitReview);
-  EXPECT_THAT(outcome.out,
-              HasSubstr("the machine profile contradicts KV_G000: PatientSupportAngle (300A,0122) is 0, by "
-                        "the profile 2"));
+  EXPECT_THAT(
+      outcome.out,
+      HasSubstr("the machine profile, which says 2, contradicts KV_G000: PatientSupportAngle (300A,0122) is 0"));
 }
 
 // Both views show the patient 2 mm off, and nothing in them can tell. A profile that knows it widens the uncertainty,

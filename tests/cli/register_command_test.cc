@@ -163,9 +163,16 @@ TEST_F(RegisterCommandTest, AStartThatCannotBeOneIsRefused) {
   EXPECT_THAT(refusal("no JSON"), HasSubstr("is not JSON"));
   EXPECT_THAT(refusal("{" + about + "[[1, 0, 0], [0, 1, 0], [0, 0, -1]]}}"), HasSubstr("is no rotation"));
   EXPECT_THAT(refusal("{" + about + straight + R"(, "patient": {"id": "Smith"}})"),
-              HasSubstr("is of the patient \"Smith\""));
+              HasSubstr("is of another patient than the study (PatientID)"));
   EXPECT_THAT(refusal("{" + about + straight + R"(, "isocenter_patient_mm": [1, 2, 3]})"),
               HasSubstr("its isocenter is (1.00, 2.00, 3.00)"));
+  EXPECT_THAT(refusal("{" + about + straight + R"(, "patient_position": "HFP"})"),
+              HasSubstr("its patient position is HFP, and that of the study HFS"));
+  EXPECT_THAT(refusal("{" + about + straight + R"(, "couch_deg": 30})"),
+              HasSubstr("its couch angle is 30.0 degrees, and that of the study 0.0"));
+  EXPECT_THAT(refusal("{" + about + straight +
+                      R"(, "table": {"support_deg": 0, "eccentric_deg": 0, "pitch_deg": 1, "roll_deg": 0}})"),
+              HasSubstr("its couch pitch is 1.0 degrees"));
   EXPECT_THAT(refusal("{" + about + straight + R"(, "set_by": 3})"), HasSubstr("pose set by hand"));
   EXPECT_EQ(register_study(study_, {"--no-search", "--check-vertebrae"}).exit_status, 2);
 }
@@ -380,6 +387,38 @@ TEST_F(RegisterCommandTest, ASwitchThatContradictsAReadOutNeedsAReview) {
   const CommandOutcome outcome = register_study(study_, {"--couch-pitch", "1"});
   EXPECT_EQ(outcome.exit_status, 3) << outcome.err;
   EXPECT_THAT(result()["reasons"].dump(), HasSubstr("--couch-pitch 1 contradicts KV_G000"));
+}
+
+TEST_F(RegisterCommandTest, AnAngleTypedInAgainstTheMeasuredOneNeedsAReviewUnlessAllowed) {
+  const std::vector<std::string> typed = {"--gantry-angle", "KV_G000=2"};
+  EXPECT_EQ(register_study(study_, typed).exit_status, 3);
+  EXPECT_THAT(result()["reasons"].dump(),
+              HasSubstr("--gantry-angle KV_G000=2 contradicts KV_G000: GantryAngle (300A,011E) is 0 (--allow "
+                        "planned-geometry=REASON)"));
+  register_study(study_, {"--gantry-angle", "KV_G000=2", "--allow", "planned-geometry=a test", "--overwrite"});
+  EXPECT_THAT(result()["reasons"].dump(), testing::Not(HasSubstr("contradicts")));
+  EXPECT_THAT(result()["overrides"].dump(), HasSubstr("(allowed by planned-geometry: a test)"));
+}
+
+TEST_F(RegisterCommandTest, AnIsocenterThatIsNotThePlansNeedsAReview) {
+  EXPECT_EQ(register_study(study_, {"--isocenter", "-2.5,38,-410"}).exit_status, 3);
+  EXPECT_THAT(result()["reasons"].dump(), HasSubstr("--isocenter -2.5,38,-410 contradicts the plan"));
+  EXPECT_EQ(register_study(study_, {"--isocenter", "-12.5,38,-410.2", "--overwrite"}).exit_status, 0);
+}
+
+TEST_F(RegisterCommandTest, ContradictionsThatDecideNothingAreWarnedOf) {
+  edit(study_.image(0), [](DicomItem d) { d.put(DCM_PatientSex, "M"); });
+  edit(study_.plan(), [](DicomItem plan) {
+    plan.put(DCM_PatientSex, "F");
+    plan.put(DCM_RTPlanDate, "20270101");
+    for (DicomItem& beam : plan.items(DCM_BeamSequence)) beam.put(DCM_TreatmentMachineName, "OTHER");
+  });
+  for (int k = 0; std::filesystem::exists(study_.ct_slice(k)); ++k)
+    edit(study_.ct_slice(k), [](DicomItem d) { d.put(DCM_PatientSex, "F"); });
+  const std::string err = register_study(study_).err;
+  EXPECT_THAT(err, HasSubstr("KV_G000.dcm: PatientSex (0010,0040) is M, that of the CT is F"));
+  EXPECT_THAT(err, HasSubstr("KV_G000: was taken on 20260301, before the plan of 20270101"));
+  EXPECT_THAT(err, HasSubstr("the plan's beams are for \"OTHER\" (TreatmentMachineName (300A,00B2))"));
 }
 
 TEST_F(RegisterCommandTest, ViewsAreInTheOrderOfTheirLabels) {

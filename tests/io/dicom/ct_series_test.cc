@@ -216,7 +216,8 @@ TEST_F(CtSeriesTest, RefusesWhatWouldMisplaceVoxels) {
   const std::map<std::string, std::pair<DcmTagKey, std::string>> wrong = {
       {"PixelSpacing (0028,0030)", {DCM_PixelSpacing, "0.5\\0.26"}},
       {"ImageOrientationPatient (0020,0037)", {DCM_ImageOrientationPatient, "1\\0\\0\\0\\0.999\\0.0447"}},
-      {"FrameOfReferenceUID (0020,0052)", {DCM_FrameOfReferenceUID, "1.2.5"}}};
+      {"FrameOfReferenceUID (0020,0052)", {DCM_FrameOfReferenceUID, "1.2.5"}},
+      {"StudyInstanceUID (0020,000D)", {DCM_StudyInstanceUID, "1.2.6"}}};
   for (const auto& [name, tag_and_value] : wrong) {
     const auto& [tag, value] = tag_and_value;
     std::string right;
@@ -271,6 +272,18 @@ TEST_F(CtSeriesTest, RefusesUnitsThatAreNotHu) {
   write_even(6);
   edit(files_[3], [](DicomItem d) { d.put(DCM_RescaleType, "US"); });
   EXPECT_THAT(error_of_reading(), testing::HasSubstr("RescaleType (0028,1054) is US, expected HU"));
+}
+
+TEST_F(CtSeriesTest, RefusesAnotherModalityAndTwoPositions) {
+  write_even(6);
+  edit(files_[2], [](DicomItem d) { d.put(DCM_Modality, "MR"); });
+  EXPECT_THAT(error_of_reading(), testing::HasSubstr("Modality (0008,0060) is MR, expected CT"));
+  edit_all([](DicomItem d) {
+    d.put(DCM_Modality, "CT");
+    d.put(DCM_PatientPosition, "HFS");
+  });
+  edit(files_[3], [](DicomItem d) { d.put(DCM_PatientPosition, "FFS"); });
+  EXPECT_THAT(error_of_reading(), testing::HasSubstr("PatientPosition (0018,5100) differs from that of"));
 }
 
 TEST_F(CtSeriesTest, RefusesPixelDataThatIsTooShort) {
@@ -375,6 +388,13 @@ TEST_F(CtSeriesTest, ACtOfNoStudyIsRefused) {
   write_even(6);
   edit_all([](DicomItem d) { d.erase(DCM_StudyInstanceUID); });
   EXPECT_THAT(error_of_reading(), testing::HasSubstr("StudyInstanceUID (0020,000D) is missing"));
+}
+
+TEST_F(CtSeriesTest, AProjectionOfSeveralPhasesIsWarnedOf) {
+  write_even(6);
+  edit_all([](DicomItem d) { d.put(DCM_ImageType, "DERIVED\\SECONDARY\\MIP"); });
+  read();
+  EXPECT_THAT(notes_.warnings, testing::ElementsAre(testing::HasSubstr("ImageType (0008,0008) says MIP")));
 }
 
 TEST_F(CtSeriesTest, CompressionWithLossIsWarnedOf) {

@@ -48,6 +48,19 @@ TEST_F(RtPlanTest, TwoBeamsOfOneNumberAreRefused) {
   EXPECT_THAT(error_of([](const RtPlan&) {}), HasSubstr("BeamNumber (300A,00C0) 1 occurs twice"));
 }
 
+TEST_F(RtPlanTest, ASetupThatIsNotThereOrThereTwiceIsRefused) {
+  edit(study_.plan(),
+       [](DicomItem plan) { plan.items(DCM_BeamSequence).front().put(DCM_ReferencedPatientSetupNumber, 9.0); });
+  EXPECT_THAT(error_of([](const RtPlan&) {}), HasSubstr("ReferencedPatientSetupNumber (300C,006A) is 9, a number that "
+                                                        "0 items of PatientSetupSequence (300A,0180) have"));
+  edit(study_.plan(), [](DicomItem plan) {
+    const double first = plan.items(DCM_PatientSetupSequence).front().required_number(DCM_PatientSetupNumber);
+    plan.items(DCM_BeamSequence).front().put(DCM_ReferencedPatientSetupNumber, first);
+    plan.append_item(DCM_PatientSetupSequence).put(DCM_PatientSetupNumber, first);
+  });
+  EXPECT_THAT(error_of([](const RtPlan&) {}), HasSubstr("a number that 2 items of PatientSetupSequence"));
+}
+
 TEST_F(RtPlanTest, ReadsWhatThePrescriptionSpeaksOf) {
   EXPECT_TRUE(read_rt_plan(study_.plan()).dose_references.empty());
   edit(study_.plan(), [](DicomItem plan) {

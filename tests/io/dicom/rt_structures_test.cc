@@ -143,6 +143,9 @@ TEST_F(RtStructuresTest, NumbersThatDoNotTellWhatIsMeantAreRefused) {
   EXPECT_THAT(error_of_reading(), HasSubstr("ROIContourSequence (3006,0039) item 2: ReferencedROINumber (3006,0084) is "
                                             "7, a number that no item of StructureSetROISequence (3006,0020) has"));
   edit(study_.structures(),
+       [](const DicomItem& d) { d.items(DCM_ROIContourSequence)[1].put(DCM_ReferencedROINumber, 1.0); });
+  EXPECT_THAT(error_of_reading(), HasSubstr("ReferencedROINumber (3006,0084) is 1, as in an earlier item"));
+  edit(study_.structures(),
        [](const DicomItem& d) { d.items(DCM_StructureSetROISequence)[1].put(DCM_ROINumber, 1.0); });
   EXPECT_THAT(error_of_reading(), HasSubstr("ROINumber (3006,0022) is 1, as in an earlier item"));
 }
