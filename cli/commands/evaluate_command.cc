@@ -56,6 +56,7 @@ void run_evaluate(EvaluateFlags& flags, Console& console) {
   options.protocol = protocol_of(flags);
   options.truth = read_setup_error(flags.truth);
   options.body_truths = read_body_truths(flags.truth);
+  options.truth_file = flags.truth;
   Notes notes;
   ConsoleObserver observer(console);
   if (flags.table2) {

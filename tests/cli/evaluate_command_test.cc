@@ -173,12 +173,11 @@ TEST_F(EvaluateCommandTest, AnotherEvaluationIsNotContinued) {
   EXPECT_EQ(content_of(folder_ / "evaluation" / "runs.csv"), runs);
 }
 
-// A planned pose given by hand makes other runs.
-TEST_F(EvaluateCommandTest, AnotherPlanIsAnotherEvaluation) {
+TEST_F(EvaluateCommandTest, ATruthAboutAnotherIsocenterIsRefused) {
   ASSERT_EQ(evaluate(folder_ / "evaluation", {"--starts", "1"}).exit_status, 0);
   const CommandOutcome outcome = evaluate(folder_ / "evaluation", {"--starts", "1", "--isocenter", "-2.5,38,-410"});
   EXPECT_EQ(outcome.exit_status, 1);
-  EXPECT_THAT(outcome.err, HasSubstr("holds another evaluation"));
+  EXPECT_THAT(outcome.err, HasSubstr("truth.json: its isocenter is (-12.50, 38.00, -410.00), and that of the study"));
 }
 
 TEST_F(EvaluateCommandTest, AFolderOfSomethingElseIsLeftAlone) {

@@ -10,12 +10,14 @@
 #include <thread>
 
 #include "base/error.h"
+#include "base/json_file.h"
 #include "base/version.h"
 #include "geometry/rotation.h"
 #include "geometry/target_error.h"
 #include "registration/quality/judge.h"
 #include "setup/couch_shift.h"
 #include "workflow/evaluate/compared_bodies.h"
+#include "workflow/register/same_setup.h"
 #include "workflow/register/target_of.h"
 #include "workflow/register/target_registration.h"
 
@@ -230,6 +232,8 @@ void check_jobs(int jobs, RendererKind kind) {
 EvaluationFolder evaluate_loaded(const Study& study, EvaluateOptions options, Observer& observer) {
   const RendererKind kind = options.registration.rendering.kind();
   check_jobs(options.jobs, kind);
+  if (!options.truth_file.empty())
+    require_same_setup(read_json_file(options.truth_file).json, options.truth_file.string(), planned_lie(study));
   const int cores = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
   const int jobs = uses_gl(kind) ? 1 : options.jobs > 0 ? options.jobs : cores;
   const TargetChoice choice = target_of(study, {.by_person = options.target});

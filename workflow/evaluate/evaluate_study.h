@@ -22,6 +22,7 @@ struct EvaluateOptions {
   int jobs = 0;  // registrations at a time, each on one thread; 1: one on all cores; 0: as many as the machine's cores
   Eigen::Isometry3d truth = Eigen::Isometry3d::Identity();  // the true setup error, at the isocenter
   std::vector<BodyTruth> body_truths;                       // empty: nobody knows what single bones did
+  std::filesystem::path truth_file;                         // must be of the study's setup; empty: nobody checks
   std::filesystem::path output;
   // What EvaluationFolder::study() must be, so that the evaluation belongs to others. Empty: anything.
   nlohmann::ordered_json of_study;

@@ -11,33 +11,13 @@
 #include "io/objects/registration_check.h"
 #include "io/objects/registration_meaning.h"
 #include "io/study/session.h"
+#include "workflow/register/same_setup.h"
 #include "workflow/register/setup_error_json.h"
 
 namespace isoshift {
 namespace {
 
 using Json = nlohmann::json;
-
-// As results round it.
-constexpr double kSameIsocenterMm = 0.01;
-
-void require_same_patient(const Json& json, const Identity& patient, const std::string& file) {
-  if (!json.contains("patient")) return;  // a truth, or a pose set by hand
-  const std::string id = json.at("patient").at("id");
-  if (id != patient.patient_id)
-    throw Error(fmt::format("{}: is of the patient \"{}\", and the CT of \"{}\": a start must be of the same patient",
-                            file, id, patient.patient_id));
-}
-
-void require_same_isocenter(const Json& json, const Eigen::Vector3d& isocenter_patient_mm, const std::string& file) {
-  if (!json.contains("isocenter_patient_mm")) return;
-  const auto mm = json.at("isocenter_patient_mm").get<std::array<double, 3>>();
-  if ((Eigen::Vector3d(mm.data()) - isocenter_patient_mm).norm() > kSameIsocenterMm)
-    throw Error(
-        fmt::format("{}: its isocenter is ({:.2f}), and that of the study ({:.2f}): a setup error is about the "
-                    "isocenter, so that a start must have the same one",
-                    file, fmt::join(mm, ", "), fmt::join(isocenter_patient_mm, ", ")));
-}
 
 // In the frame of the study's X-rays, where that is the object's source frame.
 std::optional<Eigen::Vector3d> isocenter_of_xrays(const Study& study, const std::string& frame_uid) {
@@ -113,8 +93,7 @@ Start read_start(const std::filesystem::path& file, const Study& study, std::spa
   const Json& json = read.json;
   const Eigen::Isometry3d setup_error = setup_error_in(json, name);
   try {
-    require_same_patient(json, study.ct->identity, name);
-    require_same_isocenter(json, study.isocenter_patient_mm, name);
+    require_same_setup(json, name, planned_lie(study));
     return {.setup_error = setup_error,
             .file = file.filename().string(),
             .sha256 = read.sha256,

@@ -5,12 +5,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <fstream>
 #include <nlohmann/json.hpp>
 
 #include "base/error.h"
 #include "base/json_file.h"
-#include "base/text_file.h"
 #include "geometry/rotation.h"
 #include "geometry/target_error.h"
 #include "workflow/register/setup_error_json.h"
@@ -18,13 +16,6 @@
 namespace isoshift {
 
 namespace {
-
-nlohmann::json parsed(const std::filesystem::path& path) {
-  expect_no_pipe(path);
-  std::ifstream file(path);
-  if (!file) throw Error("cannot be opened");
-  return nlohmann::json::parse(file);
-}
 
 Eigen::Vector3d vector_from(const nlohmann::json& json) {
   return {json.at(0).get<double>(), json.at(1).get<double>(), json.at(2).get<double>()};
@@ -37,8 +28,8 @@ Eigen::Isometry3d read_setup_error(const std::filesystem::path& path) {
 }
 
 std::vector<BodyTruth> read_body_truths(const std::filesystem::path& path) {
+  const nlohmann::json json = read_json_file(path).json;
   try {
-    const nlohmann::json json = parsed(path);
     std::vector<BodyTruth> truths;
     const char* const list = json.contains("bodies") ? "bodies" : "levels";
     if (json.contains("setup_error") || !json.contains(list)) return truths;
