@@ -63,13 +63,14 @@ std::optional<double> number_in_cell(std::string_view cell) {
   return is_whole && std::isfinite(value) ? std::optional(value) : std::nullopt;
 }
 
-CsvTable csv_table(std::string_view text, const std::string& where) {
+CsvTable csv_table(std::string_view text, const std::string& where, char separator) {
   if (text.starts_with("\xFF\xFE") || text.starts_with("\xFE\xFF"))
     throw Error(fmt::format("{}: is in UTF-16, expected UTF-8 (in a spreadsheet: \"CSV UTF-8\")", where));
   if (text.starts_with("\xEF\xBB\xBF")) text.remove_prefix(3);
   Lines lines;
   csv_parser parser{};
   csv_init(&parser, CSV_STRICT | CSV_STRICT_FINI | CSV_APPEND_NULL | CSV_REPALL_NL);
+  csv_set_delim(&parser, static_cast<unsigned char>(separator));
   // libcsv calls back for every cell and every end of a line.
   const auto on_cell = [](void* cell, std::size_t size, void* to) {
     static_cast<Lines*>(to)->add_cell({static_cast<const char*>(cell), size});

@@ -30,6 +30,6 @@ struct CsvTable {
 };
 
 // Throws Error naming `where` and the line.
-CsvTable csv_table(std::string_view text, const std::string& where);
+CsvTable csv_table(std::string_view text, const std::string& where, char separator = ',');
 
 }  // namespace isoshift

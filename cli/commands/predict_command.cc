@@ -58,6 +58,22 @@ std::vector<PredictorKind> kinds_of(const std::vector<std::string>& names) {
   return kinds;
 }
 
+// Between positions far apart a prediction would be compared with a straight line.
+void expect_scorable(const std::vector<MotionSample>& trace, const std::filesystem::path& path) {
+  constexpr double kLongestStepS = 2.0, kShortestStepS = 1e-3;
+  if (trace.size() < 2) throw Error(fmt::format("{}: holds fewer than two positions", path.string()));
+  for (std::size_t n = 1; n < trace.size(); ++n)
+    if (const double step_s = trace[n].time_s - trace[n - 1].time_s; step_s > kLongestStepS)
+      throw Error(fmt::format(
+          "{}: has no position for {:g} s after {:g} s, expected one every {:g} s at least.\n"
+          "       Score the parts before and after a gap alone; times are seconds in t_s and milliseconds in Timestamp",
+          path.string(), step_s, trace[n - 1].time_s, kLongestStepS));
+  const double length_s = trace.back().time_s - trace.front().time_s;
+  if (const double step_s = length_s / static_cast<double>(trace.size() - 1); step_s < kShortestStepS)
+    throw Error(fmt::format("{}: has {} positions within {:g} s: are the times of a Timestamp in ms, or of t_s in s?",
+                            path.string(), trace.size(), length_s));
+}
+
 Scores scores_of(const PredictOptions& options, Console& console) {
   Scores scores{.names = {}, .kinds = kinds_of(options.methods), .latencies_ms = options.latencies_ms, .all = {}};
   for (const double latency_ms : options.latencies_ms)
@@ -70,7 +86,7 @@ Scores scores_of(const PredictOptions& options, Console& console) {
     const auto same_stem = [&](const std::filesystem::path& other) { return other.stem() == path.stem(); };
     scores.names.push_back(std::ranges::count_if(options.traces, same_stem) == 1 ? path.stem().string()
                                                                                  : path.string());
-    if (traces.back().size() < 2) throw Error(fmt::format("{}: holds fewer than two positions", path.string()));
+    expect_scorable(traces.back(), path);
   }
   print_warnings(notes.warnings, console);
   const std::size_t per_trace = scores.kinds.size() * scores.latencies_ms.size();

@@ -5,75 +5,87 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <cmath>
-#include <fstream>
 #include <optional>
 #include <string>
 #include <string_view>
 
+#include "base/csv.h"
 #include "base/error.h"
 #include "base/text_file.h"
 
 namespace isoshift {
 namespace {
 
-std::vector<std::string> cells_of(std::string_view line, char separator) {
-  std::vector<std::string> cells(1);
-  for (const char c : line) {
-    if (c == separator)
-      cells.emplace_back();
-    else if (c != '"' && c != '\r' && c != ' ')
-      cells.back() += c;
-  }
-  return cells;
-}
+constexpr double kFarthestMm = 10000.0;
 
-std::optional<std::size_t> column_named(const std::vector<std::string>& names, std::initializer_list<const char*> any) {
-  for (const char* name : any)
-    if (const auto found = std::ranges::find(names, name); found != names.end())
-      return static_cast<std::size_t>(found - names.begin());
-  return std::nullopt;
+// Which columns hold the time and the position.
+struct Columns {
+  std::size_t time = 0;
+  double seconds_per_unit = 1.0;
+  std::array<std::size_t, 3> position{};
+};
+
+Columns columns_of(const std::vector<std::string>& titles, const std::string& where) {
+  std::vector<std::string> names = titles;
+  for (std::string& name : names) std::erase(name, ' ');
+  const auto one_of = [&](std::initializer_list<std::string_view> any) {
+    std::optional<std::size_t> found;
+    for (std::size_t n = 0; n < names.size(); ++n) {
+      if (std::ranges::find(any, names[n]) == any.end()) continue;
+      if (found)
+        throw Error(fmt::format("{}: has the columns {} and {}, expected one of them", where, names[*found], names[n]));
+      found = n;
+    }
+    return found;
+  };
+  const auto time = one_of({"t_s", "time_s", "Timestamp"});
+  const std::array position = {one_of({"measured_x_mm", "x_mm", "x"}), one_of({"measured_y_mm", "y_mm", "y"}),
+                               one_of({"measured_z_mm", "z_mm", "z"})};
+  if (!time || !position[0] || !position[1] || !position[2])
+    throw Error(
+        fmt::format("{}: has the columns {}; expected t_s (or Timestamp, in ms) and x, y, z (or x_mm, or "
+                    "measured_x_mm, ...)",
+                    where, fmt::join(names, ", ")));
+  return {.time = *time,
+          .seconds_per_unit = names[*time] == "Timestamp" ? 1e-3 : 1.0,
+          .position = {*position[0], *position[1], *position[2]}};
 }
 
 }  // namespace
 
 std::vector<MotionSample> read_motion_trace(const std::filesystem::path& path, Notes& notes) {
-  expect_no_pipe(path);
-  std::ifstream file(path);
-  std::string line;
-  if (!std::getline(file, line)) throw Error(fmt::format("{}: cannot be read, or is empty", path.string()));
-  if (line.starts_with("\xEF\xBB\xBF")) line.erase(0, 3);
-  const char separator = line.find(';') != std::string::npos ? ';' : ',';
-  const std::vector<std::string> names = cells_of(line, separator);
-  const auto seconds = column_named(names, {"t_s", "time_s"}), milliseconds = column_named(names, {"Timestamp"});
-  const std::array columns = {column_named(names, {"measured_x_mm", "x_mm", "x"}),
-                              column_named(names, {"measured_y_mm", "y_mm", "y"}),
-                              column_named(names, {"measured_z_mm", "z_mm", "z"})};
-  if ((!seconds && !milliseconds) || !columns[0] || !columns[1] || !columns[2])
-    throw Error(
-        fmt::format("{}: has the columns {}; expected t_s (or Timestamp, in ms) and x, y, z (or x_mm, or "
-                    "measured_x_mm, ...)",
-                    path.string(), fmt::join(names, ", ")));
-
+  const std::string text = text_of_file(path), where = path.string();
+  if (text.empty()) throw Error(fmt::format("{}: is empty", where));
+  const char separator = text.substr(0, text.find_first_of("\r\n")).find(';') != std::string::npos ? ';' : ',';
+  const CsvTable table = csv_table(text, where, separator);
+  const Columns columns = columns_of(table.columns, where);
   std::vector<MotionSample> trace;
-  for (int number = 2; std::getline(file, line); ++number) {
-    const std::vector<std::string> cells = cells_of(line, separator);
-    if (cells.size() == 1 && cells.front().empty()) continue;
+  for (const CsvTable::Row& row : table.rows) {
     const auto value_of = [&](std::size_t column) -> std::optional<double> {
-      if (column >= cells.size() || cells[column].empty()) return std::nullopt;
-      std::string text = cells[column];
-      if (separator == ';') std::ranges::replace(text, ',', '.');
-      double value = 0.0;
-      const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-      if (error != std::errc() || end != text.data() + text.size() || !std::isfinite(value))
-        throw Error(fmt::format("{}, line {}: \"{}\" is not a number", path.string(), number, cells[column]));
+      std::string cell = row.cells[column];
+      if (cell.find_first_not_of(" \t") == std::string::npos) return std::nullopt;
+      if (separator == ';') std::ranges::replace(cell, ',', '.');
+      const std::optional<double> value = number_in_cell(cell);
+      if (!value) throw Error(fmt::format("{}, line {}: \"{}\" is not a number", where, row.line, row.cells[column]));
       return value;
     };
-    const auto time = value_of(seconds ? *seconds : *milliseconds);
-    const auto x = value_of(*columns[0]), y = value_of(*columns[1]), z = value_of(*columns[2]);
-    if (!time) throw Error(fmt::format("{}, line {}: has no time", path.string(), number));
-    if (x && y && z) trace.push_back({seconds ? *time : *time / 1000.0, {*x, *y, *z}});
+    const auto time = value_of(columns.time);
+    if (!time) throw Error(fmt::format("{}, line {}: has no time", where, row.line));
+    Eigen::Vector3d position_mm;
+    std::size_t there = 0;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const auto value = value_of(columns.position[axis]);
+      if (value && std::abs(*value) > kFarthestMm)
+        throw Error(fmt::format("{}, line {}: {} is {} mm, expected {} to {}", where, row.line,
+                                table.columns[columns.position[axis]], *value, -kFarthestMm, kFarthestMm));
+      if (value) ++there;
+      position_mm[static_cast<Eigen::Index>(axis)] = value.value_or(0.0);
+    }
+    if (there == 3)
+      trace.push_back({columns.seconds_per_unit * *time, position_mm});
+    else if (there > 0)
+      throw Error(fmt::format("{}, line {}: has {} of 3 coordinates, expected all or none", where, row.line, there));
   }
   while (trace.size() > 1 && trace.back().position_mm.isZero(0.0) &&
          trace.back().time_s <= trace[trace.size() - 2].time_s)
@@ -86,10 +98,10 @@ std::vector<MotionSample> read_motion_trace(const std::filesystem::path& path, N
     if (in_order.empty() || sample.time_s > in_order.back().time_s) in_order.push_back(sample);
   const std::size_t wrong = trace.size() - in_order.size();
   if (static_cast<double>(wrong) > kMostShare * static_cast<double>(trace.size()))
-    throw Error(fmt::format("{}: the times of {} of {} rows do not increase", path.string(), wrong, trace.size()));
+    throw Error(fmt::format("{}: the times of {} of {} rows do not increase", where, wrong, trace.size()));
   if (wrong > 0)
     notes.warnings.push_back(fmt::format("{}: {} of {} rows have a time before that of the row above, and were skipped",
-                                         path.string(), wrong, trace.size()));
+                                         where, wrong, trace.size()));
   return in_order;
 }
 

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "base/error.h"
+#include "base/median.h"
 
 namespace isoshift {
 
@@ -27,16 +28,15 @@ std::vector<MotionSample> resampled(std::span<const MotionSample> trace, double 
   return even;
 }
 
-PredictionScore score_of(std::vector<double> errors_mm) {
+PredictionScore score_of(const std::vector<double>& errors_mm) {
   PredictionScore result{.samples = errors_mm.size()};
   if (errors_mm.empty()) return result;
-  std::ranges::sort(errors_mm);
   double squares = 0.0;
   for (const double error_mm : errors_mm) squares += error_mm * error_mm;
-  result.median_mm = errors_mm[errors_mm.size() / 2];
+  result.median_mm = quantile(errors_mm, 0.5);
   result.rmse_mm = std::sqrt(squares / static_cast<double>(errors_mm.size()));
-  result.p95_mm = errors_mm[static_cast<std::size_t>(0.95 * static_cast<double>(errors_mm.size() - 1))];
-  result.max_mm = errors_mm.back();
+  result.p95_mm = quantile(errors_mm, 0.95);
+  result.max_mm = std::ranges::max(errors_mm);
   return result;
 }
 
@@ -61,7 +61,7 @@ PredictionScore score(PredictorKind kind, const PredictorOptions& options, std::
     if (known == 0 || sample.time_s <= scored_after_s) continue;
     errors_mm.push_back((predictor->predict(sample.time_s).position_mm - sample.position_mm).norm());
   }
-  return score_of(std::move(errors_mm));
+  return score_of(errors_mm);
 }
 
 }  // namespace isoshift

@@ -22,7 +22,7 @@ struct PredictionScore {
   double median_mm = 0.0, rmse_mm = 0.0, p95_mm = 0.0, max_mm = 0.0;
   std::size_t samples = 0;
 };
-PredictionScore score_of(std::vector<double> errors_mm);
+PredictionScore score_of(const std::vector<double>& errors_mm);
 
 // On an even grid. Throws UsageError for fewer than two samples or times that do not increase.
 std::vector<MotionSample> resampled(std::span<const MotionSample> trace, double rate_hz);

@@ -231,6 +231,13 @@ TEST(Score, OfARampIsTheWayOfOneLatency) {
   EXPECT_NEAR(resampled(ramp, 10.0)[7].position_mm.y(), 1.4, 1e-9);
 }
 
+TEST(Score, PercentilesOfFewErrorsLieBetweenThem) {
+  const PredictionScore errors = score_of({10.0, 0.0});
+  EXPECT_NEAR(errors.median_mm, 5.0, 1e-12);
+  EXPECT_NEAR(errors.p95_mm, 9.5, 1e-12);
+  EXPECT_NEAR(score_of({3.0}).p95_mm, 3.0, 1e-12);
+}
+
 // A latency between two samples is predicted from the one before: as far as that is.
 TEST(Score, LatenciesOffTheGridAreLearnedAsFarAsTheyReach) {
   std::vector<MotionSample> sine;

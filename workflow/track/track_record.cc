@@ -6,6 +6,7 @@
 #include <map>
 #include <utility>
 
+#include "base/median.h"
 #include "io/report/line_chart.h"
 #include "registration/motion/score.h"
 
@@ -38,7 +39,7 @@ TruthErrors beside_truth(const TrackRecord& record) {
     predicted.push_back((frame.predicted_mm - *later).norm());
     held.push_back((*last_mm - *later).norm());
   }
-  return {score_of(std::move(measured)), score_of(std::move(predicted)), score_of(std::move(held))};
+  return {score_of(measured), score_of(predicted), score_of(held)};
 }
 
 Json errors_json(const PredictionScore& errors) {
@@ -83,7 +84,6 @@ Json track_json(const TrackRecord& record) {
     over_budget += processing_s > record.budget_s;
     if (frame.is_warm && warm_from_s.is_null()) warm_from_s = frame.time_s;
   }
-  std::ranges::sort(times_s);
   const auto moments = static_cast<double>(times_s.size());
   Json json = {
       {"schema", 1},
@@ -95,9 +95,9 @@ Json track_json(const TrackRecord& record) {
       {"latency_ms", 1000.0 * record.tracking.latency_s},
       {"dof", record.tracking.dof == Dof::kRigid ? "rigid" : "translation"},
       {"processing_s",
-       {{"median", times_s[times_s.size() / 2]},
-        {"p95", times_s[static_cast<std::size_t>(0.95 * (moments - 1.0))]},
-        {"max", times_s.back()},
+       {{"median", quantile(times_s, 0.5)},
+        {"p95", quantile(times_s, 0.95)},
+        {"max", std::ranges::max(times_s)},
         {"budget", record.budget_s}}},
       {"share_in_time", 1.0 - static_cast<double>(over_budget) / moments},
       {"over_budget", over_budget},

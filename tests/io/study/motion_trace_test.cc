@@ -67,6 +67,26 @@ TEST_F(MotionTraceTest, MistakesAreNamed) {
   EXPECT_THAT(error_of("t_s,x,y,z\n5,1,2,3\n4,1,2,3\n3,1,2,3\n"),
               HasSubstr("the times of 2 of 3 rows do not increase"));
   EXPECT_THAT(error_of(""), HasSubstr("is empty"));
+  EXPECT_THAT(error_of("t_s,x,y,z\n0,1,2,3\n1,1,,3\n"), HasSubstr("line 3: has 2 of 3 coordinates"));
+  EXPECT_THAT(error_of("t_s,x,y,z\n0,1,1e300,3\n"), HasSubstr("line 2: y is 1e+300 mm, expected -10000 to 10000"));
+  EXPECT_THAT(error_of("t_s,x,x_mm,y,z\n0,1,1,2,3\n"), HasSubstr("has the columns x and x_mm, expected one of them"));
+  EXPECT_THAT(error_of("\xFF\xFEt"), HasSubstr("is in UTF-16, expected UTF-8"));
+  EXPECT_EQ(read("t_s,x,y,z\r0,1,2,3\r1,2,3,4\r").size(), 2U);
+}
+
+TEST_F(MotionTraceTest, PredictRefusesGapsAndTimesInAnotherUnit) {
+  const auto error_with = [&](const char* title, double step, int gap_at) {
+    std::string text = fmt::format("{},x,y,z\n", title);
+    for (int n = 0; n < 1000; ++n)
+      text += fmt::format("{},0,{},0\n", step * n + (gap_at > 0 && n > gap_at ? 1e7 : 0.0), std::sin(0.1 * n));
+    read(text);
+    const CommandOutcome outcome = run_command({"predict", path_.string(), "--train-s", "1"});
+    EXPECT_EQ(outcome.exit_status, 1);
+    return outcome.err;
+  };
+  EXPECT_THAT(error_with("t_s", 0.1, 500), HasSubstr("has no position for 1e+07 s after 50 s"));
+  EXPECT_THAT(error_with("t_s", 100.0, 0), HasSubstr("has no position for 100 s after 0 s"));
+  EXPECT_THAT(error_with("Timestamp", 0.1, 0), HasSubstr("has 1000 positions within 0.0999 s"));
 }
 
 TEST_F(MotionTraceTest, PredictScoresTracesAndWritesAChart) {
