@@ -105,7 +105,8 @@ py::tuple render_with_derivatives(Renderer& renderer, const Views& views, const 
 void bind_drr(py::module_& module) {
   module.def(
       "png",
-      [](const py::array_t<float, py::array::c_style | py::array::forcecast>& line_integrals) {
+      [](const RealArray<float>& given) {
+        const auto& line_integrals = given.array;
         if (line_integrals.ndim() != 2) throw py::value_error("an image has the shape (rows, columns)");
         const auto is_number = [](float value) { return std::isfinite(value); };
         if (line_integrals.size() == 0 ||

@@ -10,7 +10,8 @@
 
 namespace isoshift::python {
 
-std::vector<Eigen::Isometry3d> poses_from(const Poses& array) {
+std::vector<Eigen::Isometry3d> poses_from(const Poses& given) {
+  const auto& array = given.array;
   const bool is_one = array.ndim() == 2;
   if ((!is_one && array.ndim() != 3) || array.shape(array.ndim() - 1) != 4 || array.shape(array.ndim() - 2) != 4)
     throw py::value_error("a pose has the shape (4, 4), several poses (P, 4, 4)");
@@ -28,10 +29,10 @@ std::vector<Eigen::Isometry3d> poses_from(const Poses& array) {
   return poses;
 }
 
-Eigen::Isometry3d pose_from(const Poses& array) {
-  if (array.ndim() != 2 || array.shape(0) != 4 || array.shape(1) != 4)
+Eigen::Isometry3d pose_from(const Poses& pose) {
+  if (pose.array.ndim() != 2 || pose.array.shape(0) != 4 || pose.array.shape(1) != 4)
     throw py::value_error("one pose is expected, of the shape (4, 4)");
-  return poses_from(array).front();
+  return poses_from(pose).front();
 }
 
 void check_size(int columns, int rows) {

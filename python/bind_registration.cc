@@ -1,7 +1,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <filesystem>
 #include <map>
@@ -10,6 +9,7 @@
 #include <string>
 
 #include "base/error.h"
+#include "base/stopwatch.h"
 #include "drr/renderer.h"
 #include "io/report/formats.h"
 #include "io/report/report_page.h"
@@ -61,8 +61,8 @@ py::array_t<double> array_of(const std::vector<double>& values) {
   return py::array_t<double>(static_cast<py::ssize_t>(values.size()), values.data());
 }
 
-double similarity_of(const std::string& kind, const py::array_t<float, py::array::c_style | py::array::forcecast>& xray,
-                     const py::array_t<float, py::array::c_style | py::array::forcecast>& drr) {
+double similarity_of(const std::string& kind, const RealArray<float>& xray_given, const RealArray<float>& drr_given) {
+  const auto &xray = xray_given.array, &drr = drr_given.array;
   const SimilarityKind known = kind_from(kind);
   if (known == SimilarityKind::kGradientCorrelation)
     throw UsageError("gradient-correlation compares neighbors: Objective computes it");
@@ -78,7 +78,7 @@ double similarity_of(const std::string& kind, const py::array_t<float, py::array
 }
 
 SetupResult register_for_python(const LoadedStudy& loaded, RegisterOptions options, std::optional<Start> start) {
-  const auto begin = std::chrono::steady_clock::now();
+  const Stopwatch watch;
   options.registration.settle();
   SharedWork none;
   Observer nobody;
@@ -86,8 +86,7 @@ SetupResult register_for_python(const LoadedStudy& loaded, RegisterOptions optio
   const std::optional<SiteRules> site = chosen_site(named_site(options.site), options.anatomy);
   SetupResult result = register_loaded(loaded.study, options, site, std::move(start), none, nobody);
   result.seconds_load = loaded.seconds;
-  result.seconds_total =
-      loaded.seconds + std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  result.seconds_total = loaded.seconds + watch.seconds();
   result.warnings = loaded.notes.warnings;
   if (const auto failure = options.registration.rendering.failed_gpu())
     result.warnings.push_back(fmt::format("{}; rendered on the CPU instead", *failure));

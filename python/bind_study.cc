@@ -1,7 +1,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <map>
 #include <memory>
@@ -10,6 +9,7 @@
 #include <variant>
 
 #include "base/error.h"
+#include "base/stopwatch.h"
 #include "geometry/xray_image.h"
 #include "io/dicom/ct_series.h"
 #include "io/study/study.h"
@@ -42,14 +42,15 @@ std::vector<std::string> allowances(const std::map<std::string, std::string>& al
 std::shared_ptr<LoadedStudy> load_study_for_python(const StudyOptions& options) {
   auto loaded = std::make_shared<LoadedStudy>();
   Observer nobody;
-  const auto begin = std::chrono::steady_clock::now();
+  const Stopwatch watch;
   loaded->study = load(options, loaded->notes, nobody);
-  loaded->seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  loaded->seconds = watch.seconds();
   return loaded;
 }
 
-XrayImage xray_of(const XrayView& view, const py::array_t<float, py::array::c_style | py::array::forcecast>& values,
-                  const std::string& label, bool is_line_integral) {
+XrayImage xray_of(const XrayView& view, const RealArray<float>& given, const std::string& label,
+                  bool is_line_integral) {
+  const auto& values = given.array;
   if (values.ndim() != 2 || values.shape(0) != view.rows || values.shape(1) != view.columns)
     throw py::value_error(fmt::format("values: expected the shape of the view, ({}, {})", view.rows, view.columns));
   XrayImage xray{.label = label,

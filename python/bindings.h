@@ -35,12 +35,17 @@ void bind_study(py::module_& module);
 void bind_drr(py::module_& module);
 void bind_registration(py::module_& module);
 
-using Poses = py::array_t<double, py::array::c_style | py::array::forcecast>;
+// Real numbers in an array of rows, converted where they are others. Texts and complex numbers are a TypeError.
+template <class T>
+struct RealArray {
+  py::array_t<T, py::array::c_style | py::array::forcecast> array;
+};
+using Poses = RealArray<double>;
 
 // A pose, shape (4, 4), or a batch of them, shape (P, 4, 4). Throws ValueError for another shape, or where a matrix is
 // not a rigid motion within 1e-4.
-std::vector<Eigen::Isometry3d> poses_from(const Poses& array);
-Eigen::Isometry3d pose_from(const Poses& array);
+std::vector<Eigen::Isometry3d> poses_from(const Poses& poses);
+Eigen::Isometry3d pose_from(const Poses& pose);
 inline Eigen::Matrix4d matrix_of(const Eigen::Isometry3d& pose) { return pose.matrix(); }
 
 // Throws ValueError for a size that no image has, and for a block that is not within one.
@@ -62,3 +67,16 @@ py::array_t<T> array_of(const Image<T>& image, const py::handle& owner) {
 }
 
 }  // namespace isoshift::python
+
+template <class T>
+struct pybind11::detail::type_caster<isoshift::python::RealArray<T>> {
+  PYBIND11_TYPE_CASTER(isoshift::python::RealArray<T>, handle_type_name<array_t<T>>::name);
+
+  bool load(handle from, bool) {
+    constexpr std::string_view kReal = "fiub";  // numpy's kinds: floating point, integers, truth values
+    const array any = array::ensure(from);
+    if (!any || kReal.find(any.dtype().kind()) == std::string_view::npos) return false;
+    value.array = decltype(value.array)::ensure(any);
+    return static_cast<bool>(value.array);
+  }
+};

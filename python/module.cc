@@ -1,8 +1,10 @@
 // import isoshift: the libraries for Python (docs/python.md).
 
 #include <pybind11/pybind11.h>
+#include <unistd.h>
 
 #include <exception>
+#include <filesystem>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -54,8 +56,14 @@ PYBIND11_MODULE(_isoshift, module) {
   namespace py = pybind11;
   isoshift::python::bind_errors(module);
   module.attr("__version__") = isoshift::kVersion;
-  module.def("use_decoder", &isoshift::use_decoder, py::arg("program"),
-             "Name the program isoshift, which decodes compressed pixels in a process of their own.");
+  module.def(
+      "use_decoder",
+      [](const std::string& program) {
+        const bool is_program = !std::filesystem::is_directory(program) && ::access(program.c_str(), X_OK) == 0;
+        if (!program.empty() && !is_program) throw isoshift::Error(program + ": is no program");
+        isoshift::use_decoder(program);
+      },
+      py::arg("program"), "Name the program isoshift, which decodes compressed pixels in a process of their own.");
   isoshift::python::bind_geometry(module);
   isoshift::python::bind_study(module);
   isoshift::python::bind_drr(module);

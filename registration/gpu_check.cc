@@ -2,11 +2,11 @@
 
 #include <fmt/format.h>
 
-#include <chrono>
 #include <map>
 
 #include "base/error.h"
 #include "base/option_name.h"
+#include "base/stopwatch.h"
 #include "drr/gl/context.h"
 #include "drr/raycast/raycast.h"
 
@@ -16,7 +16,7 @@ namespace {
 GpuCheck check_of(const GlChoice& choice) {
   GlContext& context = gl_context(choice);
   GpuCheck check{.device = context.renderer(), .driver = context.version()};
-  const auto begin = std::chrono::steady_clock::now();
+  const Stopwatch watch;
   try {
     const RendererOptions options{.gl = choice};
     check.rendering = check_rendering([&](const auto& ct_hu, const auto& model, auto beams) {
@@ -29,7 +29,7 @@ GpuCheck check_of(const GlChoice& choice) {
   } catch (const Error& error) {
     check.failure = fmt::format("{} failed its self-check: {}", check.device, error.what());
   }
-  check.milliseconds = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin).count();
+  check.milliseconds = 1000.0 * watch.seconds();
   return check;
 }
 

@@ -3,10 +3,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 
 #include "base/error.h"
+#include "base/stopwatch.h"
 #include "registration/objective.h"
 #include "registration/pose_parameters.h"
 #include "registration/quality/judge.h"
@@ -92,7 +92,7 @@ RegistrationResult register_views(const RendererPyramid& renderers, std::span<co
                                   const Eigen::Isometry3d& start_room_from_patient, const RegistrationOptions& options,
                                   const SearchProgress& progress) {
   options.check();
-  const auto begin = std::chrono::steady_clock::now();
+  const Stopwatch watch;
   FixedViews fixed = compared_views(options, images);
   std::vector<XrayView> views;
   for (FixedImage& image : fixed.images) {
@@ -139,7 +139,7 @@ RegistrationResult register_views(const RendererPyramid& renderers, std::span<co
 
   result.unobservable_room = unobservable_directions(views);
   judge(found.parameters, options, result);
-  result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  result.seconds = watch.seconds();
   return result;
 }
 

@@ -1,7 +1,6 @@
 #include "registration/search.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <functional>
 #include <numeric>
@@ -9,6 +8,7 @@
 
 #include "base/error.h"
 #include "base/parallel.h"
+#include "base/stopwatch.h"
 #include "registration/objective.h"
 #include "registration/pose_objective.h"
 #include "registration/pose_parameters.h"
@@ -175,7 +175,7 @@ SearchResult search(const RendererPyramid& renderers, const FixedViews& views,
   if (options.parameters.empty()) kept.front().resize(options.dof == Dof::kRigid ? 6 : 3, 0.0);
   std::mt19937_64 random(options.seed);
   for (const Stage& stage : options.stages) {
-    const auto begin = std::chrono::steady_clock::now();
+    const Stopwatch watch;
     const Eigen::Isometry3d about = setup_error_from_parameters(kept.front()) * start_room_from_patient;
     const std::vector<FixedImage> level = views.reduced_to(stage.pixel_mm, about, stage.initial_step_mm);
     Renderer& renderer = renderers.with_voxels_up_to(stage.voxel_mm);
@@ -206,7 +206,7 @@ SearchResult search(const RendererPyramid& renderers, const FixedViews& views,
     report.termination = found.front().termination;
     report.reached_limit = found.front().reached_limit;
     if (stage.keep == 1) report_spread(found, report);  // several that are kept may differ
-    report.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+    report.seconds = watch.seconds();
     result.stages.push_back(report);
     result.seconds_rendering += objective.seconds().rendering;
     result.seconds_similarity += objective.seconds().similarity;

@@ -4,11 +4,11 @@
 
 #include <algorithm>
 #include <array>
-#include <chrono>
 #include <fstream>
 #include <iterator>
 
 #include "base/error.h"
+#include "base/stopwatch.h"
 #include "io/report/polygons_json.h"
 #include "io/report/report_page.h"
 #include "io/report/result_folder.h"
@@ -134,12 +134,12 @@ HttpResponse ManualScreen::drrs(const HttpRequest& request) const {
   const Eigen::Isometry3d setup_error = pose_from(body.at("setup_error"));
   const auto detail = body.at("detail").get<std::size_t>();
   if (detail >= kDetails.size()) return refusal(400, "detail is 0 (full), 1 (half) or 2 (a quarter).");
-  const auto begin = std::chrono::steady_clock::now();
+  const Stopwatch watch;
   std::string bytes;
   for (const Image<std::uint8_t>& drr : study_.drrs(setup_error, kDetails[detail])) append(bytes, drr);
-  const std::chrono::duration<double, std::milli> passed = std::chrono::steady_clock::now() - begin;
+  const double passed_ms = 1000.0 * watch.seconds();
   HttpResponse response = pixels_answer(std::move(bytes));
-  response.headers.emplace_back("X-Isoshift-Milliseconds", fmt::format("{:.1f}", passed.count()));
+  response.headers.emplace_back("X-Isoshift-Milliseconds", fmt::format("{:.1f}", passed_ms));
   return response;
 }
 

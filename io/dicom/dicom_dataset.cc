@@ -82,11 +82,17 @@ std::vector<std::pair<DcmTagKey, DcmEVR>> DicomItem::elements() const {
 
 bool DicomItem::has_value(const DcmTagKey& tag) const { return item_->tagExistsWithValue(tag); }
 
-std::vector<std::string> DicomItem::texts(const DcmTagKey& tag) const {
+std::optional<std::string> DicomItem::written(const DcmTagKey& tag) const {
   DcmElement* element = nullptr;
-  if (!has_value(tag) || item_->findAndGetElement(tag, element).bad()) return {};
-  const std::optional<std::string> whole = values_of(*element);
-  if (!whole) throw Error(fmt::format("{}: {} is not text", where_, described(tag)));
+  if (!has_value(tag) || item_->findAndGetElement(tag, element).bad()) return std::nullopt;
+  std::optional<std::string> all = values_of(*element);
+  if (!all) throw Error(fmt::format("{}: {} is not text", where_, described(tag)));
+  return all;
+}
+
+std::vector<std::string> DicomItem::texts(const DcmTagKey& tag) const {
+  const std::optional<std::string> whole = written(tag);
+  if (!whole) return {};
   std::vector<std::string> values;
   std::string_view rest = *whole;
   for (;;) {
@@ -105,13 +111,9 @@ std::optional<std::string> DicomItem::text(const DcmTagKey& tag) const {
 }
 
 std::optional<std::string> DicomItem::raw_text(const DcmTagKey& tag) const {
-  DcmElement* element = nullptr;
-  if (!has_value(tag) || item_->findAndGetElement(tag, element).bad()) return std::nullopt;
-  const std::optional<std::string> whole = values_of(*element);
-  if (!whole) throw Error(fmt::format("{}: {} is not text", where_, described(tag)));
-  const std::string_view value = trimmed(*whole);
-  if (value.empty()) return std::nullopt;
-  return std::string(value);
+  const std::optional<std::string> whole = written(tag);
+  if (!whole || trimmed(*whole).empty()) return std::nullopt;
+  return std::string(trimmed(*whole));
 }
 
 std::vector<double> DicomItem::numbers(const DcmTagKey& tag) const {

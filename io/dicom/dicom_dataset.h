@@ -69,6 +69,9 @@ class DicomItem {
   DcmItem& dcmtk() const { return *item_; }
 
  private:
+  // All values of a text, with the backslashes between them.
+  std::optional<std::string> written(const DcmTagKey& tag) const;
+
   DcmItem* item_;
   std::string where_;
 };

@@ -181,6 +181,11 @@ def test_what_cannot_be_is_an_error(folder, study, renderer, tmp_path):
             renderer.render(study.views, np.zeros(shape))
     with pytest.raises(ValueError, match="pose 0 is not a rigid motion"):
         renderer.render(study.views, 2 * np.eye(4))
+    for poses in (np.eye(4) * (1 + 1j), np.eye(4).astype(str), np.eye(4).astype(object)):
+        with pytest.raises(TypeError):
+            renderer.render(study.views, poses)
+    with pytest.raises(isoshift.Error, match="is no program"):
+        isoshift.use_decoder(str(tmp_path))
     with pytest.raises(isoshift.UsageError, match="renderer=gpu: there is no such renderer"):
         isoshift.Renderer(study.ct, renderer="gpu")
     for nonsense in ({"preset": "best"}, {"dof": "Rigid"}, {"renderer": "gpu"}):

@@ -5,8 +5,8 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 #include <algorithm>
-#include <chrono>
 
+#include "base/stopwatch.h"
 #include "registration/bodies/body_objective.h"
 #include "registration/levenberg_marquardt.h"
 
@@ -105,7 +105,7 @@ BodySearchResult search_bodies(const BodyScene& scene, const BodyPoses& start, s
                                double bound_mm) {
   BodySearchResult result{.poses = start};
   for (const BodyStage& stage : stages) {
-    const auto begin = std::chrono::steady_clock::now();
+    const Stopwatch watch;
     const Objective pixels = pixels_of(scene, stage);
     const JointedBodies held = with_soft_tissue_held(scene.bodies, stage.soft_sigmas);
     BodyObjective objective(held, scene.of(stage).apart, pixels, stage.tile_mm);
@@ -113,8 +113,7 @@ BodySearchResult search_bodies(const BodyScene& scene, const BodyPoses& start, s
     const OptimizerResult climbed = climb_from_base(objective, slots, stage, bound_mm);
     result.poses = slots.poses(climbed.best);
     result.log_probability = climbed.value;
-    const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - begin;
-    result.stages.push_back(report_of(stage, climbed, seconds.count()));
+    result.stages.push_back(report_of(stage, climbed, watch.seconds()));
   }
   return result;
 }

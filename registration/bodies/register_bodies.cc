@@ -3,8 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 
+#include "base/stopwatch.h"
 #include "geometry/rotation.h"
 #include "geometry/seen_motions.h"
 #include "geometry/voxel_box.h"
@@ -218,7 +218,7 @@ bool may_target_lie_elsewhere(const RendererPyramid& renderers, std::span<const 
 void register_bodies(const BentPatient& patient, std::span<const FixedImage> images,
                      const Eigen::Isometry3d& planned_room_from_patient, const RegistrationOptions& options,
                      RegistrationResult& result, const SearchProgress& progress) {
-  const auto begin = std::chrono::steady_clock::now();
+  const Stopwatch watch;
   const Carriers carriers(patient.parts, patient.target, planned_room_from_patient, patient.parts.named_carriers);
   if (!carriers.exist()) {
     result.demote(Verdict::kReview,
@@ -256,7 +256,7 @@ void register_bodies(const BentPatient& patient, std::span<const FixedImage> ima
       motions_of_structures(patient, planned_room_from_patient, target.setup_error, found.poses, result.bodies);
   std::ranges::copy(found.alternatives, std::back_inserter(result.alternatives));
   judge(parameters_from_setup_error(target.setup_error), options, result);
-  result.seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  result.seconds += watch.seconds();
 }
 
 }  // namespace isoshift

@@ -3,9 +3,8 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include <chrono>
-
 #include "base/output_folder.h"
+#include "base/stopwatch.h"
 #include "io/report/result_folder.h"
 #include "setup/couch_shift.h"
 #include "workflow/register/setup_result_of.h"
@@ -14,14 +13,6 @@
 
 namespace isoshift {
 namespace {
-
-class Stopwatch {
- public:
-  double seconds() const { return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin_).count(); }
-
- private:
-  std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();
-};
 
 // Accepted results are written; those for review, and those with a direction that nobody measured, only on request.
 bool may_write_registration(const RegisterOptions& options, const SetupResult& result) {
