@@ -96,6 +96,11 @@ OutputFolder::OutputFolder(fs::path destination, bool overwrite, const std::vect
   destination_ = fs::absolute(destination_).lexically_normal();
   if (destination_.filename().empty()) destination_ = destination_.parent_path();  // "out/" is "out"
   std::error_code error;
+  if (fs::is_symlink(destination_, error)) {
+    if (!fs::exists(destination_, error))
+      throw Error(fmt::format("{}: is a link to a folder that is not there", destination_.string()));
+    destination_ = fs::canonical(destination_);
+  }
   if (fs::exists(destination_, error)) {
     check_replaceable(destination_, overwrite);
     check_holds_none_of(destination_, inputs);

@@ -9,6 +9,7 @@
 #include <charconv>
 #include <cstdint>
 #include <exception>
+#include <filesystem>
 #include <span>
 #include <sstream>
 #include <string>
@@ -176,6 +177,8 @@ int run_isoshift(int argc, const char* const* argv, Console& console) {
   } catch (const std::bad_alloc&) {
     console.err << "error: out of memory\n";
     return kExitFailed;
+  } catch (const std::filesystem::filesystem_error& error) {
+    return say(console, Error(fmt::format("{}: {}", error.path1().string(), error.code().message())), kExitFailed);
   } catch (const std::exception& error) {
     return say(console, error, kExitFailed);
   }

@@ -2,6 +2,8 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <cstdlib>
+#include <exception>
 #include <iostream>
 #include <string_view>
 #include <thread>
@@ -42,6 +44,13 @@ void end_cleanly_on_signals() {
   }).detach();
 }
 
+// Where the system refuses a thread or memory at a place that cannot report it, nothing half written stays.
+void end_without_traces() {
+  std::cerr << "error: the program had to end, probably because memory or threads ran out\n";
+  isoshift::abandon_outputs();
+  std::abort();
+}
+
 // Whatever is written is of patients: at most its owner's group may read it, however it is written.
 void keep_from_strangers() {
   constexpr mode_t kWithheld = S_IWGRP | S_IRWXO;
@@ -52,6 +61,8 @@ void keep_from_strangers() {
 
 int main(int argc, char** argv) {
   keep_from_strangers();
+  std::set_terminate(&end_without_traces);
+  ::unsetenv("DCMDICTPATH");  // no variable of a shell may change what DCMTK takes attributes for
   isoshift::name_options(isoshift::OptionStyle::kFlags);
   // Not commands for people: what this program runs as its child, and the manual that the build makes.
   const std::string_view hidden = argc == 3 ? argv[1] : "", role = argc == 3 ? argv[2] : "";

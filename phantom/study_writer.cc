@@ -149,6 +149,7 @@ std::string_view anatomy_name(PhantomOptions::Anatomy anatomy) {
 }
 
 void PhantomOptions::check() const {
+  constexpr double kTurnDeg = 360.0, kFarthestMm = 1000.0;
   if (!patient_position_from(placement.patient_position))
     throw UsageError(fmt::format("patient position {} is not one of HFS, HFP, FFS, FFP, HFDR, HFDL, FFDR, FFDL",
                                  placement.patient_position));
@@ -159,12 +160,17 @@ void PhantomOptions::check() const {
   if (gantry_angles_deg.empty() || gantry_angles_deg.size() > 12) throw UsageError("1 to 12 gantry angles are needed");
   std::set<std::string> labels;
   for (const double angle_deg : gantry_angles_deg)
-    if (!std::isfinite(angle_deg) || !labels.insert(image_label(angle_deg)).second)
-      throw UsageError(fmt::format("gantry angle {}: expected finite angles, a degree or more apart", angle_deg));
-  if (!placement.translation_mm.allFinite() || !placement.rotation_deg.allFinite() ||
-      !std::isfinite(placement.couch_angle_deg) || !std::isfinite(receptor_angle_deg) ||
-      !panel_fault.shift_mm.allFinite() || !panel_fault.turn_deg.allFinite())
-    throw UsageError("setup error, couch angle, receptor angle and the panel's fault must be finite numbers");
+    if (!(std::abs(angle_deg) <= kTurnDeg) || !labels.insert(image_label(angle_deg)).second)
+      throw UsageError(
+          fmt::format("gantry angle {}: expected angles of -360 to 360, a degree or more apart", angle_deg));
+  if (!(std::abs(placement.couch_angle_deg) <= kTurnDeg) || !(std::abs(receptor_angle_deg) <= kTurnDeg))
+    throw UsageError(fmt::format("couch angle {} and receptor angle {}: expected -360 to 360 degrees",
+                                 placement.couch_angle_deg, receptor_angle_deg));
+  const auto is_within = [](const auto& components, double most) { return (components.array().abs() <= most).all(); };
+  if (!is_within(placement.translation_mm, kFarthestMm) || !is_within(placement.rotation_deg, kTurnDeg) ||
+      !is_within(panel_fault.shift_mm, kFarthestMm) || !is_within(panel_fault.turn_deg, kTurnDeg))
+    throw UsageError(
+        "setup error and the panel's fault: expected at most 1000 mm in each direction, and 360 degrees about it");
   if (!(std::abs(ct_tilt_deg) <= 30.0))
     throw UsageError(fmt::format("a CT tilt of {} degrees is not within 30", ct_tilt_deg));
   check_bends(bends, anatomy_name(anatomy), placement.patient_position);

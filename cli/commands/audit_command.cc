@@ -50,7 +50,13 @@ bool examine(const AuditOptions& options, Console& console) {
   if (!chain.settled.empty())
     console.out << fmt::format("broken, and repaired by a person since: line {}\n", fmt::join(chain.settled, ", "));
   bool is_whole = chain.broken.empty();
-  if (!is_whole)
+  if (chain.links.empty()) {
+    console.err << fmt::format(
+        "error: {}: no line has a link (\"before\"), so that nothing tells whether it is whole\n",
+        options.log.string());
+    is_whole = false;
+  }
+  if (!chain.broken.empty())
     console.err << fmt::format(
         "error: {}: broken: line {}: this line, or lines before it, were changed, taken out or put in\n",
         options.log.string(), fmt::join(chain.broken, ", "));

@@ -317,7 +317,11 @@ Json references_json(const SetupResult& report) {
 
 Json shift_json(const SetupResult& report) {
   const ShownShift shown = shown_shift(report);
-  return {{"setup_error", setup_error_json(report, shown)}, {"couch_shift", couch_shift_json(shown)}};
+  return {{"setup_error", setup_error_json(report, shown)},
+          {"couch_shift", couch_shift_json(shown)},
+          {"couch_target_deg", couch_target_json(shown)},
+          {"couch_applied", couch_applied_json(report, shown)},
+          {"left_over", left_over_json(shown)}};
 }
 
 // NOLINTNEXTLINE(readability-function-size): long because result.json is: one line per key, in the order of the file

@@ -30,7 +30,7 @@ inline constexpr std::array<std::pair<const char*, std::string Identity::*>, 12>
 inline constexpr std::string_view kRad = "_rad";
 inline constexpr std::string_view kDeg = "_deg";
 
-// The parts setup_error and couch_shift, which say the same in several forms.
+// The parts that say the shift, or follow from it.
 nlohmann::ordered_json shift_json(const SetupResult& report);
 
 }  // namespace isoshift

@@ -42,6 +42,19 @@ TEST(OutputFolder, LeavesNothingBehindWithoutCommit) {
   EXPECT_EQ(entries(folder.path()), 0);
 }
 
+TEST(OutputFolder, ALinkLeadsToTheFolder) {
+  TemporaryFolder folder;
+  std::filesystem::create_directory(folder / "real");
+  std::filesystem::create_directory_symlink("real", folder / "link");
+  OutputFolder output(folder / "link", false);
+  write_text(output.path() / "a.txt", "hello");
+  output.commit();
+  EXPECT_EQ(content(folder / "real" / "a.txt"), "hello");
+  EXPECT_TRUE(std::filesystem::is_symlink(folder / "link"));
+  std::filesystem::create_directory_symlink("nowhere", folder / "broken");
+  EXPECT_THROW(OutputFolder(folder / "broken", false), Error);
+}
+
 TEST(OutputFolder, RefusesAFolderThatHoldsSomething) {
   TemporaryFolder folder;
   std::ofstream(folder / "precious.txt") << "keep me";

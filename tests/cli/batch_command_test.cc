@@ -390,6 +390,7 @@ TEST_F(ManifestTest, MistakesAreNamed) {
   EXPECT_THAT(error_of("case,study\n"), HasSubstr("holds no case"));
   EXPECT_THAT(error_of("case,study\n\"a,s\n"), HasSubstr("line"));
   EXPECT_THAT(error_of("{\"case\": 3}\n"), HasSubstr("line 1: expected a JSON object"));
+  EXPECT_THAT(error_of("{\"case\": \"a\", \"case\": \"b\"}\n"), HasSubstr("line 1: says case twice"));
 }
 
 }  // namespace

@@ -84,6 +84,9 @@ TEST(PhantomCommand, RefusesNonsense) {
   EXPECT_EQ(make_phantom(folder / "a", {"--photons", "-1"}).exit_status, 2);
   EXPECT_EQ(make_phantom(folder / "a", {"--translation", "nan,0,0"}).exit_status, 2);
   EXPECT_EQ(make_phantom(folder / "a", {"--gantry-angles", "30.2,30.4"}).exit_status, 2);
+  EXPECT_EQ(make_phantom(folder / "a", {"--gantry-angles", "0,400"}).exit_status, 2);
+  EXPECT_EQ(make_phantom(folder / "a", {"--couch-angle", "1e9"}).exit_status, 2);
+  EXPECT_EQ(make_phantom(folder / "a", {"--translation", "1e9,0,0"}).exit_status, 2);
   EXPECT_EQ(make_phantom(folder / "a", {"--bend", "knee"}).exit_status, 2);
   EXPECT_THAT(make_phantom(folder / "a", {"--bend", "neck,spine:3"}).err, testing::HasSubstr("--bend spine"));
   EXPECT_FALSE(std::filesystem::exists(folder / "a"));

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <iterator>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <set>
@@ -12,6 +13,7 @@
 
 #include "base/csv.h"
 #include "base/error.h"
+#include "base/json_file.h"
 #include "base/sha256.h"
 #include "base/text_file.h"
 #include "io/study/session_files.h"
@@ -74,14 +76,16 @@ std::vector<NumberedRow> json_rows(const std::string& text, const std::string& w
     begin = end + 1;
     if (one.find_first_not_of(" \t\r") == std::string::npos) continue;
     NumberedRow row{.line = line, .cells = {}};
+    const std::string place = fmt::format("{}, line {}", where, line);
+    const nlohmann::json object = json_from(one, place);
     try {
-      for (const auto& [name, value] : nlohmann::json::parse(one).get<std::map<std::string, nlohmann::json>>()) {
-        check_column(name, fmt::format("{}, line {}", where, line));
+      for (const auto& [name, value] : object.get<std::map<std::string, nlohmann::json>>()) {
+        check_column(name, place);
         row.cells[name] =
             value.is_array() ? value.get<std::vector<std::string>>() : std::vector{value.get<std::string>()};
       }
     } catch (const nlohmann::json::exception&) {
-      throw Error(fmt::format("{}, line {}: expected a JSON object of texts and lists of texts", where, line));
+      throw Error(fmt::format("{}: expected a JSON object of texts and lists of texts", place));
     }
     rows.push_back(std::move(row));
   }
@@ -196,7 +200,7 @@ std::vector<BatchCase> scan_cases(const fs::path& folder, bool other_xrays, Note
       if (const std::string reason = unreadable_beside(parts, files.unreadable); !reason.empty())
         throw Error("a file beside these X-rays may belong to them: " + reason);
       parts.ct = ct_paths(top, parts.ct);
-      parts.doubts = session.doubts;
+      std::ranges::copy(session.doubts, std::back_inserter(parts.doubts));
       for (const std::string& doubt : session.doubts)
         notes.warnings.push_back(fmt::format("case {}: {}", session.name, doubt));
       BatchCase& found = cases.emplace_back(BatchCase{.name = session.name, .parts = std::move(parts), .anatomy = ""});

@@ -382,7 +382,7 @@ void Watch::begin_registration(const Complete& complete) {
   try {
     tree_.check_is_new(session);
     StudyParts parts = choose_parts(complete.files);
-    parts.doubts = complete.session.doubts;
+    std::ranges::copy(complete.session.doubts, std::back_inserter(parts.doubts));
     if (const std::string reason = unreadable_beside(parts, parts_.source.unreadable()); !reason.empty())
       parts.doubts.push_back("a file beside the X-rays may belong to them: " + reason);
     const SessionInputs inputs = inputs_of(parts, parts_.contents);

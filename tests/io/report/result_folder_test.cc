@@ -137,8 +137,9 @@ TEST_F(ResultFolderTest, ABodyWhoseSigmaIsNoNumberIsNotDetermined) {
 // Whatever number of the shift is edited, the others still say what was found.
 TEST_F(ResultFolderTest, AShiftThatWasChangedByHandIsRefused) {
   const auto json = nlohmann::json::parse(json_report(bent_report(Verdict::kAccepted)));
-  for (const char* place : {"/setup_error/translation_mm/0", "/setup_error/known_translation_mm/1",
-                            "/setup_error/rotation_deg/rz", "/couch_shift/vertical_mm", "/couch_shift/pitch_deg"}) {
+  for (const char* place :
+       {"/setup_error/translation_mm/0", "/setup_error/known_translation_mm/1", "/setup_error/rotation_deg/rz",
+        "/couch_shift/vertical_mm", "/couch_shift/pitch_deg", "/couch_target_deg/yaw"}) {
     auto changed = json;
     auto& number = changed[nlohmann::json::json_pointer(place)];
     number = number.get<double>() + 0.01;

@@ -44,6 +44,15 @@ class AuditChainTest : public testing::Test {
   AuditLog log_{path_};
 };
 
+TEST_F(AuditChainTest, WhatHasNoLinkIsNotCalledWhole) {
+  for (const char* log : {"", "some text\n", "{\"event\": \"registered\"}\n"}) {
+    put(log);
+    EXPECT_EQ(audit().exit_status, 1) << log;
+    EXPECT_THAT(audit().err, HasSubstr("audit.jsonl: no line has a link"));
+    EXPECT_THAT(audit().out, testing::Not(HasSubstr("whole")));
+  }
+}
+
 // What `head -n -0 | sha256sum` of a shell says.
 TEST_F(AuditChainTest, EveryLineHoldsTheHashOfTheLineBefore) {
   add_five();
