@@ -15,6 +15,7 @@
 #include "base/large_vector.h"
 #include "base/parallel.h"
 #include "base/sha256.h"
+#include "io/dicom/ct_doubts.h"
 #include "io/dicom/decode.h"
 #include "io/dicom/pixel_padding.h"
 
@@ -107,8 +108,6 @@ Slice slice_at(const FrameGeometry& geometry, const DicomItem& dataset, const st
   slice.frame_of_reference_uid = dataset.required_uid(DCM_FrameOfReferenceUID);
   slice.identity = read_identity(dataset);
   slice.patient_position = dataset.text(DCM_PatientPosition).value_or("");
-  if (const auto modality = dataset.text(DCM_Modality); modality && *modality != "CT")
-    throw Error(fmt::format("{}: {} is {}, expected CT", where, described(DCM_Modality), *modality));
   slice.is_lossy = dataset.text(DCM_LossyImageCompression) == "01";
   slice.position_mm = Eigen::Vector3d(geometry.position.required_numbers(DCM_ImagePositionPatient, 3).data());
   const std::vector<double> orientation = geometry.orientation.required_numbers(DCM_ImageOrientationPatient, 6);
@@ -145,6 +144,7 @@ void check_one_volume(const DicomItem& dataset, const FunctionalGroups& groups, 
 std::vector<Slice> read_slices_of(const std::filesystem::path& path) {
   const DicomFile file = DicomFile::read(path, DicomFile::Extent::kWhole);
   const DicomItem dataset = file.dataset();
+  expect_modality(dataset, "CT");
   const PixelFormat format = pixel_format(dataset);
   check_size(dataset.where(), format, format.frames);
   const FunctionalGroups groups(dataset);
@@ -384,6 +384,7 @@ CtSeries read_ct_series(std::span<const std::filesystem::path> files, const Allo
   drop_duplicates(slices, axes.col(2), notes);
   if (slices.size() < 2) throw Error(fmt::format("CT series {}: only one slice", series.series_instance_uid));
   series.hu = assembled(slices, axes, series.series_instance_uid, allowed, notes);
+  series.doubts = ct_doubts(series.hu);
   std::string hashes;
   for (const Slice& slice : slices)
     if (std::ranges::find(series.sop_instance_uids, slice.sop_instance_uid) == series.sop_instance_uids.end()) {

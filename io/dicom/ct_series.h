@@ -24,6 +24,7 @@ struct CtSeries {
   std::string patient_position;                // of the scan; annotation only (C.7.3.1.1.2)
   std::string acquired_on;                     // AcquisitionDate, else SeriesDate; may be empty
   std::vector<std::string> sop_instance_uids;  // each once, in the order of the slices
+  std::vector<std::string> doubts;             // about its voxels: every result needs a person's review
   std::string sha256;  // of the SHA-256 of its files, hexadecimal, one after the other in that order
 };
 

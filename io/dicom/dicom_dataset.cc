@@ -271,6 +271,11 @@ void DicomItem::erase(const DcmTagKey& tag) {
   if (item_->tagExists(tag)) check(item_->findAndDeleteElement(tag), where_, described(tag));
 }
 
+void expect_modality(const DicomItem& dataset, std::string_view modality) {
+  if (const auto found = dataset.text(DCM_Modality); found && *found != modality)
+    throw Error(fmt::format("{}: {} is {}, expected {}", dataset.where(), described(DCM_Modality), *found, modality));
+}
+
 DicomFile::DicomFile() : path_("new DICOM object") {
   configure_dcmtk();
   file_ = std::make_unique<DcmFileFormat>();

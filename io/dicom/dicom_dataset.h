@@ -76,6 +76,9 @@ class DicomItem {
   std::string where_;
 };
 
+// Throws Error if a dataset says that it is of another modality than the objects of its class are.
+void expect_modality(const DicomItem& dataset, std::string_view modality);
+
 class DicomFile {
  public:
   enum class Extent { kHeader, kWhole };  // kHeader stops before the pixel data

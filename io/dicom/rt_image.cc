@@ -250,6 +250,7 @@ bool RtImage::is_rt_image() const { return sop_class_uid == UID_RTImageStorage; 
 std::vector<RtImage> read_rt_images(const DicomFile& file, Notes& notes) {
   const std::filesystem::path& path = file.path();
   const DicomItem dataset = file.dataset();
+  if (dataset.uid(DCM_SOPClassUID) == UID_RTImageStorage) expect_modality(dataset, "RTIMAGE");
   const PixelFormat format = pixel_format(dataset);
   const Exposures exposures(dataset, format.frames);
   std::vector<RtImage> images;

@@ -69,6 +69,7 @@ RtPlan read_rt_plan(const std::filesystem::path& path) {
   RtPlan plan;
   plan.path = path;
   plan.sha256 = file.sha256();
+  expect_modality(dataset, "RTPLAN");
   plan.identity = read_identity(dataset);
   plan.sop_class_uid = dataset.required_uid(DCM_SOPClassUID);
   plan.sop_instance_uid = dataset.required_uid(DCM_SOPInstanceUID);

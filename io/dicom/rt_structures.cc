@@ -93,6 +93,7 @@ RtStructures read_rt_structures(const std::filesystem::path& path) {
   const DicomFile file = DicomFile::read(path, DicomFile::Extent::kHeader);
   const DicomItem dataset = file.dataset();
   RtStructures read;
+  expect_modality(dataset, "RTSTRUCT");
   read.path = path;
   read.identity = read_identity(dataset);
   read.sop_instance_uid = dataset.required_uid(DCM_SOPInstanceUID);
@@ -125,6 +126,7 @@ const Structure& structure_named(const RtStructures& structures, std::string_vie
   const std::string where = structures.path.string();
   if (meant.size() != 1) {
     std::vector<std::string> there;
+    there.reserve(structures.structures.size());
     for (const Structure& structure : structures.structures) there.push_back(fmt::format("\"{}\"", structure.name));
     throw Error(fmt::format("{}: {} structure{} named \"{}\" ({}), expected one.\n       There are: {}{}", where,
                             meant.empty() ? "no" : fmt::format("{}", meant.size()), meant.empty() ? "" : "s", name,

@@ -302,6 +302,7 @@ void check_together(const StudyRequest& request, const SaidOfSession& said, Stud
   std::ranges::copy(said.findings, std::back_inserter(findings));
   settle(findings, request.allowed, notes);
   study.doubts = request.parts.doubts;
+  std::ranges::copy(study.ct->doubts, std::back_inserter(study.doubts));
   doubt(said.doubts, request.allowed, study, notes);
   check_one_patient_position(study);
 }

@@ -390,6 +390,35 @@ TEST_F(CtSeriesTest, ACtOfNoStudyIsRefused) {
   EXPECT_THAT(error_of_reading(), testing::HasSubstr("StudyInstanceUID (0020,000D) is missing"));
 }
 
+TEST_F(CtSeriesTest, NumbersThatNoScannerWritesAreInDoubt) {
+  write_even(6);
+  edit(files_[3], [](DicomItem d) { d.put(DCM_RescaleSlope, 1000.0); });
+  EXPECT_THAT(read().doubts, testing::ElementsAre(testing::HasSubstr("voxels of the CT have more than 32767 HU")));
+  edit_all([](DicomItem d) { d.put(DCM_RescaleSlope, 10.0); });
+  EXPECT_THAT(read().doubts, testing::IsEmpty());
+  edit_all([](DicomItem d) {
+    d.put(DCM_RescaleSlope, 1.0);
+    d.put_pixels(std::vector<std::uint16_t>(kColumns * kRows, 0));
+  });
+  EXPECT_THAT(read().doubts, testing::IsEmpty());
+  edit(files_[2], [](DicomItem d) {
+    std::vector<std::uint16_t> pixels(kColumns * kRows, 0);
+    pixels[1] = pixels[2] = 3500;  // 2500 HU: may be bone
+    d.put_pixels(pixels);
+  });
+  EXPECT_THAT(read().doubts, testing::IsEmpty());
+  edit(files_[2], [](DicomItem d) {
+    d.put(DCM_RescaleIntercept, -1000.0);
+    d.put(DCM_BitsStored, 16);
+    d.put(DCM_HighBit, 15);
+    std::vector<std::uint16_t> pixels(kColumns * kRows, 0);
+    pixels[1] = pixels[2] = 9000;
+    d.put_pixels(pixels);
+  });
+  EXPECT_THAT(read().doubts, testing::ElementsAre(
+                                 testing::HasSubstr("2 voxels of the CT have more than 4000 HU in the midst of air")));
+}
+
 TEST_F(CtSeriesTest, AProjectionOfSeveralPhasesIsWarnedOf) {
   write_even(6);
   edit_all([](DicomItem d) { d.put(DCM_ImageType, "DERIVED\\SECONDARY\\MIP"); });

@@ -160,6 +160,11 @@ TEST_F(RtImageTest, AReadOutOfMoreThanATurnIsNoAngle) {
   }
 }
 
+TEST_F(RtImageTest, AnotherModalityIsRefused) {
+  EXPECT_THAT(error_of_reading([](DicomItem d) { d.put(DCM_Modality, "DX"); }),
+              HasSubstr("Modality (0008,0060) is DX, expected RTIMAGE"));
+}
+
 TEST_F(RtImageTest, OfTwoValuesNoneIsChosen) {
   EXPECT_THAT(error_of_reading([](DicomItem d) { d.put(DCM_GantryAngle, "0\\90"); }),
               HasSubstr("GantryAngle (300A,011E) has 2 values, expected 1"));
