@@ -33,6 +33,7 @@ bool is_convex(const std::vector<Eigen::Vector2d>& polygon) {
 Image<std::uint8_t> mask_of_leaves(const IrradiatedField& field, int columns, int rows, double rim_px) {
   constexpr int kFraction = 4;  // bits of a pixel's fraction
   std::vector<cv::Point> corners;
+  corners.reserve(field.corners_px.size());
   for (const Eigen::Vector2d& corner : field.corners_px)
     corners.emplace_back(static_cast<int>(std::lround(corner.x() * (1 << kFraction))),
                          static_cast<int>(std::lround(corner.y() * (1 << kFraction))));
