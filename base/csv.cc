@@ -3,6 +3,7 @@
 #include <csv.h>
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <utility>
@@ -80,9 +81,15 @@ CsvTable csv_table(std::string_view text, const std::string& where, char separat
                         csv_fini(&parser, on_cell, on_end, &lines) == 0;
   const int problem = csv_error(&parser);
   csv_free(&parser);
-  if (!is_whole) throw Error(fmt::format("{}, line {}: {}", where, lines.line(), csv_strerror(problem)));
+  if (!is_whole)
+    throw Error(fmt::format(
+        "{}, line {}: is no table of cells between commas: {}", where, lines.line(),
+        problem == CSV_EPARSE ? "a quotation mark is missing, or stands within a cell" : csv_strerror(problem)));
   std::vector<CsvTable::Row> rows = lines.take_rows();
   CsvTable table{.columns = std::move(rows.front().cells), .rows = {}};
+  for (auto column = table.columns.begin(); column != table.columns.end(); ++column)
+    if (!column->empty() && std::find(table.columns.begin(), column, *column) != column)
+      throw Error(fmt::format("{}: has the column {} twice", where, *column));
   for (auto row = rows.begin() + 1; row != rows.end(); ++row) {
     if (row->cells.empty() || (row->cells.size() == 1 && row->cells.front().empty())) continue;
     if (row->cells.size() != table.columns.size())

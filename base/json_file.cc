@@ -48,6 +48,10 @@ JsonSection::JsonSection(const nlohmann::json& json, std::string where) : json_(
   if (!json_.is_object()) throw Error(fmt::format("{}: expected an object", where_));
 }
 
+void JsonSection::know(const char* key) {
+  if (std::ranges::find(known_, key) == known_.end()) known_.emplace_back(key);
+}
+
 std::optional<double> JsonSection::number(const char* key, double low, double high) {
   const auto value = find<double>(key, "a number");
   if (value && !(*value >= low && *value <= high))
@@ -56,7 +60,7 @@ std::optional<double> JsonSection::number(const char* key, double low, double hi
 }
 
 std::optional<JsonSection> JsonSection::section(const char* key) {
-  known_.emplace_back(key);
+  know(key);
   if (!json_.contains(key)) return std::nullopt;
   return JsonSection(json_.at(key), fmt::format("{}: {}", where_, key));
 }

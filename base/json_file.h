@@ -40,7 +40,7 @@ class JsonSection {
 
   template <class T>
   std::optional<T> find(const char* key, const char* expected) {
-    known_.emplace_back(key);
+    know(key);
     if (!json_.contains(key)) return std::nullopt;
     const nlohmann::json& value = json_.at(key);
     if constexpr (std::is_integral_v<T> && !std::is_same_v<T, bool>)
@@ -68,6 +68,8 @@ class JsonSection {
   void end() const;
 
  private:
+  void know(const char* key);
+
   const nlohmann::json& json_;
   std::string where_;
   std::vector<std::string> known_;

@@ -24,6 +24,9 @@ void from_json(const nlohmann::json& json, RawText& text) {
   text.bytes.assign(bytes.begin(), bytes.end());
 }
 
-std::string line_of(const nlohmann::json& message) { return message.dump() + "\n"; }
+// Names of files, and what files say, may hold bytes that are no UTF-8: they are replaced.
+std::string line_of(const nlohmann::json& message) {
+  return message.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
+}
 
 }  // namespace isoshift

@@ -11,6 +11,7 @@
 #include "base/error.h"
 #include "base/stopwatch.h"
 #include "drr/renderer.h"
+#include "geometry/patient_setup.h"
 #include "io/report/formats.h"
 #include "io/report/report_page.h"
 #include "python/bindings.h"
@@ -97,11 +98,19 @@ SetupResult register_for_python(const LoadedStudy& loaded, RegisterOptions optio
 
 // An object with the numbers of one patient and the name of another must not be written.
 void check_is_of(const SetupResult& result, const Study& study) {
+  constexpr double kSamePose = 1e-6;
   const auto is_in_study = [&](const SetupResult::View& view) {
     return std::ranges::count(study.rt_images, view.sop_instance_uid, &RtImage::sop_instance_uid) > 0;
   };
   if (result.ct_series_uid != study.ct->series_instance_uid || !std::ranges::all_of(result.views, is_in_study))
     throw Error("the result is of another study: its CT and X-rays are not those of this study");
+  const auto position = patient_position_from(result.patient_position);
+  const bool is_same_plan = position && planned_room_from_patient(*position, result.table, result.isocenter_patient_mm)
+                                            .isApprox(study.planned_room_from_patient, kSamePose);
+  if (!is_same_plan)
+    throw Error(
+        "the result is about another planned pose: its isocenter, patient position or table angles are not those of "
+        "this study");
 }
 
 py::object json_of(const SetupResult& result) { return py::module_::import("json").attr("loads")(json_report(result)); }

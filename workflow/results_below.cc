@@ -50,7 +50,9 @@ Folders folders_below(const fs::path& top) {
     for (auto entry = fs::recursive_directory_iterator(top); entry != fs::recursive_directory_iterator(); ++entry) {
       if (!entry->is_directory()) continue;
       const std::string name = entry->path().filename().string();
-      if (name.starts_with('.') || std::ranges::find(kPutAside, name) != kPutAside.end() || take(entry->path()))
+      const bool is_unfinished = name.find(".partial-") != std::string::npos;
+      if (name.starts_with('.') || is_unfinished || std::ranges::find(kPutAside, name) != kPutAside.end() ||
+          take(entry->path()))
         entry.disable_recursion_pending();
     }
   for (auto* some : {&folders.of_results, &folders.of_errors}) std::ranges::sort(*some, {}, &NamedFolder::path);

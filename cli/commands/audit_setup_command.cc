@@ -78,7 +78,7 @@ void add_audit_setup_command(CLI::App& app, Console& console, int& exit_status) 
   command->callback([options, &console, &exit_status] {
     const SetupAudit audit = audit_archive(*options);
     print_warnings(audit.of_no_use, console);
-    if (!options->output.empty()) write_audit(audit, options->output, options->overwrite);
+    if (!options->output.empty()) write_audit(audit, options->used, options->output, options->overwrite);
     console.out << (options->as_json ? audit_json(audit) : audit_text(audit));
     exit_status = kExitAccepted;
   });

@@ -33,7 +33,9 @@ std::array<double, 2> pixel_size_mm(const XrayView& view) {
 }
 
 void run_drr(const DrrOptions& options, Console& console) {
-  OutputFolder output(options.output, options.overwrite, options.study.parts.paths());
+  std::vector<std::filesystem::path> inputs = options.study.parts.paths();
+  inputs.push_back(options.setup_error);
+  OutputFolder output(options.output, options.overwrite, inputs);
   Notes notes;
   options.rendering.check();
   ConsoleObserver observer(console);

@@ -38,7 +38,7 @@ void run_phantom(PhantomCommandOptions options, Console& console) {
   phantom.placement.translation_mm = Eigen::Vector3d(options.translation_mm.data());
   phantom.placement.rotation_deg = Eigen::Vector3d(options.rotation_deg.data());
   phantom.check();
-  OutputFolder output(options.output, options.overwrite);
+  OutputFolder output(options.output, options.overwrite, {options.trace});
   {
     ProgressBar bar(console, "Writing phantom");
     write_phantom_study(phantom, output.path(), [&](std::size_t done, std::size_t total) { bar.update(done, total); });

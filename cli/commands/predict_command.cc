@@ -136,10 +136,11 @@ std::string table_of(const Scores& scores) {
       std::string cell =
           fmt::format("{:.2f} {:.2f} {:.2f}", rmse, scores.mean(&PredictionScore::p95_mm, method, latency),
                       scores.mean(&PredictionScore::max_mm, method, latency));
-      if (hold != scores.kinds.end())
-        cell += fmt::format(" ({:.3f})",
-                            rmse / scores.mean(&PredictionScore::rmse_mm,
-                                               static_cast<std::size_t>(hold - scores.kinds.begin()), latency));
+      const double held =
+          hold == scores.kinds.end()
+              ? 0.0
+              : scores.mean(&PredictionScore::rmse_mm, static_cast<std::size_t>(hold - scores.kinds.begin()), latency);
+      if (held > 0.0) cell += fmt::format(" ({:.3f})", rmse / held);
       text += fmt::format("{:>26}", cell);
     }
     text += "\n";
@@ -161,7 +162,7 @@ std::string chart_of(const Scores& scores) {
 
 void run_predict(const PredictOptions& options, Console& console) {
   std::optional<OutputFolder> output;
-  if (!options.output.empty()) output.emplace(options.output, options.overwrite);
+  if (!options.output.empty()) output.emplace(options.output, options.overwrite, options.traces);
   const Scores scores = scores_of(options, console);
   const std::string json = json_of(scores).dump(2) + "\n";
   if (output) {

@@ -7,7 +7,6 @@
 #include <memory>
 
 #include "base/error.h"
-#include "base/json_file.h"
 #include "base/output_folder.h"
 #include "cli/commands/commands.h"
 #include "cli/switches/registration_switches.h"
@@ -17,7 +16,6 @@
 #include "io/report/formats.h"
 #include "io/report/result_folder.h"
 #include "setup/couch_shift.h"
-#include "workflow/register/same_setup.h"
 #include "workflow/register/setup_result_of.h"
 #include "workflow/register/truth.h"
 
@@ -51,6 +49,7 @@ int run_register(RegisterOptions options, const std::filesystem::path& truth_fil
   if (!truth_file.empty()) {
     truth = read_setup_error(truth_file);
     body_truths = read_body_truths(truth_file);
+    options.truth = truth_file;
   }
   const bool names_target = !options.target.empty();
   SharedWork none;
@@ -58,7 +57,6 @@ int run_register(RegisterOptions options, const std::filesystem::path& truth_fil
   const SetupResult report = register_study(options, none, observer);
   print_warnings(report.warnings, console);
   console.out << (as_json ? json_report(report) : text_report(report_page(report)));
-  if (truth) require_same_setup(read_json_file(truth_file).json, truth_file.string(), planned_lie(report));
   if (!as_json) {
     if (truth && names_target)
       truth = truth_at(planned_target_patient_mm(report), *truth, report.isocenter_patient_mm, body_truths);

@@ -28,7 +28,8 @@ struct ScoutFlags {
 int run_scout(ScoutFlags& flags, Console& console) {
   flags.request.allowed = allowances_from(flags.allow);
   std::optional<OutputFolder> folder;  // a folder that cannot be written is refused before the search
-  if (!flags.output.empty()) folder.emplace(flags.output, flags.overwrite);
+  if (!flags.output.empty())
+    folder.emplace(flags.output, flags.overwrite, std::vector{flags.request.ct, flags.request.scout});
   ConsoleObserver observer(console);
   const ScoutRegistration found = register_scout(flags.request, observer);
   print_warnings(found.notes.warnings, console);

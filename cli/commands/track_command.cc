@@ -92,7 +92,7 @@ void add_track_command(CLI::App& app, Console& console, int&) {
   command->add_flag("--rigid", flags->six_dof, "Six degrees of freedom instead of the three translations");
   command->add_option("--box", options.tracking.box_mm, "Half the width of the search box around the expected position")
       ->type_name("MM")
-      ->check(CLI::Range(1.0, 50.0))
+      ->check(CLI::Range(2.0, 50.0))
       ->capture_default_str();
   command
       ->add_option("--tolerance", options.tolerance_mm,

@@ -11,6 +11,7 @@
 #include <cmath>
 #include <cstring>
 #include <fstream>
+#include <limits>
 #include <random>
 #include <utility>
 
@@ -164,6 +165,15 @@ std::optional<double> DicomItem::number(const DcmTagKey& tag) const {
   return required_number(tag);
 }
 
+// An IS value is one of 32 bits (PS3.5 6.2).
+std::optional<int> DicomItem::integer(const DcmTagKey& tag) const {
+  const std::optional<double> value = number(tag);
+  if (!value) return std::nullopt;
+  if (!(std::abs(*value) <= std::numeric_limits<int>::max()) || *value != std::floor(*value))
+    throw Error(fmt::format("{}: {} is {}, expected a whole number", where_, described(tag), *value));
+  return static_cast<int>(*value);
+}
+
 std::optional<std::string> DicomItem::uid(const DcmTagKey& tag) const {
   // Some programs that take names out of files write hexadecimal digits and hyphens, too.
   constexpr std::size_t kLongest = 64;
@@ -200,6 +210,12 @@ std::string DicomItem::required_uid(const DcmTagKey& tag) const {
 }
 
 double DicomItem::required_number(const DcmTagKey& tag) const { return required_numbers(tag, 1).front(); }
+
+int DicomItem::required_integer(const DcmTagKey& tag) const {
+  const auto value = integer(tag);
+  if (!value) throw Error(fmt::format("{}: {} is missing", where_, described(tag)));
+  return *value;
+}
 
 std::vector<double> DicomItem::required_numbers(const DcmTagKey& tag, std::size_t count) const {
   std::vector<double> values = numbers(tag);

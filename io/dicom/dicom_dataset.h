@@ -47,12 +47,14 @@ class DicomItem {
   std::optional<std::string> uid(const DcmTagKey& tag) const;  // throws Error for what cannot be meant as one
   std::optional<double> number(const DcmTagKey& tag) const;    // throws Error for several: which of them counts?
   std::vector<double> numbers(const DcmTagKey& tag) const;
+  std::optional<int> integer(const DcmTagKey& tag) const;  // throws Error for what is no whole number of 32 bits
   std::vector<DicomItem> items(const DcmTagKey& sequence) const;
 
   // The same for what must be there; `count` numbers, all finite.
   std::string required_text(const DcmTagKey& tag) const;
   std::string required_uid(const DcmTagKey& tag) const;
   double required_number(const DcmTagKey& tag) const;
+  int required_integer(const DcmTagKey& tag) const;
   std::vector<double> required_numbers(const DcmTagKey& tag, std::size_t count) const;
 
   // Writing. The VR comes from the data dictionary; DS values are shortened to 16 bytes, never cut (ds_from).

@@ -18,6 +18,13 @@ std::vector<Finding> not_allowed(const std::vector<Finding>& findings, const All
   return others;
 }
 
+std::vector<std::string> unsettled(const std::vector<Finding>& findings, const Allowances& allowed, Notes& notes) {
+  std::vector<std::string> doubts;
+  for (const Finding& finding : not_allowed(findings, allowed, notes))
+    doubts.push_back(fmt::format("{} ({})", finding.message, option("allow", fmt::format("{}=REASON", finding.key))));
+  return doubts;
+}
+
 void settle(const std::vector<Finding>& findings, const Allowances& allowed, Notes& notes) {
   std::string refused;
   for (const Finding& finding : not_allowed(findings, allowed, notes))

@@ -42,6 +42,9 @@ struct Finding {
 // Moves allowed findings to notes.overrides and returns the others.
 std::vector<Finding> not_allowed(const std::vector<Finding>& findings, const Allowances& allowed, Notes& notes);
 
+// The same as doubts, each with the --allow switch that settles it.
+std::vector<std::string> unsettled(const std::vector<Finding>& findings, const Allowances& allowed, Notes& notes);
+
 // Moves allowed findings to notes.overrides; throws one Error with all the others, each naming its --allow switch.
 void settle(const std::vector<Finding>& findings, const Allowances& allowed, Notes& notes);
 

@@ -8,6 +8,7 @@
 #include <chrono>
 #include <cmath>
 #include <iterator>
+#include <limits>
 #include <numeric>
 
 #include "base/error.h"
@@ -69,11 +70,13 @@ class FrameAttributes {
     return agreed ? agreed : dataset_.number(tag);
   }
 
-  // A number that frames may differ in.
+  // A length or, with a turn, an angle that frames may differ in.
 
-  std::optional<double> read_out(const DcmTagKey& tag) {
+  std::optional<double> read_out(const DcmTagKey& tag, double turn = std::numeric_limits<double>::infinity()) {
     const std::optional<double> value = number(tag), of_all = dataset_.number(tag);
-    if (!tell_frames_apart_ && of_all && std::abs(*value - *of_all) > kMaxReadOutNoise)
+    if (tell_frames_apart_ || !of_all) return value;
+    const double most = std::isfinite(turn) ? kMaxTableTurnDeg : kMaxTableMoveMm;
+    if (std::abs(std::remainder(*value - *of_all, turn)) > most)
       contradictions_.push_back(fmt::format("{}: {} is {}, and {} in its {}, which was used", dataset_.where(),
                                             described(tag), *of_all, *value, described(DCM_ExposureSequence)));
     return value;
@@ -81,8 +84,9 @@ class FrameAttributes {
 
   // A read-out of more than a turn is no angle.
   std::optional<double> angle_deg(const DcmTagKey& tag) {
-    const std::optional<double> value_deg = read_out(tag);
-    if (value_deg && std::abs(*value_deg) > 360.0)
+    constexpr double kTurnDeg = 360.0;
+    const std::optional<double> value_deg = read_out(tag, kTurnDeg);
+    if (value_deg && std::abs(*value_deg) > kTurnDeg)
       throw Error(
           fmt::format("{}: {} is {} degrees, expected -360 to 360", dataset_.where(), described(tag), *value_deg));
     return value_deg;
@@ -150,13 +154,14 @@ RtImage read_frame(const std::filesystem::path& path, const DicomItem& d, const 
   image.frame = frame;
   if (format.frames > 1) image.label += fmt::format("#{}", frame + 1);
   if (const auto type = d.texts(DCM_ImageType); type.size() > 2) image.image_type = type[2];
+  image.approval_status = d.text(DCM_ApprovalStatus).value_or("");
   image.reported_values_origin = d.text(DCM_ReportedValuesOrigin);
   image.fraction_number = d.number(DCM_FractionNumber);
   image.patient_position = d.text(DCM_PatientPosition);
   // The first counts, as where files are chosen (StudyFiles).
   if (const auto plans = d.items(DCM_ReferencedRTPlanSequence); !plans.empty())
     image.plan_sop_instance_uid = plans.front().uid(DCM_ReferencedSOPInstanceUID);
-  if (const auto number = d.number(DCM_ReferencedBeamNumber)) image.beam_number = static_cast<int>(*number);
+  image.beam_number = d.integer(DCM_ReferencedBeamNumber);
   read_acquisition_time(d, image);
   const std::optional<double> offset_s = frame_offset_s(d, frame);
   image.frame_offset_s = offset_s.value_or(0.0);
@@ -189,7 +194,7 @@ RtImage read_frame(const std::filesystem::path& path, const DicomItem& d, const 
   image.rows = format.rows;
   image.intensity_relationship = d.text(DCM_PixelIntensityRelationship);
   if (const auto sign = d.number(DCM_PixelIntensityRelationshipSign))
-    image.intensity_sign = *sign == 1.0 || *sign == -1.0 ? static_cast<int>(*sign) : 0;
+    image.intensity_sign = static_cast<int>(std::clamp(*sign, -1e9, 1e9));
   image.photometric_interpretation = d.text(DCM_PhotometricInterpretation).value_or("");
   image.is_lossy = d.text(DCM_LossyImageCompression) == "01";
   image.has_modality_lut = !d.items(DCM_ModalityLUTSequence).empty();

@@ -44,8 +44,9 @@ struct RtImage {
   std::string sop_instance_uid;
   std::string series_instance_uid;
   std::optional<std::string> frame_of_reference_uid;
-  std::string label;       // RTImageLabel, else the file's name without extension; of several frames with "#2"
-  std::string image_type;  // ImageType, third value
+  std::string label;            // RTImageLabel, else the file's name without extension; of several frames with "#2"
+  std::string image_type;       // ImageType, third value
+  std::string approval_status;  // ApprovalStatus; may be empty
   std::optional<std::string> reported_values_origin;
   std::optional<double> fraction_number;
   std::optional<std::string> patient_position;

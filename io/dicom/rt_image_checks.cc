@@ -55,6 +55,12 @@ RtImage with_switches(RtImage image, const RtImageSwitches& switches, Notes& not
   if (switches.couch_roll_deg)
     replace(image.table.roll_deg, *switches.couch_roll_deg, named(DCM_TableTopRollAngle),
             by(option("couch-roll", fmt::to_string(*switches.couch_roll_deg))), notes);
+  const bool is_of_no_use = switches.sad_mm || switches.sid_mm || switches.position_mm || switches.assume_centered;
+  if (by_matrix && is_of_no_use)
+    notes.warnings.push_back(
+        fmt::format("{}: a projection matrix places this image; distances and positions by {}, {}, {} or {} are not "
+                    "used for it",
+                    image.label, option("sad"), option("sid"), option("rt-image-position"), option("assume-centered")));
   if (switches.sad_mm && !by_matrix)
     replace(image.sad_mm, *switches.sad_mm, named(DCM_RadiationMachineSAD),
             by(option("sad", fmt::to_string(*switches.sad_mm))), notes);

@@ -13,7 +13,7 @@ namespace isoshift {
 namespace {
 
 void expect_range(const RtImage& image, const DcmTagKey& tag, double value, double low, double high) {
-  if (!(value > low && value < high))
+  if (!(value >= low && value <= high))
     throw Error(
         fmt::format("{}: {} is {}, expected between {} and {}", image.path.string(), described(tag), value, low, high));
 }

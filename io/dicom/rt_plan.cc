@@ -26,8 +26,9 @@ void check_same_isocenter(const RtPlan::Beam& beam, const Eigen::Vector3d& isoce
 
 RtPlan::Beam read_beam(const DicomItem& beam_item, const DcmTagKey& control_points, const DicomItem& plan) {
   RtPlan::Beam beam;
-  beam.number = static_cast<int>(beam_item.required_number(DCM_BeamNumber));
+  beam.number = beam_item.required_integer(DCM_BeamNumber);
   beam.name = beam_item.text(DCM_BeamName).value_or("");
+  beam.delivery_type = beam_item.text(DCM_TreatmentDeliveryType).value_or("");
   beam.machine = beam_item.text(DCM_TreatmentMachineName).value_or("");
   if (const auto points = beam_item.items(control_points); !points.empty()) {
     if (points.front().has_value(DCM_IsocenterPosition))
@@ -89,11 +90,9 @@ RtPlan read_rt_plan(const std::filesystem::path& path) {
           fmt::format("{}: {} {} occurs twice", beam.where(), described(DCM_BeamNumber), plan.beams.back().number));
   }
   for (const DicomItem& reference : dataset.items(DCM_DoseReferenceSequence)) {
-    const auto roi_number = reference.number(DCM_ReferencedROINumber);
-    plan.dose_references.push_back(
-        {.number = static_cast<int>(reference.number(DCM_DoseReferenceNumber).value_or(0.0)),
-         .type = reference.text(DCM_DoseReferenceType).value_or(""),
-         .roi_number = roi_number ? std::optional(static_cast<int>(*roi_number)) : std::nullopt});
+    plan.dose_references.push_back({.number = reference.integer(DCM_DoseReferenceNumber).value_or(0),
+                                    .type = reference.text(DCM_DoseReferenceType).value_or(""),
+                                    .roi_number = reference.integer(DCM_ReferencedROINumber)});
   }
   if (plan.beams.empty())
     throw Error(fmt::format("{}: {} is missing or empty", path.string(),

@@ -17,6 +17,7 @@ struct RtPlan {
   struct Beam {
     int number = 0;
     std::string name;
+    std::string delivery_type;                            // TreatmentDeliveryType: TREATMENT, SETUP
     std::string machine;                                  // TreatmentMachineName; may be empty
     std::optional<Eigen::Vector3d> isocenter_patient_mm;  // IsocenterPosition of the first control point
     std::optional<double> support_angle_deg;              // PatientSupportAngle of the first control point

@@ -4,8 +4,6 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <cmath>
-#include <limits>
 #include <set>
 
 #include "base/error.h"
@@ -44,17 +42,9 @@ Contour read_contour(const DicomItem& item) {
   return contour;
 }
 
-// An IS value is one of 32 bits (PS3.5 6.2).
-int required_integer(const DicomItem& item, const DcmTagKey& tag) {
-  const double number = item.required_number(tag);
-  if (!(std::abs(number) <= std::numeric_limits<int>::max()) || number != std::floor(number))
-    throw Error(fmt::format("{}: {} is {}, expected a whole number", item.where(), described(tag), number));
-  return static_cast<int>(number);
-}
-
 // The structure that an item of another sequence refers to.
 Structure& referred_structure(std::vector<Structure>& structures, const DicomItem& item) {
-  const int number = required_integer(item, DCM_ReferencedROINumber);
+  const int number = item.required_integer(DCM_ReferencedROINumber);
   const auto structure = std::ranges::find(structures, number, &Structure::number);
   if (structure == structures.end())
     throw Error(fmt::format("{}: {} is {}, a number that no item of {} has", item.where(),
@@ -97,10 +87,11 @@ RtStructures read_rt_structures(const std::filesystem::path& path) {
   read.path = path;
   read.identity = read_identity(dataset);
   read.sop_instance_uid = dataset.required_uid(DCM_SOPInstanceUID);
+  read.approval_status = dataset.text(DCM_ApprovalStatus).value_or("");
   read.label = dataset.text(DCM_StructureSetLabel).value_or("");
   for (const DicomItem& roi : dataset.items(DCM_StructureSetROISequence)) {
     Structure structure;
-    structure.number = required_integer(roi, DCM_ROINumber);
+    structure.number = roi.required_integer(DCM_ROINumber);
     structure.name = roi.text(DCM_ROIName).value_or("");
     structure.frame_of_reference_uid = roi.uid(DCM_ReferencedFrameOfReferenceUID);
     if (std::ranges::find(read.structures, structure.number, &Structure::number) != read.structures.end())

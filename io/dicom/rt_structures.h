@@ -31,6 +31,7 @@ struct RtStructures {
   std::filesystem::path path;
   Identity identity;
   std::string sop_instance_uid;
+  std::string approval_status;  // ApprovalStatus; may be empty
   std::string label;
   std::vector<Structure> structures;
 };

@@ -38,6 +38,15 @@ cairo_surface_t* surface_of(Canvas::Kind kind, double width, double height, std:
   return nullptr;
 }
 
+// Pango breaks long words in a time that grows with their square. No text that people write is as long as this.
+std::string shortened(std::string_view utf8) {
+  constexpr std::size_t kMostBytes = 2000;
+  if (utf8.size() <= kMostBytes) return std::string(utf8);
+  std::size_t end = kMostBytes;
+  while (end > 0 && (static_cast<unsigned char>(utf8[end]) & 0xC0) == 0x80) --end;  // not within a character
+  return std::string(utf8.substr(0, end)) + "…";
+}
+
 }  // namespace
 
 struct Canvas::Drawing {
@@ -67,7 +76,8 @@ struct Canvas::Drawing {
                                                                   : "DejaVu Sans, Noto Sans CJK JP"));
     pango_font_description_set_absolute_size(font.get(), style.size * PANGO_SCALE);
     pango_layout_set_font_description(layout.get(), font.get());
-    pango_layout_set_text(layout.get(), utf8.data(), static_cast<int>(utf8.size()));
+    const std::string shown = shortened(utf8);
+    pango_layout_set_text(layout.get(), shown.data(), static_cast<int>(shown.size()));
     if (style.width) {
       pango_layout_set_width(layout.get(), static_cast<int>(*style.width * PANGO_SCALE));
       pango_layout_set_wrap(layout.get(), PANGO_WRAP_WORD_CHAR);

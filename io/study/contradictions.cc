@@ -51,6 +51,15 @@ void compare_machines(const Study& study, std::vector<std::string>& found) {
                                   described(DCM_TreatmentMachineName)));
 }
 
+// A plan that is not approved is told of where it is compared.
+void tell_what_was_rejected(const Study& study, std::vector<std::string>& found) {
+  const auto tell = [&](const std::string& status, const std::string& name) {
+    if (status == "REJECTED") found.push_back(fmt::format("{}: {} is REJECTED", name, described(DCM_ApprovalStatus)));
+  };
+  if (study.structures) tell(study.structures->approval_status, study.structures->path.string());
+  for (const RtImage& image : study.rt_images) tell(image.approval_status, image.path.string());
+}
+
 }  // namespace
 
 std::vector<std::string> contradictions_in(const Study& study) {
@@ -58,6 +67,7 @@ std::vector<std::string> contradictions_in(const Study& study) {
   compare_sex(study, found);
   compare_dates(study, found);
   compare_machines(study, found);
+  tell_what_was_rejected(study, found);
   return found;
 }
 

@@ -177,18 +177,18 @@ std::vector<Finding> session_findings(std::span<const RtImage> images, Notes& no
                         tag == DCM_AcquisitionTime ? why_time_is_unknown(image) : described(tag) + " is missing"));
   };
 
-  compare(
-      DCM_AcquisitionTime, acquisition_seconds,
-      [](const RtImage& image, const RtImage& first) -> std::optional<Finding> {
-        const double apart_s = std::abs(*acquisition_seconds(image) - *acquisition_seconds(first));
-        if (apart_s <= kMaxTimeSpanS) return std::nullopt;
-        return Finding{
-            "time-span",
-            fmt::format("{}: taken {:.0f} minutes from {}, expected at most 10 ({})\n"
-                        "       Of several sessions isoshift batch registers each, and {}, {}, {} or {} chooses one.",
-                        image.path.string(), apart_s / 60.0, first.path.string(), described(DCM_AcquisitionTime),
-                        option("latest"), option("date"), option("fraction"), option("session"))};
-      });
+  compare(DCM_AcquisitionTime, acquisition_seconds,
+          [](const RtImage& image, const RtImage& first) -> std::optional<Finding> {
+            const double apart_s = std::abs(*acquisition_seconds(image) - *acquisition_seconds(first));
+            if (apart_s <= kMaxTimeSpanS) return std::nullopt;
+            return Finding{
+                "time-span",
+                fmt::format(
+                    "{}: taken {:.0f} s from {}, expected at most {:.0f} ({})\n"
+                    "       Of several sessions isoshift batch registers each, and {}, {}, {} or {} chooses one.",
+                    image.path.string(), apart_s, first.path.string(), kMaxTimeSpanS, described(DCM_AcquisitionTime),
+                    option("latest"), option("date"), option("fraction"), option("session"))};
+          });
   for (const TableReadOut& read_out : table_read_outs()) {
     const auto value_of = [&](const RtImage& image) { return image.table.*read_out.value; };
     if (std::ranges::any_of(images, [&](const RtImage& image) { return value_of(image).has_value(); }))

@@ -4,7 +4,6 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <iterator>
 #include <map>
@@ -15,6 +14,7 @@
 #include "base/option_name.h"
 #include "io/dicom/decode.h"
 #include "io/study/contradictions.h"
+#include "io/study/planned_pose.h"
 
 namespace isoshift {
 namespace {
@@ -184,27 +184,6 @@ std::vector<RtPlan::Beam> imaged_beams(const Study& study) {
   return selected_beams(*study.plan, numbers);
 }
 
-void warn_of_planned_displacement(const std::vector<RtPlan::Beam>& beams, Notes& notes) {
-  for (const RtPlan::Beam& beam : beams)
-    if (beam.setup_displacement_mm.norm() > 0.0)
-      notes.warnings.push_back(fmt::format(
-          "beam {} of the plan moves the table by ({:.1f}) mm (vertical, longitudinal, lateral) from marks to "
-          "treatment "
-          "({}): find out whether the X-rays were taken before or after that move",
-          beam.number, fmt::join(beam.setup_displacement_mm, ", "), described(DCM_TableTopVerticalSetupDisplacement)));
-}
-
-void warn_of_planned_couch_angle(const Study& study, const std::vector<RtPlan::Beam>& beams, Notes& notes) {
-  for (const RtPlan::Beam& beam : beams) {
-    if (!beam.support_angle_deg) continue;
-    const double change_rad = wrapped_rad(rad_from_deg(*beam.support_angle_deg) - study.table.support_rad);
-    if (std::abs(change_rad) > rad_from_deg(kMaxTableTurnDeg))
-      notes.warnings.push_back(fmt::format(
-          "beam {} of the plan has couch angle {:.1f} degrees, the images {:.1f} degrees; the images' counts",
-          beam.number, *beam.support_angle_deg, deg_from_rad(study.table.support_rad)));
-  }
-}
-
 bool is_inside(const Eigen::VectorXd& position, const Eigen::VectorXd& size) {
   return (position.array() >= -0.5).all() && (position.array() <= size.array() - 0.5).all();  // false for NaN
 }
@@ -288,14 +267,22 @@ void check_images(const Study& study, const StudyRequest& request, Notes& notes)
                                            image.label, described(DCM_ReportedValuesOrigin)));
 }
 
-// What is in doubt, and not allowed by a person, stands in the study.
-void doubt(const std::vector<Finding>& doubts, const Allowances& allowed, Study& study, Notes& notes) {
-  for (const Finding& doubt : not_allowed(doubts, allowed, notes))
-    study.doubts.push_back(fmt::format("{} ({})", doubt.message, option("allow", fmt::format("{}=REASON", doubt.key))));
+// One UID is of one instance (PS3.3 C.12.1).
+void check_instances(const Study& study) {
+  std::map<std::string, std::string> owners;
+  for (const std::string& uid : study.ct->sop_instance_uids) owners.emplace(uid, "a slice of the CT");
+  const auto check = [&](const std::string& uid, const std::string& name) {
+    if (const auto [owner, is_new] = owners.emplace(uid, name); !is_new && owner->second != name)
+      throw Error(fmt::format("{}: has the {} of {}", name, described(DCM_SOPInstanceUID), owner->second));
+  };
+  if (study.plan) check(study.plan->sop_instance_uid, study.plan->path.string());
+  if (study.structures) check(study.structures->sop_instance_uid, study.structures->path.string());
+  for (const RtImage& image : study.rt_images) check(image.sop_instance_uid, image.path.string());
 }
 
 // Whether the parts of the study belong together.
 void check_together(const StudyRequest& request, const SaidOfSession& said, Study& study, Notes& notes) {
+  check_instances(study);
   std::vector<Finding> findings = patient_findings(study);
   std::ranges::move(plan_findings(study, notes), std::back_inserter(findings));
   std::ranges::move(structure_findings(study, notes), std::back_inserter(findings));
@@ -303,76 +290,8 @@ void check_together(const StudyRequest& request, const SaidOfSession& said, Stud
   settle(findings, request.allowed, notes);
   study.doubts = request.parts.doubts;
   std::ranges::copy(study.ct->doubts, std::back_inserter(study.doubts));
-  doubt(said.doubts, request.allowed, study, notes);
+  std::ranges::move(unsettled(said.doubts, request.allowed, notes), std::back_inserter(study.doubts));
   check_one_patient_position(study);
-}
-
-constexpr double kSameIsocenterMm = 0.5;
-
-// An X-ray in the CT's frame of reference says where the machine's isocenter lay in it (docs/dicom.md, D2).
-void check_isocenter_of_images(const Study& study, const Allowances& allowed, Notes& notes) {
-  std::vector<Finding> findings;
-  for (const RtImage& image : study.rt_images)
-    if (image.isocenter_mm && image.frame_of_reference_uid == study.ct->frame_of_reference_uid &&
-        (*image.isocenter_mm - study.isocenter_patient_mm).norm() > kSameIsocenterMm)
-      findings.push_back(
-          {"plan-mismatch",
-           fmt::format("{}: {} is ({}) mm, the planned one is ({}) mm in the same {}", image.path.string(),
-                       described(DCM_IsocenterPosition), fmt::join(*image.isocenter_mm, ", "),
-                       fmt::join(study.isocenter_patient_mm, ", "), described(DCM_FrameOfReferenceUID))});
-  settle(findings, allowed, notes);
-}
-
-// An isocenter that a person supplies against the plan: with beams of several isocenters it is one of these.
-std::vector<Finding> isocenter_doubts(const Study& study, const std::vector<RtPlan::Beam>& beams) {
-  const RtPlan::Beam* other = nullptr;
-  for (const RtPlan::Beam& beam : beams) {
-    if (!beam.isocenter_patient_mm) continue;
-    if ((*beam.isocenter_patient_mm - study.isocenter_patient_mm).norm() <= kSameIsocenterMm) return {};
-    other = &beam;
-  }
-  if (other == nullptr) return {};
-  return {
-      {"plan-mismatch",
-       fmt::format("{} contradicts the plan: {} of beam {} is ({}) mm",
-                   option("isocenter", fmt::format("{}", fmt::join(study.isocenter_patient_mm, ","))),
-                   described(DCM_IsocenterPosition), other->number, fmt::join(*other->isocenter_patient_mm, ", "))}};
-}
-
-// How the patient was planned to lie: position, table, isocenter. `beams`: those of the plan that were imaged.
-void place_patient(const StudyRequest& request, const std::vector<RtPlan::Beam>& beams, Study& study, Notes& notes) {
-  study.patient_position = patient_position_from(study.rt_images.front().patient_position.value()).value();
-  study.table = table_angles(study.rt_images, notes);
-  if (request.isocenter_patient_mm) {
-    study.isocenter_patient_mm = *request.isocenter_patient_mm;
-    notes.overrides.push_back(fmt::format("{}: ({}) mm by {}", described(DCM_IsocenterPosition),
-                                          fmt::join(study.isocenter_patient_mm, ", "), option("isocenter")));
-    doubt(isocenter_doubts(study, beams), request.allowed, study, notes);
-    check_isocenter_of_images(study, request.allowed, notes);
-  } else if (study.plan) {
-    study.isocenter_patient_mm = common_isocenter(*study.plan, beams);
-    check_isocenter_of_images(study, request.allowed, notes);
-  } else {
-    throw Error(fmt::format(
-        "no RT Plan found ({}), so the planned isocenter is unknown.\n"
-        "       Name the plan ({}) or supply the isocenter: {}",
-        request.parts.study.empty() ? "no study folder was given" : "searched " + request.parts.study.string(),
-        option("plan", "FILE"), option("isocenter", "X,Y,Z")));
-  }
-  if (const auto planned = study.plan ? common_patient_position(*study.plan, beams) : std::nullopt;
-      planned && *planned != to_string(study.patient_position))
-    throw Error(fmt::format(
-        "{}: {} is {}, that of {} is {}",
-        request.switches.patient_position ? option("patient-position") : study.rt_images.front().path.string(),
-        described(DCM_PatientPosition), to_string(study.patient_position), study.plan->path.string(), *planned));
-  if (!study.ct->patient_position.empty() && study.ct->patient_position != to_string(study.patient_position))
-    notes.warnings.push_back(fmt::format("the CT was scanned in {}, the patient is treated in {} ({})",
-                                         study.ct->patient_position, to_string(study.patient_position),
-                                         described(DCM_PatientPosition)));
-  warn_of_planned_couch_angle(study, beams, notes);
-  warn_of_planned_displacement(beams, notes);
-  study.planned_room_from_patient =
-      planned_room_from_patient(study.patient_position, study.table, study.isocenter_patient_mm);
 }
 
 // Where an X-ray says nothing of jaws, those of the planned beam that it names are a hint.

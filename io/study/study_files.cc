@@ -482,7 +482,8 @@ void merge(StudyFiles from, StudyFiles& files) {
 }
 
 StudyFiles scan_study(const std::vector<fs::path>& paths) {
-  const std::vector<fs::path> below = files_below(paths);
+  std::set<fs::path> unsearchable;
+  const std::vector<fs::path> below = files_below(paths, {}, &unsearchable);
   std::vector<StudyFiles> scanned(below.size());
   parallel_for(std::size_t{0}, below.size(), [&](std::size_t n) {
     try {
@@ -492,6 +493,9 @@ StudyFiles scan_study(const std::vector<fs::path>& paths) {
     }
   });
   StudyFiles files;
+  for (const fs::path& path : unsearchable)
+    files.unreadable.push_back(
+        fmt::format("{}: cannot be searched: it may not be opened, or is a link to what is not there", path.string()));
   for (StudyFiles& of_file : scanned) merge(std::move(of_file), files);
   return files;
 }

@@ -272,6 +272,11 @@ def test_an_object_is_of_the_study_of_its_result(study, tmp_path):
     other = isoshift.load_study(SOURCE / "testdata" / "small" / "2", latest=True)
     with pytest.raises(isoshift.Error, match="the result is of another study"):
         isoshift.write_spatial_registration(other, result, tmp_path / "other.dcm")
+    for change in ({"isocenter": [-2.5, 38.0, -410.0]}, {"couch_angle_deg": 5.0}):
+        other = isoshift.load_study(SOURCE / "testdata" / "small" / "1", latest=True, **change)
+        same = isoshift.register(isoshift.load_study(SOURCE / "testdata" / "small" / "1", latest=True))
+        with pytest.raises(isoshift.Error, match="the result is about another planned pose"):
+            isoshift.write_spatial_registration(other, same, tmp_path / "other.dcm")
     assert not (tmp_path / "other.dcm").exists()
 
 

@@ -130,6 +130,15 @@ TEST_F(AuditSetupCommandTest, DescribesWhatIsoshiftFoundWithoutUsedShifts) {
   EXPECT_THAT(outcome.out, HasSubstr("MARGINS"));
 }
 
+TEST_F(AuditSetupCommandTest, ResultsThatAreReadAreNotReplaced) {
+  write_archive(made_archive(1, 0.0, false), results(), table());
+  const fs::path one = fs::directory_iterator(results())->path();
+  const CommandOutcome outcome = run({"-o", one.string(), "--overwrite"});
+  EXPECT_EQ(outcome.exit_status, 1);
+  EXPECT_THAT(outcome.err, HasSubstr("which is read"));
+  EXPECT_TRUE(fs::exists(one / "result.json"));
+}
+
 // Of two results of an X-ray the later counts, whatever the clocks of the programs showed and whatever else they hold.
 TEST_F(AuditSetupCommandTest, OfResultsOfOneXrayTheLatestCounts) {
   MadeArchive archive = made_archive(1, 0.0, false);

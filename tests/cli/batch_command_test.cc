@@ -127,6 +127,14 @@ TEST_F(BatchCommandTest, OneBadCaseStopsNoOther) {
   EXPECT_THAT(outcome.out, HasSubstr("1 failed"));
 }
 
+TEST_F(BatchCommandTest, AByteThatIsNoUtf8StopsNoOtherCase) {
+  edit(exported() / "1" / "RTIMAGE" / "F02" / "KV_G000.dcm", [](DicomItem d) { d.put(DCM_GantryAngle, "9\xfc"); });
+  EXPECT_THAT(batch().out, HasSubstr("1 failed"));
+  const nlohmann::json all = summary()["cases"];
+  EXPECT_EQ(std::ranges::count_if(all, [](const auto& one) { return one["status"] == "failed"; }), 1);
+  EXPECT_GT(all.size(), 1U);
+}
+
 // A program that dies over its first case is started anew for the next.
 TEST_F(BatchCommandTest, AWorkerThatDiesTakesItsCaseWithIt) {
   const fs::path program = folder_ / "dies";
@@ -388,6 +396,7 @@ TEST_F(ManifestTest, MistakesAreNamed) {
   EXPECT_THAT(error_of("case,study\na\n"), HasSubstr("line 2: 1 cells, expected 2"));
   EXPECT_THAT(error_of("case,ct\na,CT\n"), HasSubstr("expected a study, or ct and images"));
   EXPECT_THAT(error_of("case,study\n"), HasSubstr("holds no case"));
+  EXPECT_THAT(error_of("case,study,doubts,doubts\na,s,serious,\n"), HasSubstr("has the column doubts twice"));
   EXPECT_THAT(error_of("case,study\n\"a,s\n"), HasSubstr("line"));
   EXPECT_THAT(error_of("{\"case\": 3}\n"), HasSubstr("line 1: expected a JSON object"));
   EXPECT_THAT(error_of("{\"case\": \"a\", \"case\": \"b\"}\n"), HasSubstr("line 1: says case twice"));

@@ -347,7 +347,7 @@ TEST_F(ErrorMessagesTest, TableMovedBetweenTheViews) {
 TEST_F(ErrorMessagesTest, ViewsTooFarApartInTime) {
   edit(study_.image(1), [](DicomItem d) { d.put(DCM_AcquisitionTime, "104500"); });
   expect_error(fmt::format(
-      "{}: taken 30 minutes from {}, expected at most 10 (AcquisitionTime (0008,0032))\n"
+      "{}: taken 1800 s from {}, expected at most 600 (AcquisitionTime (0008,0032))\n"
       "       Of several sessions isoshift batch registers each, and --latest, --date, --fraction or --session "
       "chooses one.\n"
       "       If that is known to be right, allow it: --allow time-span=REASON",
@@ -415,6 +415,7 @@ TEST_F(ErrorMessagesTest, UsageErrorsHaveTheirOwnStatus) {
   EXPECT_EQ(register_study(study_, {"--allow", "gaps"}).exit_status, 2);
   EXPECT_EQ(register_study(study_, {"--gantry-angle", "KV_G000=north"}).exit_status, 2);
   EXPECT_EQ(register_study(study_, {"--gantry-angle", "NOBODY=0"}).exit_status, 2);
+  EXPECT_EQ(register_study(study_, {"--gantry-angle", "KV_G000=0", "--gantry-angle", "KV_G000=9"}).exit_status, 2);
   EXPECT_EQ(register_study(study_, {"--attenuation", "windowed", "--window", "100,-100"}).exit_status, 2);
   EXPECT_EQ(register_study(study_, {"--gantry-angle", "KV_G000=nan"}).exit_status, 2);
   EXPECT_EQ(register_study(study_, {"--couch-angle", "nan"}).exit_status, 2);

@@ -406,8 +406,40 @@ TEST_F(RegisterCommandTest, AnIsocenterThatIsNotThePlansNeedsAReview) {
   EXPECT_EQ(register_study(study_, {"--isocenter", "-12.5,38,-410.2", "--overwrite"}).exit_status, 0);
 }
 
+TEST_F(RegisterCommandTest, ABeamThatTreatsElsewhereThanItWasImagedNeedsAReview) {
+  edit(study_.plan(), [](DicomItem plan) {
+    DicomItem beam = plan.append_item(DCM_BeamSequence);
+    beam.put(DCM_BeamNumber, 9.0);
+    beam.put(DCM_TreatmentDeliveryType, "TREATMENT");
+    beam.append_item(DCM_ControlPointSequence).put(DCM_IsocenterPosition, "-2.5\\38\\-410");
+  });
+  EXPECT_EQ(register_study(study_).exit_status, 3);
+  EXPECT_THAT(result()["reasons"].dump(),
+              HasSubstr("no beam that treats has it: that of beam 9 is (-2.5, 38, -410) mm"));
+}
+
+TEST_F(RegisterCommandTest, ATruthAboutAnotherSetupIsRefusedBeforeAnythingIsWritten) {
+  std::ofstream(study_.truth(), std::ios::trunc)
+      << R"({"patient_position": "FFS", "setup_error_room": {"translation_mm": [0, 0, 0],
+             "rotation_matrix": [[1, 0, 0], [0, 1, 0], [0, 0, 1]]}})";
+  const CommandOutcome outcome = register_study(study_, {"--truth", study_.truth().string()});
+  EXPECT_EQ(outcome.exit_status, 1);
+  EXPECT_THAT(outcome.err, HasSubstr("its patient position is FFS, and that of the study HFS"));
+  EXPECT_FALSE(std::filesystem::exists(study_.output()));
+}
+
+TEST_F(RegisterCommandTest, AnXrayWithTheUidOfThePlanIsRefused) {
+  std::string uid;
+  edit(study_.plan(), [&](DicomItem plan) { uid = plan.required_uid(DCM_SOPInstanceUID); });
+  edit(study_.image(0), [&](DicomItem d) { d.put(DCM_SOPInstanceUID, uid); });
+  EXPECT_THAT(register_study(study_).err, HasSubstr("KV_G000.dcm: has the SOPInstanceUID (0008,0018) of"));
+}
+
 TEST_F(RegisterCommandTest, ContradictionsThatDecideNothingAreWarnedOf) {
-  edit(study_.image(0), [](DicomItem d) { d.put(DCM_PatientSex, "M"); });
+  edit(study_.image(0), [](DicomItem d) {
+    d.put(DCM_PatientSex, "M");
+    d.put(DCM_ApprovalStatus, "REJECTED");
+  });
   edit(study_.plan(), [](DicomItem plan) {
     plan.put(DCM_PatientSex, "F");
     plan.put(DCM_RTPlanDate, "20270101");
@@ -416,6 +448,7 @@ TEST_F(RegisterCommandTest, ContradictionsThatDecideNothingAreWarnedOf) {
   for (int k = 0; std::filesystem::exists(study_.ct_slice(k)); ++k)
     edit(study_.ct_slice(k), [](DicomItem d) { d.put(DCM_PatientSex, "F"); });
   const std::string err = register_study(study_).err;
+  EXPECT_THAT(err, HasSubstr("KV_G000.dcm: ApprovalStatus (300E,0002) is REJECTED"));
   EXPECT_THAT(err, HasSubstr("KV_G000.dcm: PatientSex (0010,0040) is M, that of the CT is F"));
   EXPECT_THAT(err, HasSubstr("KV_G000: was taken on 20260301, before the plan of 20270101"));
   EXPECT_THAT(err, HasSubstr("the plan's beams are for \"OTHER\" (TreatmentMachineName (300A,00B2))"));

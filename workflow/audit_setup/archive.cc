@@ -116,7 +116,10 @@ void find_first_of_days(std::vector<AuditedSession>& sessions_by_time) {
 CouchAxes AuditedSession::difference() const {
   CouchAxes off;
   for (std::size_t axis = 0; axis < off.size(); ++axis)
-    if (used[axis] && found[axis]) off[axis] = *used[axis] - *found[axis];
+    if (used[axis] && found[axis]) {
+      const double apart = *used[axis] - *found[axis];
+      off[axis] = axis < 3 ? apart : std::remainder(apart, 360.0);
+    }
   return off;
 }
 

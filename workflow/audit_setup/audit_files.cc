@@ -131,8 +131,11 @@ std::string audit_csv(const SetupAudit& audit, const std::filesystem::path& plac
   return csv;
 }
 
-void write_audit(const SetupAudit& audit, const std::filesystem::path& folder, bool overwrite) {
-  OutputFolder output(folder, overwrite);
+void write_audit(const SetupAudit& audit, const std::filesystem::path& used, const std::filesystem::path& folder,
+                 bool overwrite) {
+  std::vector<std::filesystem::path> inputs = {used};
+  for (const AuditedSession& session : audit.sessions) inputs.push_back(session.folder);
+  OutputFolder output(folder, overwrite, inputs);
   // proximate() finds no way to a relative path of which nothing exists.
   const std::filesystem::path place = std::filesystem::absolute(folder);
   write_text(output.path() / "audit.csv", audit_csv(audit, place));

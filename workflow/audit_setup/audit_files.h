@@ -14,7 +14,8 @@ std::string audit_json(const SetupAudit& audit);
 std::string audit_csv(const SetupAudit& audit, const std::filesystem::path& place);
 std::string audit_html(const SetupAudit& audit, const std::filesystem::path& place);
 
-// Writes all three. Throws Error as OutputFolder does.
-void write_audit(const SetupAudit& audit, const std::filesystem::path& folder, bool overwrite);
+// Writes all three. `used`: where the used shifts were read; may be empty. Throws Error as OutputFolder does.
+void write_audit(const SetupAudit& audit, const std::filesystem::path& used, const std::filesystem::path& folder,
+                 bool overwrite);
 
 }  // namespace isoshift

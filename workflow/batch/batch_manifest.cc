@@ -53,6 +53,8 @@ void check_column(const std::string& name, const std::string& where) {
 std::vector<NumberedRow> csv_rows(const std::string& text, const std::string& where) {
   const CsvTable table = csv_table(text, where);
   for (const std::string& name : table.columns) check_column(name, where);
+  if (std::ranges::find(table.columns, "case") == table.columns.end())
+    throw Error(fmt::format("{}: has no column case, which names the cases", where));
   std::vector<NumberedRow> rows;
   for (const CsvTable::Row& cells : table.rows) {
     NumberedRow row{.line = cells.line, .cells = {}};

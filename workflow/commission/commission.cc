@@ -14,6 +14,7 @@
 #include "geometry/rotation.h"
 #include "io/config/site_file.h"
 #include "workflow/commission/commission_files.h"
+#include "workflow/results_below.h"
 
 namespace isoshift {
 namespace {
@@ -131,7 +132,9 @@ Commission commission_of(const CommissionRequest& request) {
 void write_commission(const Commission& commission, const CommissionRequest& request) {
   std::optional<SigningKey> key;
   if (!request.key.empty()) key.emplace(request.key);
-  OutputFolder output(request.output, request.overwrite);
+  std::vector<std::filesystem::path> inputs = {request.known_poses, request.site, request.key};
+  for (const NamedFolder& result : result_folders_below(request.results)) inputs.push_back(result.path);
+  OutputFolder output(request.output, request.overwrite, inputs);
   const std::string pdf = commission_pdf(commission, key.has_value()), csv = commission_csv(commission);
   const std::string json = commission_json(commission, sha256_of(pdf), sha256_of(csv));
   write_text(output.path() / "commission.pdf", pdf);

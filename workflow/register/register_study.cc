@@ -3,10 +3,12 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include "base/json_file.h"
 #include "base/output_folder.h"
 #include "base/stopwatch.h"
 #include "io/report/result_folder.h"
 #include "setup/couch_shift.h"
+#include "workflow/register/same_setup.h"
 #include "workflow/register/setup_result_of.h"
 #include "workflow/register/start_pose.h"
 #include "workflow/register/target_of.h"
@@ -65,7 +67,9 @@ SetupResult register_loaded(const Study& study, const RegisterOptions& options, 
 
 SetupResult register_study(const RegisterOptions& options, SharedWork& shared, Observer& observer) {
   const Stopwatch total;
-  OutputFolder output(options.output, options.overwrite, options.study.parts.paths());
+  std::vector<std::filesystem::path> inputs = options.study.parts.paths();
+  inputs.insert(inputs.end(), {options.start, options.truth, options.site});
+  OutputFolder output(options.output, options.overwrite, inputs);
   const std::optional<SiteFile> site_file = named_site(options.site);
   const std::optional<SiteRules> site = chosen_site(site_file, options.anatomy);
 
@@ -75,6 +79,8 @@ SetupResult register_study(const RegisterOptions& options, SharedWork& shared, O
   if (const auto failure = options.registration.rendering.failed_gpu())
     notes.warnings.push_back(fmt::format("{}; rendered on the CPU instead", *failure));
   const Study study = load(named, notes, observer, shared.cts);
+  if (!options.truth.empty())
+    require_same_setup(read_json_file(options.truth).json, options.truth.string(), planned_lie(study));
   std::optional<Start> start;
   if (!options.start.empty()) start = read_start(options.start, study, options.source_isocenter, notes);
   const double seconds_load = total.seconds();

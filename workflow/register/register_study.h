@@ -23,6 +23,7 @@ struct RegisterOptions {
   std::string anatomy;
   std::filesystem::path start;           // a pose (start_pose.h); empty: the planned one
   std::vector<double> source_isocenter;  // of a Spatial Registration in it; empty: as it or the X-rays tell
+  std::filesystem::path truth;           // must be about the study's setup; empty: nobody knows
   std::string target;  // the structure that the setup must bring right, or "isocenter"; empty: as target_of() finds it
   bool overwrite = false;
   bool write_reg_for_review = false;

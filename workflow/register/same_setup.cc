@@ -44,13 +44,6 @@ PlannedLie planned_lie(const Study& study) {
           .table = study.table};
 }
 
-PlannedLie planned_lie(const SetupResult& result) {
-  return {.patient_id = result.identity.patient_id,
-          .patient_position = result.patient_position,
-          .isocenter_patient_mm = result.isocenter_patient_mm,
-          .table = result.table};
-}
-
 void require_same_setup(const Json& file, const std::string& name, const PlannedLie& expected) {
   try {
     if (file.contains("patient") && file.at("patient").at("id") != expected.patient_id)

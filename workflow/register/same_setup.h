@@ -6,7 +6,6 @@
 
 #include "geometry/patient_setup.h"
 #include "io/study/study.h"
-#include "setup/setup_result.h"
 
 namespace isoshift {
 
@@ -18,7 +17,6 @@ struct PlannedLie {
   TableAngles table;
 };
 PlannedLie planned_lie(const Study& study);
-PlannedLie planned_lie(const SetupResult& result);
 
 // Throws Error naming `name` where a result.json, a truth.json or a pose set by hand says that it is of another
 // patient, patient position, isocenter or table angle. A file need not say any of these.

@@ -5,6 +5,7 @@
 #include <array>
 
 #include "base/error.h"
+#include "base/json_file.h"
 #include "geometry/rotation.h"
 
 namespace isoshift {
@@ -34,7 +35,7 @@ Eigen::Isometry3d setup_error_in(const nlohmann::json& file, const std::string& 
     throw Error(fmt::format("{}: {}", name, error.what()));
   } catch (const nlohmann::json::exception& error) {
     throw Error(fmt::format("{}: holds no complete setup error (a result.json or truth.json is needed): {}", name,
-                            error.what()));
+                            reason_of(error)));
   }
 }
 

@@ -66,6 +66,12 @@ auto known(std::string_view name, const std::string& word, From from) -> decltyp
   return value;
 }
 
+std::string allow_keys() {
+  std::string keys;
+  for (const AllowKey& known : kAllowKeys) keys += (keys.empty() ? "" : ", ") + std::string(known.key);
+  return keys;
+}
+
 }  // namespace
 
 void StudyOptions::check_numbers() const {
@@ -91,8 +97,10 @@ Allowances allowances_from(std::span<const std::string> allow) {
   for (const std::string& text : allow) {
     const auto [key, reason] = key_and_value(text, option("allow"));
     if (std::ranges::find(kAllowKeys, key, &AllowKey::key) == std::end(kAllowKeys))
-      throw UsageError(fmt::format("{}: no check has this key", option("allow", key)));
-    allowed[key] = reason;
+      throw UsageError(fmt::format("{}: no check has this key; the keys are {}", option("allow", key), allow_keys()));
+    if (reason.find_first_not_of(" \t") == std::string::npos)
+      throw UsageError(fmt::format("{}: the reason is empty", option("allow", key + "=" + reason)));
+    if (!allowed.emplace(key, reason).second) throw UsageError(fmt::format("{}: is there twice", option("allow", key)));
   }
   return allowed;
 }
@@ -107,7 +115,9 @@ StudyRequest StudyOptions::request() const {
   if (!isocenter.empty()) request.isocenter_patient_mm = Eigen::Vector3d(isocenter.data());
   for (const std::string& text : gantry_angles) {
     const auto [label, angle] = key_and_value(text, option("gantry-angle"));
-    request.switches.gantry_angle_deg[label] = number_from(angle, option("gantry-angle"));
+    const double angle_deg = number_from(angle, option("gantry-angle"));
+    if (!request.switches.gantry_angle_deg.emplace(label, angle_deg).second)
+      throw UsageError(fmt::format("{}: {} is there twice", option("gantry-angle"), label));
   }
   request.max_span_s = max_span_s;
   request.switches.couch_angle_deg = couch_angle_deg;

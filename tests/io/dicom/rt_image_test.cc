@@ -127,7 +127,7 @@ TEST_F(RtImageTest, AnExposureThatContradictsTheTopLevelIsToldOf) {
     DicomItem exposure = d.items(DCM_ExposureSequence).front();
     d.put(DCM_TableTopPitchAngle, 0.0);
     exposure.put(DCM_TableTopPitchAngle, 2.0);
-    exposure.put(DCM_GantryAngle, 0.005);
+    exposure.put(DCM_GantryAngle, 360.05);
   });
   EXPECT_EQ(image.table.pitch_deg, 2.0);
   EXPECT_THAT(image.contradictions,
@@ -163,6 +163,12 @@ TEST_F(RtImageTest, AReadOutOfMoreThanATurnIsNoAngle) {
 TEST_F(RtImageTest, AnotherModalityIsRefused) {
   EXPECT_THAT(error_of_reading([](DicomItem d) { d.put(DCM_Modality, "DX"); }),
               HasSubstr("Modality (0008,0060) is DX, expected RTIMAGE"));
+}
+
+TEST_F(RtImageTest, NumbersOfBeamsAreWhole) {
+  for (const char* number : {"-1e308", "1.5"})
+    EXPECT_THAT(error_of_reading([&](DicomItem d) { d.put(DCM_ReferencedBeamNumber, number); }),
+                HasSubstr("ReferencedBeamNumber (300C,0006) is "));
 }
 
 TEST_F(RtImageTest, OfTwoValuesNoneIsChosen) {

@@ -426,5 +426,12 @@ TEST(Report, FirstPageHoldsAllThatIsSigned) {
   EXPECT_EQ(disclaimers, pages + 1);  // on every page, on the first one twice
 }
 
+// Breaking one long word took a minute.
+TEST(Canvas, TextsThatNobodyWritesAreShortened) {
+  Canvas canvas(Canvas::Kind::kPng, 200.0, 200.0);
+  const TextStyle style{.width = 150.0};
+  EXPECT_EQ(canvas.text_height(std::string(200'000, 'x'), style), canvas.text_height(std::string(3000, 'x'), style));
+}
+
 }  // namespace
 }  // namespace isoshift::report_test

@@ -238,6 +238,15 @@ TEST_F(StudyFilesTest, FilesThatLostTheirContentsAreSaid) {
   EXPECT_EQ(files.left_aside.size(), 4U);
 }
 
+TEST_F(StudyFilesTest, ALinkToNothingIsSaidAndStopsNothingElse) {
+  const TemporaryFolder folder;
+  std::ofstream(folder / "notes.txt") << "text";
+  fs::create_symlink("nowhere", folder / "link.dcm");
+  const StudyFiles files = scan_study({folder.path()});
+  EXPECT_THAT(files.unreadable, testing::ElementsAre(HasSubstr("link.dcm: cannot be searched")));
+  EXPECT_EQ(files.left_aside.size(), 1U);
+}
+
 TEST_F(StudyFilesTest, FoldersAreFoundThroughLinksOnce) {
   const TemporaryFolder folder, elsewhere;
   fs::create_directory(elsewhere / "retakes");

@@ -29,6 +29,13 @@ std::string explanation(const SetupAudit& audit, std::size_t session) {
   return outlier == nullptr ? "" : outlier->explanation;
 }
 
+TEST(SetupAudit, AWholeTurnIsNoDifference) {
+  AuditedSession session;
+  session.found[3] = -2.03;
+  session.used[3] = 357.97;
+  EXPECT_NEAR(session.difference()[3].value(), 0.0, 1e-9);
+}
+
 // Twenty audits of a year without a mistake call one; so of 200 about ten, and more than 20 once in a thousand times.
 TEST(SetupAudit, RarelyCallsAnythingWhereNothingIsWrong) {
   int with_outliers = 0, with_drift = 0, with_setup_drift = 0;

@@ -1,0 +1,138 @@
+#include "io/study/planned_pose.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+
+#include "base/error.h"
+#include "base/option_name.h"
+#include "geometry/rotation.h"
+
+namespace isoshift {
+namespace {
+
+void warn_of_planned_displacement(const std::vector<RtPlan::Beam>& beams, Notes& notes) {
+  for (const RtPlan::Beam& beam : beams)
+    if (beam.setup_displacement_mm.norm() > 0.0)
+      notes.warnings.push_back(fmt::format(
+          "beam {} of the plan moves the table by ({:.1f}) mm (vertical, longitudinal, lateral) from marks to "
+          "treatment "
+          "({}): find out whether the X-rays were taken before or after that move",
+          beam.number, fmt::join(beam.setup_displacement_mm, ", "), described(DCM_TableTopVerticalSetupDisplacement)));
+}
+
+void warn_of_planned_couch_angle(const Study& study, const std::vector<RtPlan::Beam>& beams, Notes& notes) {
+  for (const RtPlan::Beam& beam : beams) {
+    if (!beam.support_angle_deg) continue;
+    const double change_rad = wrapped_rad(rad_from_deg(*beam.support_angle_deg) - study.table.support_rad);
+    if (std::abs(change_rad) > rad_from_deg(kMaxTableTurnDeg))
+      notes.warnings.push_back(fmt::format(
+          "beam {} of the plan has couch angle {:.1f} degrees, the images {:.1f} degrees; the images' counts",
+          beam.number, *beam.support_angle_deg, deg_from_rad(study.table.support_rad)));
+  }
+}
+
+constexpr double kSameIsocenterMm = 0.5;
+
+// An X-ray in the CT's frame of reference says where the machine's isocenter lay in it (docs/dicom.md, D2).
+void check_isocenter_of_images(const Study& study, const Allowances& allowed, Notes& notes) {
+  std::vector<Finding> findings;
+  for (const RtImage& image : study.rt_images)
+    if (image.isocenter_mm && image.frame_of_reference_uid == study.ct->frame_of_reference_uid &&
+        (*image.isocenter_mm - study.isocenter_patient_mm).norm() > kSameIsocenterMm)
+      findings.push_back(
+          {"plan-mismatch",
+           fmt::format("{}: {} is ({}) mm, the planned one is ({}) mm in the same {}", image.path.string(),
+                       described(DCM_IsocenterPosition), fmt::join(*image.isocenter_mm, ", "),
+                       fmt::join(study.isocenter_patient_mm, ", "), described(DCM_FrameOfReferenceUID))});
+  settle(findings, allowed, notes);
+}
+
+// An isocenter that a person supplies against the plan: with beams of several isocenters it is one of these.
+std::vector<Finding> isocenter_doubts(const Study& study, const std::vector<RtPlan::Beam>& beams) {
+  const RtPlan::Beam* other = nullptr;
+  for (const RtPlan::Beam& beam : beams) {
+    if (!beam.isocenter_patient_mm) continue;
+    if ((*beam.isocenter_patient_mm - study.isocenter_patient_mm).norm() <= kSameIsocenterMm) return {};
+    other = &beam;
+  }
+  if (other == nullptr) return {};
+  return {
+      {"plan-mismatch",
+       fmt::format("{} contradicts the plan: {} of beam {} is ({}) mm",
+                   option("isocenter", fmt::format("{}", fmt::join(study.isocenter_patient_mm, ","))),
+                   described(DCM_IsocenterPosition), other->number, fmt::join(*other->isocenter_patient_mm, ", "))}};
+}
+
+// What is treated against what was imaged: X-rays refer to setup beams.
+std::vector<Finding> treatment_doubts(const Study& study) {
+  std::vector<Finding> doubts;
+  const RtPlan::Beam* elsewhere = nullptr;
+  bool is_treated_here = false;
+  for (const RtPlan::Beam& beam : study.plan->beams) {
+    if (beam.delivery_type == "SETUP") continue;
+    if (beam.patient_position && *beam.patient_position != to_string(study.patient_position))
+      doubts.push_back(
+          {"plan-mismatch", fmt::format("the patient lies in {}, and beam {} of the plan treats in {} ({})",
+                                        to_string(study.patient_position), beam.number, *beam.patient_position,
+                                        described(DCM_PatientPosition))});
+    if (!beam.isocenter_patient_mm) continue;
+    if ((*beam.isocenter_patient_mm - study.isocenter_patient_mm).norm() <= kSameIsocenterMm)
+      is_treated_here = true;
+    else
+      elsewhere = &beam;
+  }
+  if (elsewhere != nullptr && !is_treated_here)
+    doubts.push_back(
+        {"plan-mismatch",
+         fmt::format("the X-rays' beams have their isocenter at ({}) mm, and no beam that treats has it: that of "
+                     "beam {} is ({}) mm ({})",
+                     fmt::join(study.isocenter_patient_mm, ", "), elsewhere->number,
+                     fmt::join(*elsewhere->isocenter_patient_mm, ", "), described(DCM_IsocenterPosition))});
+  return doubts;
+}
+
+}  // namespace
+
+void place_patient(const StudyRequest& request, const std::vector<RtPlan::Beam>& beams, Study& study, Notes& notes) {
+  study.patient_position = patient_position_from(study.rt_images.front().patient_position.value()).value();
+  study.table = table_angles(study.rt_images, notes);
+  if (request.isocenter_patient_mm) {
+    study.isocenter_patient_mm = *request.isocenter_patient_mm;
+    notes.overrides.push_back(fmt::format("{}: ({}) mm by {}", described(DCM_IsocenterPosition),
+                                          fmt::join(study.isocenter_patient_mm, ", "), option("isocenter")));
+    std::ranges::move(unsettled(isocenter_doubts(study, beams), request.allowed, notes),
+                      std::back_inserter(study.doubts));
+    check_isocenter_of_images(study, request.allowed, notes);
+  } else if (study.plan) {
+    study.isocenter_patient_mm = common_isocenter(*study.plan, beams);
+    check_isocenter_of_images(study, request.allowed, notes);
+  } else {
+    throw Error(fmt::format(
+        "no RT Plan found ({}), so the planned isocenter is unknown.\n"
+        "       Name the plan ({}) or supply the isocenter: {}",
+        request.parts.study.empty() ? "no study folder was given" : "searched " + request.parts.study.string(),
+        option("plan", "FILE"), option("isocenter", "X,Y,Z")));
+  }
+  if (const auto planned = study.plan ? common_patient_position(*study.plan, beams) : std::nullopt;
+      planned && *planned != to_string(study.patient_position))
+    throw Error(fmt::format(
+        "{}: {} is {}, that of {} is {}",
+        request.switches.patient_position ? option("patient-position") : study.rt_images.front().path.string(),
+        described(DCM_PatientPosition), to_string(study.patient_position), study.plan->path.string(), *planned));
+  if (!study.ct->patient_position.empty() && study.ct->patient_position != to_string(study.patient_position))
+    notes.warnings.push_back(fmt::format("the CT was scanned in {}, the patient is treated in {} ({})",
+                                         study.ct->patient_position, to_string(study.patient_position),
+                                         described(DCM_PatientPosition)));
+  if (study.plan && !request.isocenter_patient_mm)
+    std::ranges::move(unsettled(treatment_doubts(study), request.allowed, notes), std::back_inserter(study.doubts));
+  warn_of_planned_couch_angle(study, beams, notes);
+  warn_of_planned_displacement(beams, notes);
+  study.planned_room_from_patient =
+      planned_room_from_patient(study.patient_position, study.table, study.isocenter_patient_mm);
+}
+
+}  // namespace isoshift
