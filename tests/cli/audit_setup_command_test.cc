@@ -133,6 +133,9 @@ TEST_F(AuditSetupCommandTest, DescribesWhatIsoshiftFoundWithoutUsedShifts) {
 TEST_F(AuditSetupCommandTest, ResultsThatAreReadAreNotReplaced) {
   write_archive(made_archive(1, 0.0, false), results(), table());
   const fs::path one = fs::directory_iterator(results())->path();
+  std::ofstream listing(one / ".isoshift");  // as register leaves it
+  for (const auto& file : fs::directory_iterator(one)) listing << file.path().filename().string() << "\n";
+  listing.close();
   const CommandOutcome outcome = run({"-o", one.string(), "--overwrite"});
   EXPECT_EQ(outcome.exit_status, 1);
   EXPECT_THAT(outcome.err, HasSubstr("which is read"));

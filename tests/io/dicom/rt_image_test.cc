@@ -127,7 +127,7 @@ TEST_F(RtImageTest, AnExposureThatContradictsTheTopLevelIsToldOf) {
     DicomItem exposure = d.items(DCM_ExposureSequence).front();
     d.put(DCM_TableTopPitchAngle, 0.0);
     exposure.put(DCM_TableTopPitchAngle, 2.0);
-    exposure.put(DCM_GantryAngle, 360.05);
+    exposure.put(DCM_GantryAngle, 359.95);
   });
   EXPECT_EQ(image.table.pitch_deg, 2.0);
   EXPECT_THAT(image.contradictions,

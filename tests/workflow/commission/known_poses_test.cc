@@ -49,7 +49,7 @@ TEST_F(KnownPosesTest, AnglesMayBeLeftOut) {
 TEST_F(KnownPosesTest, MistakesAreNamed) {
   EXPECT_THAT(refusal("session,x_mm,y_mm\na,1,2\n"), HasSubstr("has no column z_mm"));
   EXPECT_THAT(refusal("session,x_mm,y_mm,z_mm,x_cm\na,1,2,3,4\n"), HasSubstr("column \"x_cm\""));
-  EXPECT_THAT(refusal("session,x_mm,y_mm,z_mm,x_mm\na,1,2,3,4\n"), HasSubstr("column \"x_mm\", expected each once"));
+  EXPECT_THAT(refusal("session,x_mm,y_mm,z_mm,x_mm\na,1,2,3,4\n"), HasSubstr("has the column x_mm twice"));
   EXPECT_THAT(refusal("session,x_mm,y_mm,z_mm\na,1,2\n"), HasSubstr("line 2: 3 cells, expected 4"));
   EXPECT_THAT(refusal("session,x_mm,y_mm,z_mm\na,1,2,\n"), HasSubstr("line 2, column z_mm: \"\""));
   EXPECT_THAT(refusal("session,x_mm,y_mm,z_mm\na,1,2,nan\n"), HasSubstr("column z_mm: \"nan\""));
