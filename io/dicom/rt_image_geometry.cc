@@ -112,7 +112,7 @@ XrayView xray_view(const RtImage& image, Beam beam, Notes& notes) {
                     described(DCM_PhotometricInterpretation)));
   if (!image.pixel_from_room) {
     const CarmGeometry geometry = carm_geometry(image, notes);
-    const XrayView view = make_xray_view(geometry, beam);
+    XrayView view = make_xray_view(geometry, beam);
     if (!image.imager || !image.imager->is_corrected) return view;
     return with_errors(view, geometry.gantry_angle_rad, image.sid_mm.value(), image.imager->values);
   }

@@ -99,7 +99,7 @@ Allowances allowances_from(std::span<const std::string> allow) {
     if (std::ranges::find(kAllowKeys, key, &AllowKey::key) == std::end(kAllowKeys))
       throw UsageError(fmt::format("{}: no check has this key; the keys are {}", option("allow", key), allow_keys()));
     if (reason.find_first_not_of(" \t") == std::string::npos)
-      throw UsageError(fmt::format("{}: the reason is empty", option("allow", key + "=" + reason)));
+      throw UsageError(fmt::format("{}: the reason is empty", option("allow", fmt::format("{}={}", key, reason))));
     if (!allowed.emplace(key, reason).second) throw UsageError(fmt::format("{}: is there twice", option("allow", key)));
   }
   return allowed;
