@@ -21,6 +21,13 @@ struct JsonFile {
 // What the library says of a text that it cannot read, without its own name for that: "parse error at line 1, ...".
 std::string reason_of(const nlohmann::json::exception& error);
 
+// The text of a JSON file: indented, with a newline at the end. Names of files, and what files say, may hold bytes that
+// are no UTF-8: they are replaced, never a reason to lose a result.
+template <class Json>
+std::string json_text(const Json& json) {
+  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
 // Throws Error naming `where` for a text that is not JSON, or in which an object has a key twice.
 nlohmann::json json_from(const std::string& text, const std::string& where);
 

@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "base/certificate_authority.h"
+#include "base/json_file.h"
 #include "base/output_folder.h"
 #include "base/random_word.h"
 #include "base/signing_key.h"
@@ -73,7 +74,7 @@ class Files {
     write_text(folder_ / name, text);
     fs::permissions(folder_ / name, fs::perms::owner_read | fs::perms::owner_write);
   }
-  void write(const std::string& name, const Json& json) const { write(name, json.dump(2) + "\n"); }
+  void write(const std::string& name, const Json& json) const { write(name, json_text(json)); }
 
  private:
   const fs::path& folder_;

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <memory>
 
+#include "base/json_file.h"
 #include "base/output_folder.h"
 #include "cli/commands/bench_scene.h"
 #include "cli/commands/bench_table1.h"
@@ -35,7 +36,7 @@ void run_bench_drr(const BenchDrrOptions& options, Console& console) {
           if (!options.json) console.out << table1_text(cell) << std::flush;
         });
   }
-  if (options.json) console.out << result.dump(2) << "\n";
+  if (options.json) console.out << json_text(result);
 }
 
 struct BenchFiguresOptions {

@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "base/error.h"
+#include "base/json_file.h"
 #include "base/output_folder.h"
 #include "cli/commands/commands.h"
 #include "cli/switches/study_switches.h"
@@ -228,7 +229,7 @@ int run_check(const CheckOptions& options, Console& console) {
     json["difference"] = describe(comparison, all[0].source_frame_uid == all[1].source_frame_uid, text);
     has_errors = has_errors || !comparison.difference || comparison.difference->other_is_inverted;
   }
-  console.out << (options.as_json ? json.dump(2) + "\n" : text);
+  console.out << (options.as_json ? json_text(json) : text);
   if (!options.transform.empty()) write_transform(all.front(), options.transform);
   return has_errors ? kExitFailed : kExitAccepted;
 }

@@ -9,6 +9,7 @@
 #include <optional>
 
 #include "base/error.h"
+#include "base/json_file.h"
 #include "cli/commands/commands.h"
 #include "cli/switches/study_switches.h"
 #include "geometry/motion_axes.h"
@@ -165,7 +166,7 @@ std::string json_of(const PatientGeometry& geometry) {
                {"imagers", json_of(geometry.imagers, geometry.found.imagers)}};
   for (std::size_t imager = 0; imager < geometry.imagers.size(); ++imager)
     json["cts_by_imager"][geometry.imagers[imager]] = geometry.found.cts[imager];
-  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+  return json_text(json);
 }
 
 std::string json_of(const BallGeometry& geometry) {
@@ -182,7 +183,7 @@ std::string json_of(const BallGeometry& geometry) {
   for (std::size_t n = 0; n < geometry.sessions.size(); ++n)
     json["sessions"][geometry.sessions[n]] = {{"setup_error", json_of(pose_of(adjustment, n))},
                                               {"moved", json_of(move_of(adjustment, n))}};
-  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+  return json_text(json);
 }
 
 void run_geometry(GeometryFlags& flags, Console& console) {

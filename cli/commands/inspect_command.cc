@@ -6,6 +6,7 @@
 #include <memory>
 
 #include "base/error.h"
+#include "base/json_file.h"
 #include "base/output_folder.h"
 #include "cli/commands/commands.h"
 #include "cli/commands/description.h"
@@ -272,7 +273,7 @@ class Inspection {
                          {"sessions", json_of(sessions)},
                          {"left_aside", files.left_aside},
                          {"unreadable", files.unreadable}};
-      console_.out << json.dump(2, ' ', false, Json::error_handler_t::replace) << "\n";
+      console_.out << json_text(json);
       return;
     }
     std::string text;

@@ -10,6 +10,7 @@
 #include <optional>
 
 #include "base/error.h"
+#include "base/json_file.h"
 #include "base/output_folder.h"
 #include "base/parallel.h"
 #include "cli/commands/commands.h"
@@ -164,7 +165,7 @@ void run_predict(const PredictOptions& options, Console& console) {
   std::optional<OutputFolder> output;
   if (!options.output.empty()) output.emplace(options.output, options.overwrite, options.traces);
   const Scores scores = scores_of(options, console);
-  const std::string json = json_of(scores).dump(2) + "\n";
+  const std::string json = json_text(json_of(scores));
   if (output) {
     write_text(output->path() / "prediction.json", json);
     write_text(output->path() / "prediction.svg", chart_of(scores));

@@ -42,14 +42,13 @@ Eigen::Vector3d planned_target_patient_mm(const SetupResult& report) {
 
 }  // namespace
 
-int run_register(RegisterOptions options, const std::filesystem::path& truth_file, bool as_json, Console& console) {
+int run_register(RegisterOptions options, bool as_json, Console& console) {
   options.registration.settle();
   std::optional<Eigen::Isometry3d> truth;
   std::vector<BodyTruth> body_truths;
-  if (!truth_file.empty()) {
-    truth = read_setup_error(truth_file);
-    body_truths = read_body_truths(truth_file);
-    options.truth = truth_file;
+  if (!options.truth.empty()) {
+    truth = read_setup_error(options.truth);
+    body_truths = read_body_truths(options.truth);
   }
   const bool names_target = !options.target.empty();
   SharedWork none;
@@ -131,11 +130,10 @@ void add_register_command(CLI::App& app, Console& console, int& exit_status) {
       "Writes the report (report.pdf, .html, .txt, .csv, and .dcm: Encapsulated PDF), result.json, pictures per view\n"
       "and, for an accepted result, spatial_registration.dcm.\n"
       "Exit status: 0 accepted, 1 failed, 2 usage, 3 review, 4 rejected.");
-  auto truth = std::make_shared<std::filesystem::path>();
   auto as_json = std::make_shared<bool>(false);
   add_study_options(*command, options->study);
   command->add_option("-o,--output", options->output, "Folder for the results")->required()->type_name("FOLDER");
-  command->add_option("--truth", *truth, "truth.json of a phantom study, to print beside the result")
+  command->add_option("--truth", options->truth, "truth.json of a phantom study, to print beside the result")
       ->type_name("FILE");
   add_start_option(*command, *options);
   command->add_flag_callback(
@@ -145,9 +143,8 @@ void add_register_command(CLI::App& app, Console& console, int& exit_status) {
   command->add_flag("--overwrite", options->overwrite, "Replace an earlier output in that folder");
   command->add_flag("--json", *as_json, "Print result.json instead of the report");
   add_registration_switches(*command, options->registration);
-  command->callback([options, truth, as_json, &console, &exit_status] {
-    exit_status = run_register(*options, *truth, *as_json, console);
-  });
+  command->callback(
+      [options, as_json, &console, &exit_status] { exit_status = run_register(*options, *as_json, console); });
 }
 
 }  // namespace isoshift

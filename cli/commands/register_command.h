@@ -20,7 +20,7 @@ RegisterOptions register_options_from(const std::vector<std::string>& flags);
 
 // Registers, prints the report or result.json, and beside it the truth of a phantom study where a file is named.
 // Returns the exit status.
-int run_register(RegisterOptions options, const std::filesystem::path& truth_file, bool as_json, Console& console);
+int run_register(RegisterOptions options, bool as_json, Console& console);
 
 // The exit status of a verdict.
 int exit_status_of(Verdict verdict);

@@ -61,7 +61,7 @@ int run_report_of_object(const ReportOptions& options, Console& console) {
   request.anatomy = options.anatomy;
   request.output = options.output;
   request.overwrite = options.overwrite;
-  return run_register(request, {}, false, console);
+  return run_register(request, false, console);
 }
 
 }  // namespace

@@ -33,7 +33,7 @@ Table1Folder::Table1Folder(std::filesystem::path path, const nlohmann::ordered_j
     throw Error(
         fmt::format("{}: exists and holds no rows of Table 1.\n       Choose another folder with -o", path_.string()));
   std::filesystem::create_directories(path_);
-  replace_text(path_ / kProtocolFile, protocol.dump(2) + "\n");
+  replace_text(path_ / kProtocolFile, json_text(protocol));
 }
 
 // "spine phantom", -380, "ours: cpu" -> spine-phantom-380-hu-ours-cpu.json
@@ -69,7 +69,7 @@ std::optional<nlohmann::ordered_json> Table1Folder::find(const nlohmann::ordered
 void Table1Folder::keep(const nlohmann::ordered_json& cell, const nlohmann::ordered_json& row) const {
   if (path_.empty()) return;
   replace_text(file_of(cell, row.at("method").get<std::string>()),
-               nlohmann::ordered_json{{"cell", cell}, {"row", row}}.dump(2) + "\n");
+               json_text(nlohmann::ordered_json{{"cell", cell}, {"row", row}}));
 }
 
 }  // namespace isoshift

@@ -5,6 +5,7 @@
 #include <memory>
 
 #include "base/error.h"
+#include "base/json_file.h"
 #include "cli/commands/commands.h"
 #include "cli/switches/region_switches.h"
 #include "cli/switches/rendering_switches.h"
@@ -36,7 +37,7 @@ void run_track(TrackFlags& flags, Console& console) {
   ConsoleObserver observer(console);
   const auto json = track_json(track_study(options, observer));
   if (flags.json)
-    console.out << json.dump(2) << "\n";
+    console.out << json_text(json);
   else
     console.out << track_text(json) << fmt::format("\nWritten to {}\n", options.output.string());
 }

@@ -86,8 +86,8 @@ MachineProfile::Rule rule_from(JsonSection section) {
   rule.switches.sad_mm = section.number("sad_mm", 1, 5000);
   rule.switches.sid_mm = section.number("sid_mm", 1, 5000);
   rule.switches.couch_angle_deg = section.number("couch_angle_deg", -360, 360);
-  rule.switches.couch_pitch_deg = section.number("couch_pitch_deg", -45, 45);
-  rule.switches.couch_roll_deg = section.number("couch_roll_deg", -45, 45);
+  rule.switches.couch_pitch_deg = section.number("couch_pitch_deg", -kMaxTableTiltDeg, kMaxTableTiltDeg);
+  rule.switches.couch_roll_deg = section.number("couch_roll_deg", -kMaxTableTiltDeg, kMaxTableTiltDeg);
   if (const auto word = section.find<std::string>("intensity", "LIN+, LIN-, LOG+ or LOG-")) {
     rule.switches.intensity = pixel_intensity_from(*word);
     if (!rule.switches.intensity) section.refuse("intensity", "LIN+, LIN-, LOG+ or LOG-");

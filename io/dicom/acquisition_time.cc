@@ -27,15 +27,12 @@ int number_in(const std::string& digits, std::size_t begin, std::size_t count) {
   return value;
 }
 
-// "20260301".
-std::optional<std::string> date_digits(const RtImage& image) {
-  if (!image.acquisition_date) return std::nullopt;
-  auto digits = digits_of(*image.acquisition_date, '.', 4);
-  return digits && digits->size() == 8 ? digits : std::nullopt;
+std::optional<std::string> acquisition_digits(const RtImage& image) {
+  return image.acquisition_date ? date_digits(*image.acquisition_date) : std::nullopt;
 }
 
 std::optional<std::chrono::sys_days> day_of(const RtImage& image) {
-  const auto date = date_digits(image);
+  const auto date = acquisition_digits(image);
   if (!date) return std::nullopt;
   const std::chrono::year_month_day day(std::chrono::year(number_in(*date, 0, 4)),
                                         std::chrono::month(static_cast<unsigned>(number_in(*date, 4, 2))),
@@ -64,6 +61,11 @@ std::optional<int> utc_offset_min(const std::string& text) {
 }
 
 }  // namespace
+
+std::optional<std::string> date_digits(std::string_view written) {
+  auto digits = digits_of(written, '.', 4);
+  return digits && digits->size() == 8 ? digits : std::nullopt;
+}
 
 void read_acquisition_time(const DicomItem& dataset, RtImage& image) {
   std::string offset = dataset.text(DCM_TimezoneOffsetFromUTC).value_or("");
@@ -111,7 +113,7 @@ std::string why_time_is_unknown(const RtImage& image) {
 }
 
 std::string acquired(const RtImage& image) {
-  const auto date = date_digits(image), time = time_digits(image);
+  const auto date = acquisition_digits(image), time = time_digits(image);
   if (!date || !time) return "";
   return fmt::format("{}-{}-{} {}:{}:{}", date->substr(0, 4), date->substr(4, 2), date->substr(6, 2),
                      time->substr(0, 2), time->substr(2, 2), time->substr(4, 2));

@@ -12,6 +12,7 @@ class PixelPadding {
  public:
   explicit PixelPadding(const DicomItem& dataset);
 
+  bool is_given() const { return range_.has_value(); }
   bool holds(std::int32_t stored) const { return range_ && stored >= range_->least && stored <= range_->most; }
 
  private:

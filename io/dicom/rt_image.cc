@@ -70,8 +70,7 @@ class FrameAttributes {
     return agreed ? agreed : dataset_.number(tag);
   }
 
-  // A length or, with a turn, an angle that frames may differ in.
-
+  // A length or, with a turn, an angle.
   std::optional<double> read_out(const DcmTagKey& tag, double turn = std::numeric_limits<double>::infinity()) {
     const std::optional<double> value = number(tag), of_all = dataset_.number(tag);
     if (tell_frames_apart_ || !of_all) return value;
@@ -140,10 +139,10 @@ JawOpenings jaws_of(const std::vector<DicomItem>& exposures) {
 }
 
 RtImage read_frame(const std::filesystem::path& path, const DicomItem& d, const PixelFormat& format, int frame,
-                   const Exposures& exposures) {
+                   std::vector<DicomItem> exposures, bool tell_frames_apart) {
   RtImage image;
-  image.jaws = jaws_of(exposures.of(frame));
-  FrameAttributes attributes(d, exposures.of(frame), exposures.tell_frames_apart());
+  image.jaws = jaws_of(exposures);
+  FrameAttributes attributes(d, std::move(exposures), tell_frames_apart);
   image.path = path;
   image.identity = read_identity(d);
   image.sop_class_uid = d.required_uid(DCM_SOPClassUID);
@@ -216,6 +215,7 @@ double collimator_angle_on_image_rad(const RtImage& image) {
 
 // Pixels that the file says are none get the darkest value of the others.
 void put_padding(const PixelPadding& padding, const std::vector<std::int32_t>& stored_values, XrayImage& xray) {
+  if (!padding.is_given()) return;
   std::vector<float>& values = xray.values.pixels;
   Image<std::uint8_t> mask(xray.values.columns, xray.values.rows);
   std::ranges::transform(stored_values, mask.pixels.begin(),
@@ -260,11 +260,12 @@ std::vector<RtImage> read_rt_images(const DicomFile& file, Notes& notes) {
   const Exposures exposures(dataset, format.frames);
   std::vector<RtImage> images;
   for (int frame = 0; frame < format.frames; ++frame) {
-    if (exposures.name_frames() && exposures.of(frame).empty())
+    std::vector<DicomItem> of_frame = exposures.of(frame);
+    if (exposures.name_frames() && of_frame.empty())
       notes.warnings.push_back(fmt::format("{}: frame {} was left aside: no item of {} tells its geometry",
                                            path.string(), frame + 1, described(DCM_ExposureSequence)));
     else
-      images.push_back(read_frame(path, dataset, format, frame, exposures));
+      images.push_back(read_frame(path, dataset, format, frame, std::move(of_frame), exposures.tell_frames_apart()));
   }
   for (RtImage& image : images) {
     image.sha256 = file.sha256();

@@ -99,6 +99,9 @@ inline std::vector<RtImage> read_rt_images(const std::filesystem::path& path, No
   return read_rt_images(DicomFile::read(path, DicomFile::Extent::kHeader), notes);
 }
 
+// A date as DICOM writes it, "20260301"; ACR-NEMA wrote dots (PS3.5 6.2). Nothing for what is no date.
+std::optional<std::string> date_digits(std::string_view written);
+
 // Date and time of acquisition, else of the content.
 void read_acquisition_time(const DicomItem& dataset, RtImage& image);
 

@@ -14,6 +14,7 @@ namespace isoshift {
 
 constexpr double kMaxTableMoveMm = 0.5;
 constexpr double kMaxTableTurnDeg = 0.1;
+constexpr double kMaxTableTiltDeg = 45.0;  // of any table top, by pitch or roll
 
 // IEC 61217 read-outs; an optional without value is absent or empty in the file.
 struct TableReadOuts {

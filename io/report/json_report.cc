@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "base/error.h"
+#include "base/json_file.h"
 #include "geometry/rotation.h"
 #include "io/report/formats.h"
 #include "io/report/polygons_json.h"
@@ -390,7 +391,7 @@ std::string json_report(const SetupResult& report) {
   json["warnings"] = report.warnings;
   json["left_aside"] = report.left_aside;
   // Text from files may hold bytes that are no UTF-8; they are replaced, never a reason to lose a result.
-  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+  return json_text(json);
 }
 
 }  // namespace isoshift

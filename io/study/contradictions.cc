@@ -20,17 +20,11 @@ void compare_sex(const Study& study, std::vector<std::string>& found) {
   for (const RtImage& image : study.rt_images) compare(image.identity, image.path.string());
 }
 
-// "20260301"; empty for what is no date.
-std::string date_digits(std::string date) {
-  std::erase(date, '.');
-  return date.size() == 8 ? date : "";
-}
-
 void compare_dates(const Study& study, std::vector<std::string>& found) {
   const auto compare = [&](const std::string& date, const char* what, const RtImage& image) {
-    const std::string before = date_digits(image.acquisition_date.value_or("")), after = date_digits(date);
-    if (!before.empty() && before < after)
-      found.push_back(fmt::format("{}: was taken on {}, before the {} of {}", image.label, before, what, after));
+    const auto before = date_digits(image.acquisition_date.value_or("")), after = date_digits(date);
+    if (before && after && *before < *after)
+      found.push_back(fmt::format("{}: was taken on {}, before the {} of {}", image.label, *before, what, *after));
   };
   for (const RtImage& image : study.rt_images) {
     compare(study.ct->acquired_on, "CT", image);

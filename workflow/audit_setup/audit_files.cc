@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "base/csv.h"
+#include "base/json_file.h"
 #include "base/output_folder.h"
 #include "base/version.h"
 #include "workflow/audit_setup/audit_words.h"
@@ -110,7 +111,7 @@ std::string audit_json(const SetupAudit& audit) {
     json["setup_error_drift"][kErrorComponents[n]] = json_of(audit.setup_drift[n]);
   }
   for (std::size_t n = 0; n < audit.sessions.size(); ++n) json["sessions"].push_back(session_json(audit, n));
-  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+  return json_text(json);
 }
 
 std::string audit_csv(const SetupAudit& audit, const std::filesystem::path& place) {

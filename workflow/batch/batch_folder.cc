@@ -48,9 +48,7 @@ BatchFolder::BatchFolder(fs::path path, const std::vector<std::string>& options)
   std::error_code error;
   fs::create_directories(path_ / "cases", error);
   if (error) throw Error(fmt::format("{}: cannot be made: {}", path_.string(), error.message()));
-  replace_text(file, nlohmann::ordered_json{{"schema", 1}, {"options", options}}.dump(
-                         2, ' ', false, nlohmann::json::error_handler_t::replace) +
-                         "\n");
+  replace_text(file, json_text(nlohmann::ordered_json{{"schema", 1}, {"options", options}}));
 }
 
 ShardLock BatchFolder::work_on(const Shard& shard, const std::vector<BatchCase>& cases) const {
@@ -105,9 +103,7 @@ std::vector<std::string> BatchFolder::set_aside_regrouped(const std::vector<Batc
 void BatchFolder::fail(const std::string& name, const std::string& message) const {
   if (has_ended(name)) return;
   OutputFolder output(folder_of(name), false);
-  write_text(output.path() / kErrorFile, nlohmann::ordered_json{{"schema", 1}, {"error", message}}.dump(
-                                             2, ' ', false, nlohmann::json::error_handler_t::replace) +
-                                             "\n");
+  write_text(output.path() / kErrorFile, json_text(nlohmann::ordered_json{{"schema", 1}, {"error", message}}));
   output.commit();
 }
 

@@ -222,7 +222,7 @@ std::string summary_json(const BatchSummary& summary) {
                           {"mean", summary.population->mean},
                           {"systematic", summary.population->systematic},
                           {"random", summary.population->random}};
-  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+  return json_text(json);
 }
 
 std::string summary_text(const BatchSummary& summary) {

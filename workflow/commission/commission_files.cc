@@ -8,6 +8,7 @@
 #include <set>
 
 #include "base/csv.h"
+#include "base/json_file.h"
 #include "base/version.h"
 #include "geometry/motion_axes.h"
 #include "io/report/canvas.h"
@@ -246,7 +247,7 @@ std::string commission_json(const Commission& commission, const std::string& pdf
   for (const Commission::LeftOut& left : commission.left_out)
     json["left_out"].push_back({{"name", left.session}, {"why", left.why}});
   if (!pdf_sha256.empty()) json["files_sha256"] = {{"commission.pdf", pdf_sha256}, {"commission.csv", csv_sha256}};
-  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+  return json_text(json);
 }
 
 }  // namespace isoshift

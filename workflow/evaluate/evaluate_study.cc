@@ -233,7 +233,7 @@ EvaluationFolder evaluate_loaded(const Study& study, EvaluateOptions options, Ob
   const RendererKind kind = options.registration.rendering.kind();
   check_jobs(options.jobs, kind);
   if (!options.truth_file.empty())
-    require_same_setup(read_json_file(options.truth_file).json, options.truth_file.string(), planned_lie(study));
+    require_same_setup(read_json_file(options.truth_file).json, options.truth_file.string(), study);
   const int cores = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
   const int jobs = uses_gl(kind) ? 1 : options.jobs > 0 ? options.jobs : cores;
   const TargetChoice choice = target_of(study, {.by_person = options.target});

@@ -9,6 +9,7 @@
 #include <sstream>
 
 #include "base/error.h"
+#include "base/json_file.h"
 #include "base/output_folder.h"
 #include "io/report/bar_chart.h"
 
@@ -242,7 +243,7 @@ EvaluationFolder::EvaluationFolder(std::filesystem::path path, Json configuratio
     throw Error(
         fmt::format("{}: exists and holds no evaluation.\n       Choose another folder with -o", path_.string()));
   std::filesystem::create_directories(path_);
-  replace_text(path_ / kConfigurationFile, configuration_.dump(2) + "\n");
+  replace_text(path_ / kConfigurationFile, json_text(configuration_));
   write_bodies();
   write_runs();
 }
@@ -317,7 +318,7 @@ void EvaluationFolder::append(const EvaluatedRun& run) {
 
 void EvaluationFolder::write_summary() const {
   const EvaluationSummary summary = summarized(runs_, judged_by_mrpd());
-  replace_text(path_ / "summary.json", json_of(summary).dump(2) + "\n");
+  replace_text(path_ / "summary.json", json_text(json_of(summary)));
   replace_text(path_ / "success.svg", bar_chart_svg(success_chart(runs_, judged_by_mrpd(), summary)));
   replace_text(path_ / "errors.svg", bar_chart_svg(error_histogram(runs_, judged_by_mrpd(), summary)));
 }

@@ -79,8 +79,7 @@ SetupResult register_study(const RegisterOptions& options, SharedWork& shared, O
   if (const auto failure = options.registration.rendering.failed_gpu())
     notes.warnings.push_back(fmt::format("{}; rendered on the CPU instead", *failure));
   const Study study = load(named, notes, observer, shared.cts);
-  if (!options.truth.empty())
-    require_same_setup(read_json_file(options.truth).json, options.truth.string(), planned_lie(study));
+  if (!options.truth.empty()) require_same_setup(read_json_file(options.truth).json, options.truth.string(), study);
   std::optional<Start> start;
   if (!options.start.empty()) start = read_start(options.start, study, options.source_isocenter, notes);
   const double seconds_load = total.seconds();

@@ -37,27 +37,21 @@ void require_same_table(const Json& file, const std::string& name, const TableAn
 
 }  // namespace
 
-PlannedLie planned_lie(const Study& study) {
-  return {.patient_id = study.ct->identity.patient_id,
-          .patient_position = std::string(to_string(study.patient_position)),
-          .isocenter_patient_mm = study.isocenter_patient_mm,
-          .table = study.table};
-}
-
-void require_same_setup(const Json& file, const std::string& name, const PlannedLie& expected) {
+void require_same_setup(const Json& file, const std::string& name, const Study& study) {
+  const std::string position(to_string(study.patient_position));
   try {
-    if (file.contains("patient") && file.at("patient").at("id") != expected.patient_id)
+    if (file.contains("patient") && file.at("patient").at("id") != study.ct->identity.patient_id)
       throw Error(fmt::format("{}: is of another patient than the study (PatientID)", name));
-    if (file.contains("patient_position") && file.at("patient_position") != expected.patient_position)
+    if (file.contains("patient_position") && file.at("patient_position") != position)
       throw Error(fmt::format("{}: its patient position is {}, and that of the study {}: {}", name,
-                              file.at("patient_position").get<std::string>(), expected.patient_position, kWhy));
+                              file.at("patient_position").get<std::string>(), position, kWhy));
     if (file.contains("isocenter_patient_mm")) {
       const auto mm = file.at("isocenter_patient_mm").get<std::array<double, 3>>();
-      if ((Eigen::Vector3d(mm.data()) - expected.isocenter_patient_mm).norm() > kSameIsocenterMm)
+      if ((Eigen::Vector3d(mm.data()) - study.isocenter_patient_mm).norm() > kSameIsocenterMm)
         throw Error(fmt::format("{}: its isocenter is ({:.2f}), and that of the study ({:.2f}): {}", name,
-                                fmt::join(mm, ", "), fmt::join(expected.isocenter_patient_mm, ", "), kWhy));
+                                fmt::join(mm, ", "), fmt::join(study.isocenter_patient_mm, ", "), kWhy));
     }
-    require_same_table(file, name, expected.table);
+    require_same_table(file, name, study.table);
   } catch (const Json::exception& error) {
     throw Error(fmt::format("{}: is no result.json, truth.json or pose set by hand: {}", name, reason_of(error)));
   }

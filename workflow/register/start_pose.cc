@@ -93,7 +93,7 @@ Start read_start(const std::filesystem::path& file, const Study& study, std::spa
   const Json& json = read.json;
   const Eigen::Isometry3d setup_error = setup_error_in(json, name);
   try {
-    require_same_setup(json, name, planned_lie(study));
+    require_same_setup(json, name, study);
     return {.setup_error = setup_error,
             .file = file.filename().string(),
             .sha256 = read.sha256,

@@ -1,11 +1,13 @@
 #include "workflow/register/study_options.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <array>
 #include <charconv>
 #include <cmath>
+#include <ranges>
 
 #include "base/error.h"
 #include "base/option_name.h"
@@ -39,13 +41,13 @@ void check_finite(const std::string& flag, std::span<const double> values) {
 
 void check_couch_angles(const std::optional<double>& couch_angle_deg, const std::optional<double>& couch_pitch_deg,
                         const std::optional<double>& couch_roll_deg) {
-  constexpr double kTurnDeg = 360.0, kMostTiltedDeg = 45.0;
+  constexpr double kTurnDeg = 360.0;
   if (const double angle_deg = couch_angle_deg.value_or(0.0); !(std::abs(angle_deg) <= kTurnDeg))
     throw UsageError(fmt::format("{}: {}, expected degrees from -360 to 360", option("couch-angle"), angle_deg));
   for (const auto& [flag, angle_deg] : {std::pair(option("couch-pitch"), couch_pitch_deg.value_or(0.0)),
                                         std::pair(option("couch-roll"), couch_roll_deg.value_or(0.0))})
     if (!(std::abs(angle_deg) <= kTurnDeg) ||
-        std::abs(wrapped_rad(rad_from_deg(angle_deg))) > rad_from_deg(kMostTiltedDeg))
+        std::abs(wrapped_rad(rad_from_deg(angle_deg))) > rad_from_deg(kMaxTableTiltDeg))
       throw UsageError(
           fmt::format("{}: {}, expected degrees from -45 to 45: no table top tilts farther", flag, angle_deg));
 }
@@ -64,12 +66,6 @@ auto known(std::string_view name, const std::string& word, From from) -> decltyp
   const auto value = from(word);
   if (!value) throw UsageError(fmt::format("{}: there is no such value", option(name, word)));
   return value;
-}
-
-std::string allow_keys() {
-  std::string keys;
-  for (const AllowKey& known : kAllowKeys) keys += (keys.empty() ? "" : ", ") + std::string(known.key);
-  return keys;
 }
 
 }  // namespace
@@ -97,7 +93,8 @@ Allowances allowances_from(std::span<const std::string> allow) {
   for (const std::string& text : allow) {
     const auto [key, reason] = key_and_value(text, option("allow"));
     if (std::ranges::find(kAllowKeys, key, &AllowKey::key) == std::end(kAllowKeys))
-      throw UsageError(fmt::format("{}: no check has this key; the keys are {}", option("allow", key), allow_keys()));
+      throw UsageError(fmt::format("{}: no check has this key; the keys are {}", option("allow", key),
+                                   fmt::join(kAllowKeys | std::views::transform(&AllowKey::key), ", ")));
     if (reason.find_first_not_of(" \t") == std::string::npos)
       throw UsageError(fmt::format("{}: the reason is empty", option("allow", fmt::format("{}={}", key, reason))));
     if (!allowed.emplace(key, reason).second) throw UsageError(fmt::format("{}: is there twice", option("allow", key)));

@@ -38,7 +38,7 @@ void put_deletion(const fs::path& results, const Deletion& deletion) {
   const nlohmann::ordered_json json = {{"schema", 1},       {"session", deletion.session},
                                        {"by", deletion.by}, {"user", deletion.user},
                                        {"on", deletion.on}, {"xrays", deletion.xrays}};
-  replace_text(file_of(results, deletion.session), json.dump(2) + "\n");
+  replace_text(file_of(results, deletion.session), json_text(json));
 }
 
 std::vector<Deletion> deletions(const fs::path& results) {

@@ -52,7 +52,7 @@ void EngineFile::update(const EngineState& state) {
                                          {"waiting", json_of(state.waiting)},
                                          {"chosen", json_of(state.chosen)},
                                          {"troubles", state.troubles}};
-    replace_text(path_, json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
+    replace_text(path_, json_text(json));
     std::filesystem::last_write_time(path_, clock_.file_time());
     written_ = state;
   }

@@ -73,10 +73,12 @@ SessionRecord record_of(const std::string& session, const fs::path& folder) {
 std::string json_of(const SessionRecord& record) {
   nlohmann::ordered_json files = nlohmann::ordered_json::array();
   for (const auto& [file, sha256] : record.files) files.push_back({{"file", file}, {"sha256", sha256}});
-  return nlohmann::ordered_json{{"schema", 1},     {"session", record.session},         {"verdict", record.verdict},
-                                {"on", record.on}, {"pose_set_by", record.pose_set_by}, {"files", files}}
-             .dump(2) +
-         "\n";
+  return json_text(nlohmann::ordered_json{{"schema", 1},
+                                          {"session", record.session},
+                                          {"verdict", record.verdict},
+                                          {"on", record.on},
+                                          {"pose_set_by", record.pose_set_by},
+                                          {"files", files}});
 }
 
 SessionRecord read_session_record(const fs::path& path) {

@@ -1,5 +1,7 @@
 #include "workflow/room/signed_json.h"
 
+#include "base/json_file.h"
+
 namespace isoshift {
 namespace {
 
@@ -13,9 +15,7 @@ std::string signed_text(nlohmann::json record) {
 
 }  // namespace
 
-std::string file_text(const nlohmann::ordered_json& json) {
-  return json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
-}
+std::string file_text(const nlohmann::ordered_json& json) { return json_text(json); }
 
 void sign(nlohmann::ordered_json& record, const std::optional<SigningKey>& key) {
   if (key) record[kSignatureKey] = key->sign(signed_text(nlohmann::json::parse(file_text(record))));

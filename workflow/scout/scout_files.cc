@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "base/json_file.h"
 #include "base/sha256.h"
 #include "base/version.h"
 #include "geometry/motion_axes.h"
@@ -124,7 +125,7 @@ std::string scout_json(const ScoutRegistration& found, const ScoutRequest& reque
       {"warnings", found.notes.warnings},
       {"overrides", found.notes.overrides}};
   if (!pdf_sha256.empty()) json["files_sha256"] = {{"scout.pdf", pdf_sha256}, {"scout.png", png_sha256}};
-  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+  return json_text(json);
 }
 
 std::string scout_png(const ScoutRegistration& found) {

@@ -8,6 +8,7 @@
 
 #include "base/error.h"
 #include "base/graceful_end.h"
+#include "base/json_file.h"
 #include "base/output_folder.h"
 #include "geometry/mask.h"
 #include "io/dicom/structure_mask.h"
@@ -194,7 +195,7 @@ class TrackRun {
   void write(OutputFolder& output) const {
     const auto json = track_json(record_);
     write_text(output.path() / "trace.csv", trace_csv(record_));
-    write_text(output.path() / "track.json", json.dump(2) + "\n");
+    write_text(output.path() / "track.json", json_text(json));
     write_text(output.path() / "trace.svg", trace_svg(record_));
     output.commit();
   }
