@@ -73,7 +73,7 @@ class Walk {
   }
 
   // Past the file meta information, which need not be there. Its transfer syntax, empty where it names none. DCMTK
-  // takes the first of two, and believes the group's length.
+  // takes the first of two, overlooks one that is not a UI, and believes the group's length.
   std::string transfer_syntax() {
     std::string uid;
     std::uint64_t end = 0;
@@ -81,6 +81,8 @@ class Walk {
     while (number(file_.piece(at_, 2), true) == DCM_TransferSyntaxUID.getGroup()) {
       const Element element = next_element();
       if (element.tag <= last) fail(fmt::format("{} stands where a larger tag is expected", named(element)));
+      if (element.tag == DCM_TransferSyntaxUID && !element.vr.empty() && element.vr != "UI")
+        fail(fmt::format("{} has the value representation {}, expected UI", named(element), element.vr));
       last = element.tag;
       skip(element);
       if (element.tag == DCM_FileMetaInformationGroupLength && element.length == 4)

@@ -197,6 +197,9 @@ TEST(FileStructure, WhatProgramsReadDifferentlyIsRefused) {
   EXPECT_THAT(error_of(file + shorter(0x0002, 0x0000, "UL", little(1000, 4)) + implicit + kSopClass),
               HasSubstr("says that the file meta information ends at byte 1144, and it ends at byte 170"));
   EXPECT_THAT(error_of(std::string("\0\x08\0\x16OB\0\0\0\0\0\x04", 12)), HasSubstr("names no transfer syntax"));
+  // DCMTK would take the deflated bytes for elements, and reserve what they announce.
+  EXPECT_THAT(error_of(file + shorter(0x0002, 0x0010, "TM", "1.2.840.10008.1.2.1.99") + deflated(kSopClass)),
+              HasSubstr("TransferSyntaxUID (0002,0010) at byte 132 has the value representation TM, expected UI"));
 }
 
 // The bound holds at any depth.
