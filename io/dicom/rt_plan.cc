@@ -37,6 +37,9 @@ RtPlan::Beam read_beam(const DicomItem& beam_item, const DcmTagKey& control_poin
     beam.jaws = read_jaws(points.front().items(DCM_BeamLimitingDevicePositionSequence),
                           beam_item.items(is_ion ? DCM_IonBeamLimitingDeviceSequence : DCM_BeamLimitingDeviceSequence));
     beam.support_angle_deg = points.front().number(DCM_PatientSupportAngle);
+    beam.eccentric_angle_deg = points.front().number(DCM_TableTopEccentricAngle);
+    beam.pitch_deg = points.front().number(DCM_TableTopPitchAngle);
+    beam.roll_deg = points.front().number(DCM_TableTopRollAngle);
     for (const DicomItem& point : points)
       if (point.has_value(DCM_IsocenterPosition))
         check_same_isocenter(beam, Eigen::Vector3d(point.required_numbers(DCM_IsocenterPosition, 3).data()), point);

@@ -20,8 +20,9 @@ struct RtPlan {
     std::string delivery_type;                            // TreatmentDeliveryType: TREATMENT, SETUP
     std::string machine;                                  // TreatmentMachineName; may be empty
     std::optional<Eigen::Vector3d> isocenter_patient_mm;  // IsocenterPosition of the first control point
-    std::optional<double> support_angle_deg;              // PatientSupportAngle of the first control point
-    JawOpenings jaws;                                     // of the first control point
+    // Angles of the table at the first control point: PatientSupportAngle, TableTop{Eccentric,Pitch,Roll}Angle.
+    std::optional<double> support_angle_deg, eccentric_angle_deg, pitch_deg, roll_deg;
+    JawOpenings jaws;  // of the first control point
     // Of the patient setup to which the beam refers. If it refers to none: the position that all setups share, and the
     // largest displacement.
     std::optional<std::string> patient_position;

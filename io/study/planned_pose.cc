@@ -24,14 +24,20 @@ void warn_of_planned_displacement(const std::vector<RtPlan::Beam>& beams, Notes&
           beam.number, fmt::join(beam.setup_displacement_mm, ", "), described(DCM_TableTopVerticalSetupDisplacement)));
 }
 
-void warn_of_planned_couch_angle(const Study& study, const std::vector<RtPlan::Beam>& beams, Notes& notes) {
+void warn_of_planned_table(const Study& study, const std::vector<RtPlan::Beam>& beams, Notes& notes) {
   for (const RtPlan::Beam& beam : beams) {
-    if (!beam.support_angle_deg) continue;
-    const double change_rad = wrapped_rad(rad_from_deg(*beam.support_angle_deg) - study.table.support_rad);
-    if (std::abs(change_rad) > rad_from_deg(kMaxTableTurnDeg))
-      notes.warnings.push_back(fmt::format(
-          "beam {} of the plan has couch angle {:.1f} degrees, the images {:.1f} degrees; the images' counts",
-          beam.number, *beam.support_angle_deg, deg_from_rad(study.table.support_rad)));
+    const auto compare = [&](const char* angle, const std::optional<double>& planned_deg, double imaged_rad) {
+      const double change_rad = wrapped_rad(rad_from_deg(planned_deg.value_or(0.0)) - imaged_rad);
+      if (!planned_deg || std::abs(change_rad) <= rad_from_deg(kMaxTableTurnDeg)) return;
+      notes.warnings.push_back(
+          fmt::format("beam {} of the plan has couch {} {:.1f} degrees, the images {:.1f} degrees; the images' counts",
+                      beam.number, angle, *planned_deg, deg_from_rad(imaged_rad)));
+    };
+    std::optional<double> yaw_deg = beam.support_angle_deg;
+    if (yaw_deg) *yaw_deg += beam.eccentric_angle_deg.value_or(0.0);
+    compare("angle", yaw_deg, study.table.yaw_rad());
+    compare("pitch", beam.pitch_deg, study.table.pitch_rad);
+    compare("roll", beam.roll_deg, study.table.roll_rad);
   }
 }
 
@@ -129,7 +135,7 @@ void place_patient(const StudyRequest& request, const std::vector<RtPlan::Beam>&
                                          described(DCM_PatientPosition)));
   if (study.plan && !request.isocenter_patient_mm)
     std::ranges::move(unsettled(treatment_doubts(study), request.allowed, notes), std::back_inserter(study.doubts));
-  warn_of_planned_couch_angle(study, beams, notes);
+  warn_of_planned_table(study, beams, notes);
   warn_of_planned_displacement(beams, notes);
   study.planned_room_from_patient =
       planned_room_from_patient(study.patient_position, study.table, study.isocenter_patient_mm);
