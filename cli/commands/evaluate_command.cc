@@ -119,7 +119,7 @@ void add_evaluate_command(CLI::App& app, Console& console, int&) {
           "--jobs", options.jobs,
           "Registrations at the same time, each on one thread [one per core]; with 1, a registration uses all cores: "
           "use this to measure its time")
-      ->check(CLI::PositiveNumber);
+      ->check(CLI::Range(1, 256));
   command->add_option("--table", flags->table, "Print a table of evaluations made earlier")->type_name("FOLDER...");
   add_registration_switches(*command, options.registration);
   add_table2_flags(*command, *flags);

@@ -88,7 +88,7 @@ void add_track_command(CLI::App& app, Console& console, int&) {
       ->add_option("--budget", flags->budget_ms,
                    "Time that a moment may take; the summary says how many moments took no longer")
       ->type_name("MS")
-      ->check(CLI::PositiveNumber)
+      ->check(CLI::Range(0.1, 60000.0))
       ->capture_default_str();
   command->add_flag("--rigid", flags->six_dof, "Six degrees of freedom instead of the three translations");
   command->add_option("--box", options.tracking.box_mm, "Half the width of the search box around the expected position")
@@ -99,7 +99,7 @@ void add_track_command(CLI::App& app, Console& console, int&) {
       ->add_option("--tolerance", options.tolerance_mm,
                    "Mark the moments at which the target is farther off than this, so that the beam should wait")
       ->type_name("MM")
-      ->check(CLI::PositiveNumber);
+      ->check(CLI::Range(0.01, 1000.0));
   command->add_option("--truth", options.truth, "True positions (t_s, x, y, z), to print beside the result")
       ->type_name("CSV");
   command->add_flag("--overwrite", options.overwrite, "Replace an earlier output in that folder");

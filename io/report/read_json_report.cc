@@ -245,9 +245,9 @@ std::optional<Uncertainty> uncertainty_from(const Json& json) {
 }
 
 Verdict verdict_from(const std::string& word) {
-  for (const Verdict verdict : {Verdict::kAccepted, Verdict::kReview})
+  for (const Verdict verdict : {Verdict::kAccepted, Verdict::kReview, Verdict::kRejected})
     if (word == to_string(verdict)) return verdict;
-  return Verdict::kRejected;  // and what no version of isoshift says
+  throw Error(fmt::format("verdict is \"{}\", expected accepted, review or rejected", word));
 }
 
 // NOLINTNEXTLINE(readability-function-size): long because result.json is: each key into its field

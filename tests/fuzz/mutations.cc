@@ -1,19 +1,22 @@
-// Reads damaged copies of every kind of file isoshift reads (DicomMutator). Every one must be read or refused with
-// Error, within 10 s. Prints what came of them; exits with 1 at the first that did anything else.
+// Reads damaged copies of every kind of file isoshift reads (DicomMutator), or the files that fuzzing has left in the
+// folders ct, rt_image, ... of FOLDER. Every one must be read or refused with Error, within 10 s. Prints what came of
+// them; exits with 1 at the first that did anything else.
 //
 //   mutations [count=12000] [first seed=1]
+//   mutations FOLDER
 
 #include <fmt/format.h>
 #include <sys/resource.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cstdlib>
 #include <fstream>
 #include <iostream>
+#include <ranges>
 #include <string_view>
 
 #include "base/error.h"
+#include "base/stopwatch.h"
 #include "base/text_file.h"
 #include "io/dicom/decoder_process.h"
 #include "tests/fuzz/dicom_mutator.h"
@@ -52,41 +55,66 @@ double used_mb(int whose) {
   return static_cast<double>(used.ru_maxrss) / 1024.0;
 }
 
-int run(std::uint64_t count, std::uint64_t first_seed) {
+// What came of the files that were read.
+class Outcomes {
+ public:
+  // Whether the file was read or refused in time; if not, says so.
+  bool read(const std::string& reader, const std::filesystem::path& path, const std::string& name) {
+    const Stopwatch watch;
+    try {
+      kReaders.at(reader)(path);
+      ++read_;
+    } catch (const Error& error) {
+      ++refused_;
+      const std::string_view message = error.what();
+      died_ += message.find("the decoder ended with") != message.npos ? 1 : 0;
+      stalled_ += message.find("were not decoded within") != message.npos ? 1 : 0;
+    } catch (const std::exception& error) {
+      std::cerr << fmt::format("{}: {}\n", name, error.what());
+      return false;
+    }
+    const double seconds = watch.seconds();
+    slowest_s_ = std::max(slowest_s_, seconds);
+    if (seconds <= 2.0) return true;
+    ++slow_;
+    std::cerr << fmt::format("{} took {:.1f} s\n", name, seconds);
+    return seconds <= 11.0;
+  }
+
+  void print() const {
+    use_decoder({});  // ends those that wait, so that their memory is known
+    std::cout << fmt::format(
+        "{} files: {} read, {} refused, of these {} by a decoder that died and {} by one that was ended; {} took "
+        "longer than 2 s, the slowest {:.2f} s; at most {:.0f} MB of memory, decoders {:.0f} MB\n",
+        read_ + refused_, read_, refused_, died_, stalled_, slow_, slowest_s_, used_mb(RUSAGE_SELF),
+        used_mb(RUSAGE_CHILDREN));
+  }
+
+ private:
+  std::uint64_t read_ = 0, refused_ = 0, died_ = 0, stalled_ = 0, slow_ = 0;
+  double slowest_s_ = 0.0;
+};
+
+int read_mutations(std::uint64_t count, std::uint64_t first_seed) {
   const TemporaryFolder folder(memory_folder());
   const std::filesystem::path path = folder / "mutated.dcm";
-  std::uint64_t read = 0, refused = 0, died = 0, stalled = 0, slow = 0;
-  double slowest_s = 0.0;
+  Outcomes outcomes;
   const std::vector<Original> list = originals();
   for (std::uint64_t seed = first_seed; seed < first_seed + count; ++seed) {
     const Original& original = list[seed % list.size()];
     std::ofstream(path, std::ios::binary) << DicomMutator(seed).mutated(original.bytes);
-    const auto start = std::chrono::steady_clock::now();
-    try {
-      kReaders.at(original.reader)(path);
-      ++read;
-    } catch (const Error& error) {
-      ++refused;
-      const std::string_view message = error.what();
-      died += message.find("the decoder ended with") != message.npos ? 1 : 0;
-      stalled += message.find("were not decoded within") != message.npos ? 1 : 0;
-    } catch (const std::exception& error) {
-      std::cerr << fmt::format("seed {} ({}): {}\n", seed, original.name, error.what());
-      return 1;
-    }
-    const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-    slowest_s = std::max(slowest_s, seconds);
-    if (seconds <= 2.0) continue;
-    ++slow;
-    std::cerr << fmt::format("seed {} ({}) took {:.1f} s\n", seed, original.name, seconds);
-    if (seconds > 11.0) return 1;
+    if (!outcomes.read(original.reader, path, fmt::format("seed {} ({})", seed, original.name))) return 1;
   }
-  use_decoder({});  // ends those that wait, so that their memory is known
-  std::cout << fmt::format(
-      "{} files, seeds {} to {}: {} read, {} refused, of these {} by a decoder that died and {} by one that was ended; "
-      "{} took longer than 2 s, the slowest {:.2f} s; at most {:.0f} MB of memory, decoders {:.0f} MB\n",
-      count, first_seed, first_seed + count - 1, read, refused, died, stalled, slow, slowest_s, used_mb(RUSAGE_SELF),
-      used_mb(RUSAGE_CHILDREN));
+  outcomes.print();
+  return 0;
+}
+
+int read_kept(const std::filesystem::path& folder) {
+  Outcomes outcomes;
+  for (const auto& reader : std::views::keys(kReaders))
+    for (const auto& file : std::filesystem::directory_iterator(folder / reader))
+      if (!outcomes.read(reader, file.path(), file.path().string())) return 1;
+  outcomes.print();
   return 0;
 }
 
@@ -97,6 +125,7 @@ int main(int argc, char** argv) {
   // Decodes as its own child, as the program does (cli/main.cc).
   if (argc == 3 && argv[1] == std::string_view("__child")) return isoshift::run_decoder();
   isoshift::use_decoder("/proc/self/exe");
-  return isoshift::run(argc > 1 ? std::strtoull(argv[1], nullptr, 10) : 12000,
-                       argc > 2 ? std::strtoull(argv[2], nullptr, 10) : 1);
+  if (argc == 2 && std::filesystem::is_directory(argv[1])) return isoshift::read_kept(argv[1]);
+  return isoshift::read_mutations(argc > 1 ? std::strtoull(argv[1], nullptr, 10) : 12000,
+                                  argc > 2 ? std::strtoull(argv[2], nullptr, 10) : 1);
 }

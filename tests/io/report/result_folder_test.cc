@@ -154,6 +154,11 @@ TEST_F(ResultFolderTest, AShiftThatWasChangedByHandIsRefused) {
   scaled["setup_error"]["rotation_matrix"][0] = {2, 0, 0};
   EXPECT_THAT([&] { report_from_json(scaled.dump(), "result.json"); },
               ThrowsMessage<Error>(HasSubstr("result.json: setup_error: rotation_matrix is no rotation")));
+  auto judged = json;
+  judged["verdict"] = "fine";
+  EXPECT_THAT(
+      [&] { report_from_json(judged.dump(), "result.json"); },
+      ThrowsMessage<Error>(HasSubstr("result.json: verdict is \"fine\", expected accepted, review or rejected")));
 }
 
 TEST_F(ResultFolderTest, ThePdfIsADicomObjectToo) {
