@@ -73,6 +73,12 @@ compressed() {
   dcmconv +tb $slice compressed/big-endian.dcm
 }
 
+enhanced() {
+  mkdir enhanced
+  /usr/bin/python3 "$here/enhanced_ct.py" enhanced/plain.dcm small/1/CT/CT00{16..20}.dcm
+  dcmcrle enhanced/plain.dcm enhanced/rle.dcm
+}
+
 breathing() {
   mkdir breathing
   phantom breathes --anatomy thorax --breathing 60 --rate 4 --gantry-angles 0 --phases 0 --voxel-mm 5 --image-pixels 64 \
@@ -134,6 +140,7 @@ studies
 registrations
 /usr/bin/python3 "$here/rt_image_dialects.py" small/1/RTIMAGE rt-images
 compressed
+enhanced
 breathing
 results
 damaged

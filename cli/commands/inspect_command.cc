@@ -169,7 +169,7 @@ Description describe_structures(const std::filesystem::path& path) {
 Description describe_ct(const StudyFiles::Ct& found, Console& console) {
   const std::string folder = found.files.front().parent_path().string();
   Description description("CT series", "", found.series_instance_uid);
-  description.show("slices", "slices", found.files.size(), fmt::format("{}, from {}", found.files.size(), folder));
+  description.show("files", "files", found.files.size(), fmt::format("{}, from {}", found.files.size(), folder));
   Notes notes;
   try {
     ProgressBar bar(console, "Reading CT");

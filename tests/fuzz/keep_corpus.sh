@@ -4,7 +4,7 @@
 set -euo pipefail
 kept=build/fuzz/kept/corpus
 rm -rf "$kept"
-for reader in ct rt_image rt_plan rt_structures spatial_registration decoder; do
+for reader in ct enhanced_ct rt_image rt_plan rt_structures spatial_registration decoder; do
   mkdir -p "$kept/$reader"
   # Files on which DCMTK's decoders crash end the attempt at these files alone.
   build/fuzz/tests/fuzz_$reader -merge=1 -timeout=60 -rss_limit_mb=4096 "$kept/$reader" build/fuzz/{seeds,corpus}/$reader

@@ -1,5 +1,5 @@
 // Reads damaged copies of every kind of file isoshift reads (DicomMutator), or the files that fuzzing has left in the
-// folders ct, rt_image, ... of FOLDER. Every one must be read or refused with Error, within 10 s. Prints what came of
+// folders ct, enhanced_ct, ... of FOLDER. Every one must be read or refused with Error, within 10 s. Prints what came of
 // them; exits with 1 at the first that did anything else.
 //
 //   mutations [count=12000] [first seed=1]
@@ -46,6 +46,8 @@ std::vector<Original> originals() {
   add("rt_structures", "thorax/RTSTRUCT.dcm");
   add("spatial_registration", "registrations/HFS/spatial_registration.dcm");
   add("rt_image", "rt-images/obi-frames/KV.dcm");
+  add("enhanced_ct", "enhanced/plain.dcm");
+  add("enhanced_ct", "enhanced/rle.dcm");
   return list;
 }
 

@@ -9,15 +9,20 @@
 #include "io/objects/registration_check.h"
 #include "io/objects/spatial_registration.h"
 #include "io/study/study_files.h"
+#include "tests/support/testdata.h"
 
 namespace isoshift {
 namespace {
 
-void read_ct(const std::filesystem::path& path) {
+void read_ct(std::vector<std::filesystem::path> files) {
   Notes notes;
-  scan_study({path});
-  const std::vector<std::filesystem::path> files = {path};
+  scan_study({files.front()});
   read_ct_series(files, {{"gaps", "hostile"}}, notes, {});
+}
+
+// Between two slices of the phantom that testdata/compressed shows: alone it would be no volume.
+void read_ct_slice(const std::filesystem::path& path) {
+  read_ct({path, testdata("small/1/CT/CT0014.dcm"), testdata("small/1/CT/CT0022.dcm")});
 }
 
 void read_rt_image(const std::filesystem::path& path) {
@@ -40,7 +45,8 @@ void read_structures(const std::filesystem::path& path) {
 }  // namespace
 
 const std::map<std::string, std::function<void(const std::filesystem::path&)>> kReaders = {
-    {"ct", read_ct},
+    {"ct", read_ct_slice},
+    {"enhanced_ct", [](const std::filesystem::path& path) { read_ct({path}); }},
     {"rt_image", read_rt_image},
     {"rt_plan", [](const std::filesystem::path& path) { read_rt_plan(path); }},
     {"rt_structures", read_structures},

@@ -8,8 +8,8 @@
 
 namespace isoshift {
 
-// By name: ct, rt_image, rt_plan, rt_structures, spatial_registration, decoder. Each reads all that it would in use,
-// pixels included, and throws what reading throws.
+// By name: ct, enhanced_ct, rt_image, rt_plan, rt_structures, spatial_registration, decoder. Each reads all that it
+// would in use, pixels included, and throws what reading throws.
 extern const std::map<std::string, std::function<void(const std::filesystem::path&)>> kReaders;
 
 }  // namespace isoshift
