@@ -9,6 +9,8 @@
 #include <dcmtk/dcmjpls/djdecode.h>
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <array>
 #include <cstring>
 #include <optional>
 #include <span>
@@ -94,6 +96,24 @@ std::vector<Uint8> frame_stream(DcmPixelData& pixels, const DcmDataset& dataset,
     stream.insert(stream.end(), bytes, bytes + fragment->getLength());
   }
   return stream;
+}
+
+// The header of a frame in RLE: how many segments there are, one for each byte of a pixel, and where they begin (PS3.5
+// G.5). DCMTK 3.6.7 reads whatever lies where the header says.
+void expect_rle_header(std::span<const Uint8> stream, const PixelFormat& format, const std::string& where) {
+  constexpr std::size_t kHeaderWords = 16;
+  std::array<std::uint32_t, kHeaderWords> header{};
+  bool is_sound = stream.size() > sizeof header;
+  if (is_sound) {
+    std::memcpy(header.data(), stream.data(), sizeof header);
+    const auto segments = static_cast<std::size_t>(format.bits_allocated / 8);
+    const std::span begins = std::span(header).subspan(1, segments);
+    is_sound = header[0] == segments && begins.front() == sizeof header && std::ranges::is_sorted(begins) &&
+               begins.back() < stream.size();
+  }
+  if (!is_sound)
+    throw Error(fmt::format("{}: the header of a frame in RLE is damaged: expected {} segments, from byte {} on", where,
+                            format.bits_allocated / 8, sizeof header));
 }
 
 }  // namespace
@@ -200,11 +220,12 @@ std::vector<std::uint8_t> decompressed_frame(const DicomFile& file, int frame) {
     throw Error(fmt::format("{}: {} is missing", where, described(DCM_PixelData)));
   auto& pixels = dynamic_cast<DcmPixelData&>(*element);
   const E_TransferSyntax syntax = dataset.getOriginalXfer();
-  if (syntax != EXS_RLELossless) {
-    const std::vector<Uint8> stream = frame_stream(pixels, dataset, frame, format.frames);
-    if (is_jpeg2000(syntax)) return decoded_jpeg2000(stream, format, where);
-    if (const auto announced = jpeg_size(stream)) expect_size(format, *announced, where);
-  }
+  const std::vector<Uint8> stream = frame_stream(pixels, dataset, frame, format.frames);
+  if (is_jpeg2000(syntax)) return decoded_jpeg2000(stream, format, where);
+  if (syntax == EXS_RLELossless)
+    expect_rle_header(stream, format, where);
+  else if (const auto announced = jpeg_size(stream))
+    expect_size(format, *announced, where);
   Uint32 fragment = 0;  // found by the decoder
   OFString color_model;
   std::vector<std::uint8_t> bytes(size + size % 2);  // what DCMTK asks for, too: pixel_format() allows one sample only

@@ -108,6 +108,23 @@ void expect_all_tiles(opj_codec_t* codec, std::span<const std::uint8_t> stream, 
     throw Error(fmt::format("{}: {} of its {} JPEG 2000 tiles are there", where, found, tiles));
 }
 
+// Before OpenJPEG looks into the stream, which reserves some 10 KB for each of its tiles: the image is that of the
+// header, and the tiles are not many (ISO/IEC 15444-1, A.5.1). A stream without this segment OpenJPEG refuses itself.
+void check_announced_size(std::span<const std::uint8_t> stream, const PixelFormat& format, const std::string& where) {
+  constexpr std::uint32_t kSize = 0xFF51, kMostTiles = 4096;
+  constexpr std::size_t kEndOfTileOffsets = 40;
+  if (stream.size() < kEndOfTileOffsets || number(stream.subspan(2, 2)) != kSize) return;
+  const auto word = [&](std::size_t n) -> std::int64_t { return number(stream.subspan(8 + 4 * n, 4)); };
+  expect_size(format, {word(0) - word(2), word(1) - word(3)}, where);
+  const auto tiles_along = [&](std::size_t axis) {
+    const std::int64_t tile = std::max<std::int64_t>(word(4 + axis), 1);
+    return (word(axis) - word(6 + axis) + tile - 1) / tile;
+  };
+  const std::int64_t across = tiles_along(0), down = tiles_along(1);
+  if (std::max(across, down) > kMostTiles || across * down > kMostTiles)
+    throw Error(fmt::format("{}: its JPEG 2000 pixels have more than {} tiles", where, kMostTiles));
+}
+
 // Before anything is decoded: what the stream announces is the image of the header.
 void check_is_of(const PixelFormat& format, const opj_image_t& image, const std::string& where) {
   if (image.numcomps != 1)
@@ -130,6 +147,7 @@ std::vector<std::uint8_t> decoded_jpeg2000(std::span<const std::uint8_t> stream,
       throw Error(fmt::format("{}: its JPEG 2000 pixels cannot be decoded: {}", where,
                               fault.empty() ? "they are damaged" : fault));
   };
+  check_announced_size(stream, format, where);
   Bytes bytes{stream};
   const OpjStream source = stream_from(bytes);
   const OpjCodec codec(opj_create_decompress(OPJ_CODEC_J2K), &opj_destroy_codec);

@@ -294,6 +294,56 @@ TEST_F(DecodeTest, AStreamOfAnotherSizeThanTheHeaderIsRefused) {
   }
 }
 
+// OpenJPEG would reserve 10 KB for each tile, 394 MB for those of an image that is not that of the header.
+TEST_F(DecodeTest, Jpeg2000OfManyTilesIsRefused) {
+  const std::filesystem::path compressed = compressed_by("gdcmconv --j2k");
+  const PixelFormat format = pixel_format(DicomFile::read(compressed, DicomFile::Extent::kHeader).dataset());
+  const std::vector<std::uint8_t> stream = stream_of(compressed);
+  const auto error_with = [&](std::size_t place, std::uint8_t byte, PixelFormat expected) {
+    std::vector<std::uint8_t> changed = stream;
+    changed[place] = byte;
+    try {
+      decoded_jpeg2000(changed, expected, "here");
+    } catch (const Error& error) {
+      return std::string(error.what());
+    }
+    return std::string("no error");
+  };
+  constexpr std::size_t kFirstByteOfRows = 12, kSecondByteOfRows = 13;
+  EXPECT_THAT(error_with(kSecondByteOfRows, 0x24, format),
+              testing::HasSubstr("its compressed pixels are 48 x 2359354"));
+  PixelFormat large = format;
+  large.rows += 0x24 << 24;
+  EXPECT_THAT(error_with(kFirstByteOfRows, 0x24, large),
+              testing::HasSubstr("here: its JPEG 2000 pixels have more than 4096 tiles"));
+}
+
+// DCMTK 3.6.7 would read whatever lies there.
+TEST_F(DecodeTest, ASegmentOfRleBehindItsFrameIsRefused) {
+  const std::filesystem::path compressed = compressed_by("dcmcrle");
+  const std::string bytes = read_text(compressed), header("\x02\0\0\0\x40\0\0\0", 8);
+  const std::size_t place = bytes.find(header);
+  ASSERT_NE(place, bytes.npos);
+  const auto error_with = [&](std::size_t at, char byte) {
+    std::string changed = bytes;
+    changed[place + at] = byte;
+    std::filesystem::remove(compressed);
+    write_text(compressed, changed);
+    try {
+      decompressed_frame(DicomFile::read(compressed, DicomFile::Extent::kWhole), 0);
+    } catch (const Error& error) {
+      return std::string(error.what());
+    }
+    return std::string("no error");
+  };
+  const auto is_named =
+      testing::HasSubstr("the header of a frame in RLE is damaged: expected 2 segments, from byte 64");
+  EXPECT_EQ(error_with(0, 2), "no error");
+  EXPECT_THAT(error_with(0, 1), is_named);
+  EXPECT_THAT(error_with(4, 65), is_named);
+  EXPECT_THAT(error_with(11, 0x31), is_named);
+}
+
 TEST_F(DecodeTest, ADamagedFileIsRefusedAndTheNextOneRead) {
   const std::vector<std::int32_t> expected = pixels_of(study_.ct_slice(18));
   const std::filesystem::path compressed = compressed_by("dcmcjpls +el");
