@@ -81,15 +81,16 @@ class Walk {
     while (number(file_.piece(at_, 2), true) == DCM_TransferSyntaxUID.getGroup()) {
       const Element element = next_element();
       if (element.tag <= last) fail(fmt::format("{} stands where a larger tag is expected", named(element)));
-      if (element.tag == DCM_TransferSyntaxUID && !element.vr.empty() && element.vr != "UI")
-        fail(fmt::format("{} has the value representation {}, expected UI", named(element), element.vr));
       last = element.tag;
       skip(element);
       if (element.tag == DCM_FileMetaInformationGroupLength && element.length == 4)
         end = at_ + number(bytes(element.value_at, 4), true);
       constexpr std::size_t kLongest = 64;
-      if (element.tag == DCM_TransferSyntaxUID)
+      if (element.tag == DCM_TransferSyntaxUID) {
+        if (!element.vr.empty() && element.vr != "UI")
+          fail(fmt::format("{} has the value representation {}, expected UI", named(element), element.vr));
         uid = bytes(element.value_at, std::min<std::size_t>(element.length, kLongest));
+      }
     }
     if (end != 0 && end != at_)
       fail(fmt::format("{} says that the file meta information ends at byte {}, and it ends at byte {}",

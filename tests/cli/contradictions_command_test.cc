@@ -18,20 +18,15 @@ using testing::HasSubstr;
 
 class ContradictionsCommandTest : public testing::Test {
  protected:
-  nlohmann::json result() {
-    std::ifstream file(study_.output() / "result.json");
-    return nlohmann::json::parse(file);
-  }
-
   SmallStudy study_;
 };
 
 TEST_F(ContradictionsCommandTest, TheSameXrayTwiceIsOneView) {
   std::filesystem::copy(study_.image(0), study_.path() / "RTIMAGE" / "again.dcm");
   const CommandOutcome outcome = register_study(study_);
-  EXPECT_EQ(result()["views"].size(), 2U);
+  EXPECT_EQ(result_of(study_)["views"].size(), 2U);
   EXPECT_THAT(outcome.err, HasSubstr("left aside: "));
-  EXPECT_THAT(result()["left_aside"].dump(), HasSubstr("the same X-ray as"));
+  EXPECT_THAT(result_of(study_)["left_aside"].dump(), HasSubstr("the same X-ray as"));
 }
 
 TEST_F(ContradictionsCommandTest, AViewWithoutATimeIsWarnedOfAndDoesNotHideTheOthers) {
@@ -40,7 +35,7 @@ TEST_F(ContradictionsCommandTest, AViewWithoutATimeIsWarnedOfAndDoesNotHideTheOt
     d.erase(DCM_ContentTime);
   });
   register_study(study_);
-  EXPECT_THAT(result()["warnings"].dump(), HasSubstr("KV_G000: AcquisitionTime (0008,0032) is missing"));
+  EXPECT_THAT(result_of(study_)["warnings"].dump(), HasSubstr("KV_G000: AcquisitionTime (0008,0032) is missing"));
 }
 
 // Whether the couch moved in between nobody knows without its read-outs, which the phantom's X-rays do not have.
@@ -52,7 +47,7 @@ TEST_F(ContradictionsCommandTest, ViewsFarApartWithoutTableReadOutsNeedAReview) 
     std::vector<std::string> arguments = {"--overwrite"};
     arguments.insert(arguments.end(), more.begin(), more.end());
     register_study(study_, arguments);
-    return fmt::format("{} {}", result()["verdict"].get<std::string>(), result()["reasons"].dump());
+    return fmt::format("{} {}", result_of(study_)["verdict"].get<std::string>(), result_of(study_)["reasons"].dump());
   };
   take_second_at("101659");
   EXPECT_EQ(reasons({}), "accepted []");
@@ -61,7 +56,7 @@ TEST_F(ContradictionsCommandTest, ViewsFarApartWithoutTableReadOutsNeedAReview) 
             "review [\"KV_G090 was taken 130 s after KV_G000, more than 120 s: without measured table positions in all "
             "views it is not known whether the table moved (--allow time-span=REASON)\"]");
   EXPECT_EQ(reasons({"--allow", "time-span=the couch stood still"}), "accepted []");
-  EXPECT_THAT(result()["overrides"].dump(), HasSubstr("130 s after KV_G000"));
+  EXPECT_THAT(result_of(study_)["overrides"].dump(), HasSubstr("130 s after KV_G000"));
   const std::filesystem::path site = study_.path().parent_path() / "site.json";
   std::ofstream(site) << R"({"site_file": 1, "name": "S", "sessions": {"views": 2, "quiet_s": 1, "max_span_s": 300}})";
   EXPECT_EQ(reasons({"--site", site.string()}), "accepted []");
@@ -82,7 +77,7 @@ TEST_F(ContradictionsCommandTest, AViewTakenTwiceNeedsAReviewWhereTheTableIsUnkn
     d.put(DCM_AcquisitionTime, "101530");
   });
   EXPECT_EQ(register_study(study_).exit_status, 3);
-  EXPECT_THAT(result()["reasons"].dump(), HasSubstr("AGAIN.dcm show the same view"));
+  EXPECT_THAT(result_of(study_)["reasons"].dump(), HasSubstr("AGAIN.dcm show the same view"));
 }
 
 // What nobody knows is not taken for granted.
@@ -91,7 +86,7 @@ TEST_F(ContradictionsCommandTest, ViewsThatMayBeOfTwoSetupsNeedAReview) {
     const SmallStudy study;
     edit(study.image(1), change);
     register_study(study);
-    return nlohmann::json::parse(std::ifstream(study.output() / "result.json"))["reasons"].dump();
+    return result_of(study)["reasons"].dump();
   };
   EXPECT_THAT(reasons([](DicomItem d) {
                 for (const DcmTagKey& tag : {DCM_AcquisitionTime, DCM_ContentTime}) d.erase(tag);
@@ -115,13 +110,13 @@ TEST_F(ContradictionsCommandTest, ATableThatStandsWhereItStoodDoesNotReplaceTheT
       d.put(DCM_AcquisitionTime, n == 0 ? "1015" : "1601");  // hours apart, without seconds
     });
   EXPECT_EQ(register_study(study_).exit_status, 3);
-  EXPECT_THAT(result()["reasons"].dump(), HasSubstr("so it is not known whether the views show one setup"));
+  EXPECT_THAT(result_of(study_)["reasons"].dump(), HasSubstr("so it is not known whether the views show one setup"));
 }
 
 TEST_F(ContradictionsCommandTest, ViewsOfTwoFractionsNeedAReview) {
   for (const int n : {0, 1}) edit(study_.image(n), [&](DicomItem d) { d.put(DCM_FractionNumber, 6.0 + n); });
   EXPECT_EQ(register_study(study_).exit_status, 3);
-  EXPECT_THAT(result()["reasons"].dump(), HasSubstr("KV_G090 is of fraction 7, KV_G000 of 6"));
+  EXPECT_THAT(result_of(study_)["reasons"].dump(), HasSubstr("KV_G090 is of fraction 7, KV_G000 of 6"));
 }
 
 // The isocenter, in the frame of the CT, tells of a second plan or of a move that no read-out tells.
@@ -134,7 +129,7 @@ TEST_F(ContradictionsCommandTest, ViewsOfTwoIsocentersNeedAReview) {
         d.put(DCM_IsocenterPosition, isocenter_mm);
       });
     register_study(study);
-    return nlohmann::json::parse(std::ifstream(study.output() / "result.json"))["reasons"].dump();
+    return result_of(study)["reasons"].dump();
   };
   EXPECT_THAT(reasons(0.1), testing::Not(HasSubstr("different isocenters")));
   EXPECT_THAT(reasons(2.0), HasSubstr("KV_G090 and KV_G000 have different isocenters"));
@@ -154,7 +149,7 @@ TEST_F(ContradictionsCommandTest, PlaceholdersAreNoTablePosition) {
       });
     edit(study.image(1), [](DicomItem d) { d.put(DCM_AcquisitionTime, "101800"); });
     register_study(study, {"--allow", "planned-geometry=a test"});
-    return nlohmann::json::parse(std::ifstream(study.output() / "result.json"))["reasons"].dump();
+    return result_of(study)["reasons"].dump();
   };
   EXPECT_THAT(reasons(0.0), HasSubstr("without measured table positions in all views"));
   EXPECT_THAT(reasons(99999.0), HasSubstr("without measured table positions in all views"));
@@ -165,23 +160,23 @@ TEST_F(ContradictionsCommandTest, PlaceholdersAreNoTablePosition) {
 TEST_F(ContradictionsCommandTest, ASwitchThatContradictsAReadOutNeedsAReview) {
   const CommandOutcome outcome = register_study(study_, {"--couch-pitch", "1"});
   EXPECT_EQ(outcome.exit_status, 3) << outcome.err;
-  EXPECT_THAT(result()["reasons"].dump(), HasSubstr("--couch-pitch 1 contradicts KV_G000"));
+  EXPECT_THAT(result_of(study_)["reasons"].dump(), HasSubstr("--couch-pitch 1 contradicts KV_G000"));
 }
 
 TEST_F(ContradictionsCommandTest, AnAngleTypedInAgainstTheMeasuredOneNeedsAReviewUnlessAllowed) {
   const std::vector<std::string> typed = {"--gantry-angle", "KV_G000=2"};
   EXPECT_EQ(register_study(study_, typed).exit_status, 3);
-  EXPECT_THAT(result()["reasons"].dump(),
+  EXPECT_THAT(result_of(study_)["reasons"].dump(),
               HasSubstr("--gantry-angle KV_G000=2 contradicts KV_G000: GantryAngle (300A,011E) is 0 (--allow "
                         "planned-geometry=REASON)"));
   register_study(study_, {"--gantry-angle", "KV_G000=2", "--allow", "planned-geometry=a test", "--overwrite"});
-  EXPECT_THAT(result()["reasons"].dump(), testing::Not(HasSubstr("contradicts")));
-  EXPECT_THAT(result()["overrides"].dump(), HasSubstr("(allowed by planned-geometry: a test)"));
+  EXPECT_THAT(result_of(study_)["reasons"].dump(), testing::Not(HasSubstr("contradicts")));
+  EXPECT_THAT(result_of(study_)["overrides"].dump(), HasSubstr("(allowed by planned-geometry: a test)"));
 }
 
 TEST_F(ContradictionsCommandTest, AnIsocenterThatIsNotThePlansNeedsAReview) {
   EXPECT_EQ(register_study(study_, {"--isocenter", "-2.5,38,-410"}).exit_status, 3);
-  EXPECT_THAT(result()["reasons"].dump(), HasSubstr("--isocenter -2.5,38,-410 contradicts the plan"));
+  EXPECT_THAT(result_of(study_)["reasons"].dump(), HasSubstr("--isocenter -2.5,38,-410 contradicts the plan"));
   EXPECT_EQ(register_study(study_, {"--isocenter", "-12.5,38,-410.2", "--overwrite"}).exit_status, 0);
 }
 
@@ -193,7 +188,7 @@ TEST_F(ContradictionsCommandTest, ABeamThatTreatsElsewhereThanItWasImagedNeedsAR
     beam.append_item(DCM_ControlPointSequence).put(DCM_IsocenterPosition, "-2.5\\38\\-410");
   });
   EXPECT_EQ(register_study(study_).exit_status, 3);
-  EXPECT_THAT(result()["reasons"].dump(),
+  EXPECT_THAT(result_of(study_)["reasons"].dump(),
               HasSubstr("no beam that treats has it: that of beam 9 is (-2.5, 38, -410) mm"));
 }
 
@@ -205,7 +200,7 @@ TEST_F(ContradictionsCommandTest, APlanForAnotherTableIsWarnedOf) {
     plan.items(DCM_BeamSequence)[1].items(DCM_ControlPointSequence).front().put(DCM_TableTopEccentricAngle, 5.0);
   });
   EXPECT_EQ(register_study(study_).exit_status, 0);
-  const std::string warnings = result()["warnings"].dump();
+  const std::string warnings = result_of(study_)["warnings"].dump();
   EXPECT_THAT(warnings, HasSubstr("beam 1 of the plan has couch pitch 2.0 degrees, the images 0.0 degrees"));
   EXPECT_THAT(warnings, HasSubstr("beam 2 of the plan has couch angle 5.0 degrees, the images 0.0 degrees"));
   EXPECT_THAT(warnings, testing::Not(HasSubstr("couch roll")));

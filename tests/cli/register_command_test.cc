@@ -18,11 +18,6 @@ using testing::HasSubstr;
 
 class RegisterCommandTest : public testing::Test {
  protected:
-  nlohmann::json result() {
-    std::ifstream file(study_.output() / "result.json");
-    return nlohmann::json::parse(file);
-  }
-
   SmallStudy study_;
 };
 
@@ -73,17 +68,17 @@ TEST_F(RegisterCommandTest, ResultFollowsItsSchema) {
 
 TEST_F(RegisterCommandTest, JsonOnStdoutIsTheResultFile) {
   const CommandOutcome outcome = register_study(study_, {"--json"});
-  EXPECT_EQ(nlohmann::json::parse(outcome.out), result());
+  EXPECT_EQ(nlohmann::json::parse(outcome.out), result_of(study_));
 }
 
 TEST_F(RegisterCommandTest, OneViewIsReviewWithoutDepthAndWithoutRegistrationObject) {
   const CommandOutcome outcome =
       register_study(study_, {"--image", study_.image(0).string(), "--write-reg-for-review"});
   EXPECT_EQ(outcome.exit_status, 3);
-  EXPECT_EQ(result()["verdict"], "review");
-  EXPECT_TRUE(result()["setup_error"]["translation_mm"][2].is_null());  // gantry 0 looks along z
-  EXPECT_FALSE(result()["setup_error"]["translation_mm"][0].is_null());
-  EXPECT_TRUE(result()["couch_shift"]["vertical_mm"].is_null());
+  EXPECT_EQ(result_of(study_)["verdict"], "review");
+  EXPECT_TRUE(result_of(study_)["setup_error"]["translation_mm"][2].is_null());  // gantry 0 looks along z
+  EXPECT_FALSE(result_of(study_)["setup_error"]["translation_mm"][0].is_null());
+  EXPECT_TRUE(result_of(study_)["couch_shift"]["vertical_mm"].is_null());
   EXPECT_FALSE(std::filesystem::exists(study_.output() / "spatial_registration.dcm"));
 }
 
@@ -91,13 +86,13 @@ TEST_F(RegisterCommandTest, WhatNobodyMeasuredIsWrittenAsZeroOnlyOnRequest) {
   const CommandOutcome outcome = register_study(
       study_, {"--image", study_.image(0).string(), "--write-reg-for-review", "--accept-unobservable", "--json"});
   EXPECT_EQ(outcome.exit_status, 3);
-  EXPECT_THAT(result()["overrides"].dump(),
+  EXPECT_THAT(result_of(study_)["overrides"].dump(),
               HasSubstr("which was not measured, is taken as 0 by --accept-unobservable"));
   const std::string written = (study_.output() / "spatial_registration.dcm").string();
   const CommandOutcome checked = run_command({"check", written, "--plan", study_.plan().string(), "--json"});
   const auto shift = nlohmann::json::parse(checked.out)["registrations"][0]["couch_shift"];
   EXPECT_NEAR(shift["vertical_mm"], 0.0, 1e-6);
-  EXPECT_NEAR(shift["lateral_mm"], result()["couch_shift"]["lateral_mm"], 1e-6);
+  EXPECT_NEAR(shift["lateral_mm"], result_of(study_)["couch_shift"]["lateral_mm"], 1e-6);
 }
 
 // A pose in a file, as a person has set it.
@@ -121,8 +116,8 @@ TEST_F(RegisterCommandTest, APoseSetByHandSaysSoEverywhereAndIsForReview) {
   EXPECT_THAT(read_setup_error(study_.output() / "result.json"), PoseNear(truth, 1e-6, 1e-6));
   EXPECT_THAT(outcome.out, HasSubstr("set by hand by jdoe, NOT SEARCHED"));
   EXPECT_THAT(outcome.out, HasSubstr("the pose was set, not searched"));
-  EXPECT_EQ(result()["searched"], false);
-  EXPECT_EQ(result()["start"]["set_by"], "jdoe");
+  EXPECT_EQ(result_of(study_)["searched"], false);
+  EXPECT_EQ(result_of(study_)["start"]["set_by"], "jdoe");
   const DicomFile file = DicomFile::read(study_.output() / "spatial_registration.dcm", DicomFile::Extent::kWhole);
   EXPECT_EQ(file.dataset().text(DCM_ContentLabel), "SETUP_BY_HAND");
   EXPECT_EQ(file.dataset().text(DCM_ContentDescription), "SET BY HAND: REVIEW");
@@ -143,8 +138,8 @@ TEST_F(RegisterCommandTest, ASearchBeginsWhereTheFileSays) {
   const std::filesystem::path before = study_.path() / "before.json";
   std::filesystem::copy_file(study_.output() / "result.json", before);
   EXPECT_EQ(register_study(study_, {"--start", before.string(), "--overwrite"}).exit_status, first.exit_status);
-  EXPECT_TRUE(result()["start"]["set_by"].is_null());
-  EXPECT_EQ(result()["start"]["file"], "before.json");
+  EXPECT_TRUE(result_of(study_)["start"]["set_by"].is_null());
+  EXPECT_EQ(result_of(study_)["start"]["file"], "before.json");
 }
 
 TEST_F(RegisterCommandTest, AStartThatCannotBeOneIsRefused) {
@@ -188,27 +183,27 @@ TEST_F(RegisterCommandTest, ASiteFileDecidesAboutActionAndCouch) {
   const CommandOutcome outcome =
       register_study(study_, {"--site", site.string(), "--anatomy", "head", "--structure", "TARGET"});
   EXPECT_EQ(outcome.exit_status, 3) << outcome.err;
-  EXPECT_EQ(result()["site"]["name"], "Linac 3");
-  if (result()["verdict"] != "rejected") {
-    EXPECT_EQ(result()["action"], "exceeds");
-    EXPECT_EQ(result()["left_over"].back()["at"], "centroid of TARGET");
-    EXPECT_EQ(result()["couch_applied"]["brings_right"], result()["target"]["name"]);
+  EXPECT_EQ(result_of(study_)["site"]["name"], "Linac 3");
+  if (result_of(study_)["verdict"] != "rejected") {
+    EXPECT_EQ(result_of(study_)["action"], "exceeds");
+    EXPECT_EQ(result_of(study_)["left_over"].back()["at"], "centroid of TARGET");
+    EXPECT_EQ(result_of(study_)["couch_applied"]["brings_right"], result_of(study_)["target"]["name"]);
   }
-  EXPECT_FALSE(result()["views"][0]["picture"]["structures"][0]["planned"].empty());
+  EXPECT_FALSE(result_of(study_)["views"][0]["picture"]["structures"][0]["planned"].empty());
   EXPECT_EQ(register_study(study_, {"--overwrite", "--anatomy", "head"}).exit_status, 2);
   EXPECT_EQ(register_study(study_, {"--overwrite", "--site", site.string(), "--anatomy", "pelvis"}).exit_status, 2);
 }
 
 TEST_F(RegisterCommandTest, ReportMakesAllFormatsAgain) {
   register_study(study_);
-  const auto before = result();
+  const auto before = result_of(study_);
   const std::string folder = study_.output().string();
   EXPECT_EQ(run_command({"report", folder}).exit_status, 1);  // nothing is overwritten unasked
   for (const char* name : {"report.txt", "report.pdf", "report.html", "report.csv", "report.dcm", "view1.png"})
     std::filesystem::remove(study_.output() / name);
   const CommandOutcome outcome = run_command({"report", folder, "--overwrite"});
   EXPECT_EQ(outcome.exit_status, 0) << outcome.err;
-  EXPECT_EQ(result(), before);
+  EXPECT_EQ(result_of(study_), before);
   for (const char* name :
        {"report.txt", "report.pdf", "report.html", "report.csv", "report.dcm", "view1.png", "spatial_registration.dcm"})
     EXPECT_TRUE(std::filesystem::exists(study_.output() / name)) << name;
@@ -236,23 +231,24 @@ TEST_F(RegisterCommandTest, AnotherPatientIsNeverAcceptedAndNeverWrittenWhereRej
       register_study(study_, {"--ct", (other.path() / "CT").string(), "--allow", "patient-mismatch=test", "--allow",
                               "for-mismatch=test", "--preset", "fast", "--write-reg-for-review"});
   ASSERT_THAT(outcome.exit_status, testing::AnyOf(3, 4)) << outcome.err;
-  EXPECT_THAT(result()["reasons"].dump(), HasSubstr("gradient correlation"));
+  EXPECT_THAT(result_of(study_)["reasons"].dump(), HasSubstr("gradient correlation"));
   EXPECT_EQ(std::filesystem::exists(study_.output() / "spatial_registration.dcm"), outcome.exit_status == 3);
-  EXPECT_EQ(result()["couch_shift"].is_null(), outcome.exit_status == 4);
+  EXPECT_EQ(result_of(study_)["couch_shift"].is_null(), outcome.exit_status == 4);
 }
 
 TEST_F(RegisterCommandTest, AllowedFindingsAreInTheResult) {
   edit(study_.image(1), [](DicomItem d) { d.put(DCM_AcquisitionTime, "104500"); });
   EXPECT_EQ(register_study(study_, {"--allow", "time-span=phantom does not move"}).exit_status, 0);
-  EXPECT_THAT(result()["overrides"][0].get<std::string>(), HasSubstr("(allowed by time-span: phantom does not move)"));
+  EXPECT_THAT(result_of(study_)["overrides"][0].get<std::string>(),
+              HasSubstr("(allowed by time-span: phantom does not move)"));
 }
 
 TEST_F(RegisterCommandTest, ViewsAreInTheOrderOfTheirLabels) {
   const CommandOutcome outcome =
       register_study(study_, {"--image", study_.image(1).string(), "--image", study_.image(0).string()});
   EXPECT_EQ(outcome.exit_status, 0) << outcome.err;
-  EXPECT_EQ(result()["views"][0]["label"], "KV_G000");
-  EXPECT_EQ(result()["views"][1]["label"], "KV_G090");
+  EXPECT_EQ(result_of(study_)["views"][0]["label"], "KV_G000");
+  EXPECT_EQ(result_of(study_)["views"][1]["label"], "KV_G090");
 }
 
 TEST_F(RegisterCommandTest, LabelsCannotForgeLines) {
@@ -325,12 +321,12 @@ TEST_F(RegisterCommandTest, InspectSaysWhyStructuresAreRefused) {
 
 TEST_F(RegisterCommandTest, FramesOfOneFileAreViewsAsFilesOfTheirOwn) {
   ASSERT_EQ(register_study(study_).exit_status, 0);
-  const nlohmann::json of_files = result();
+  const nlohmann::json of_files = result_of(study_);
   join_images(study_);
   const CommandOutcome outcome = register_study(study_, {"--overwrite", "--write-reg-for-review"});
   // The file does not say when its second frame was taken, and the phantom has no table read-outs.
   EXPECT_EQ(outcome.exit_status, 3) << outcome.err;
-  const nlohmann::json of_frames = result();
+  const nlohmann::json of_frames = result_of(study_);
   EXPECT_EQ(of_frames["setup_error"], of_files["setup_error"]);
   EXPECT_EQ(of_frames["views"][1]["frame"], 2);
   const CommandOutcome checked = run_shell("dciodvfy -new " + (study_.output() / "spatial_registration.dcm").string());
@@ -358,7 +354,7 @@ TEST_F(RegisterCommandTest, NamesInOtherCharacterSetsAreKept) {
 // Old exports begin with the dataset: no 128 bytes, no "DICM", no transfer syntax.
 TEST_F(RegisterCommandTest, FilesWithoutAHeaderAreReadToo) {
   ASSERT_EQ(register_study(study_).exit_status, 0);
-  const nlohmann::json expected = result()["setup_error"];
+  const nlohmann::json expected = result_of(study_)["setup_error"];
   for (const auto& entry : std::filesystem::recursive_directory_iterator(study_.path()))
     if (entry.path().extension() == ".dcm") {
       const std::string file = entry.path().string();
@@ -368,7 +364,7 @@ TEST_F(RegisterCommandTest, FilesWithoutAHeaderAreReadToo) {
     }
   const CommandOutcome again = register_study(study_, {"--overwrite"});
   EXPECT_EQ(again.exit_status, 0) << again.err;
-  EXPECT_EQ(result()["setup_error"], expected);
+  EXPECT_EQ(result_of(study_)["setup_error"], expected);
 }
 
 }  // namespace

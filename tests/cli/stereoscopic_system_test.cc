@@ -223,7 +223,7 @@ class StereoscopicSystemCommandTest : public testing::Test {
     std::ofstream(path, std::ios::trunc) << changed.dump();
     return registered(path.string());
   }
-  static nlohmann::json result() { return nlohmann::json::parse(text_of_file(study_->output() / "result.json")); }
+  static nlohmann::json result() { return result_of(*study_); }
 
   static SmallStudy* study_;
 };

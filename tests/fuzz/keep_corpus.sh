@@ -4,9 +4,10 @@
 set -euo pipefail
 kept=build/fuzz/kept/corpus
 rm -rf "$kept"
-for reader in ct enhanced_ct rt_image rt_plan rt_structures spatial_registration decoder; do
+for program in build/fuzz/tests/fuzz_*; do
+  reader=${program##*/fuzz_}
   mkdir -p "$kept/$reader"
   # Files on which DCMTK's decoders crash end the attempt at these files alone.
-  build/fuzz/tests/fuzz_$reader -merge=1 -timeout=60 -rss_limit_mb=4096 "$kept/$reader" build/fuzz/{seeds,corpus}/$reader
+  "$program" -merge=1 -timeout=60 -rss_limit_mb=4096 "$kept/$reader" build/fuzz/{seeds,corpus}/"$reader"
 done
 tar -C build/fuzz/kept --sort=name --mtime=@0 --owner=0 --group=0 --numeric-owner -cJf tests/fuzz/corpus.tar.xz corpus

@@ -14,7 +14,7 @@
 namespace isoshift {
 namespace {
 
-void read_ct(std::vector<std::filesystem::path> files) {
+void read_ct(const std::vector<std::filesystem::path>& files) {
   Notes notes;
   scan_study({files.front()});
   read_ct_series(files, {{"gaps", "hostile"}}, notes, {});

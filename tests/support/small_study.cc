@@ -3,6 +3,9 @@
 #include <dcmtk/dcmdata/dcuid.h>
 #include <fmt/format.h>
 
+#include <nlohmann/json.hpp>
+
+#include "base/text_file.h"
 #include "io/dicom/decode.h"
 #include "io/dicom/rt_plan.h"
 #include "tests/support/testdata.h"
@@ -105,6 +108,10 @@ CommandOutcome register_study(const SmallStudy& study, const std::vector<std::st
   std::vector<std::string> arguments = {"register", study.path().string(), "-o", study.output().string()};
   arguments.insert(arguments.end(), more.begin(), more.end());
   return run_command(arguments);
+}
+
+nlohmann::json result_of(const SmallStudy& study) {
+  return nlohmann::json::parse(text_of_file(study.output() / "result.json"));
 }
 
 void edit(const std::filesystem::path& path, const std::function<void(DicomItem)>& change) {

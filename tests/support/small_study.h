@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <functional>
+#include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <vector>
 
@@ -49,6 +50,9 @@ std::vector<Eigen::Vector3d> rectangle(const Eigen::Vector3d& center_mm, double 
 
 // isoshift register STUDY -o OUTPUT, with more arguments.
 CommandOutcome register_study(const SmallStudy& study, const std::vector<std::string>& more = {});
+
+// The result.json that this has written.
+nlohmann::json result_of(const SmallStudy& study);
 
 // Puts the second image into the first one's file: two frames, each with its item in the Exposure Sequence.
 void join_images(const SmallStudy& study);
