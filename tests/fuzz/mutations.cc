@@ -1,6 +1,6 @@
 // Reads damaged copies of every kind of file isoshift reads (DicomMutator), or the files that fuzzing has left in the
-// folders ct, enhanced_ct, ... of FOLDER. Every one must be read or refused with Error, within 10 s. Prints what came of
-// them; exits with 1 at the first that did anything else.
+// folders ct, enhanced_ct, ... of FOLDER. Every one must be read or refused with Error, within 10 s. Prints what came
+// of them; exits with 1 at the first that did anything else.
 //
 //   mutations [count=12000] [first seed=1]
 //   mutations FOLDER
