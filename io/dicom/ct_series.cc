@@ -122,6 +122,17 @@ Slice slice_at(const FrameGeometry& geometry, const DicomItem& dataset, const st
   return slice;
 }
 
+// A localizer among the frames is no slice (PS3.3 C.8.15.2.1.1.3).
+void check_frame_types(const DicomItem& dataset, const FunctionalGroups& groups) {
+  for (std::size_t frame = 0; frame < groups.frames(); ++frame)
+    if (const auto item = groups.find(frame, DCM_CTImageFrameTypeSequence))
+      if (const auto type = item->texts(DCM_FrameType); std::ranges::find(type, "LOCALIZER") != type.end())
+        throw Error(
+            fmt::format("{} frame {}: {} says LOCALIZER, expected a slice.\n"
+                        "       Export the volume without its localizer",
+                        dataset.where(), frame + 1, described(DCM_FrameType)));
+}
+
 // One volume of one time: which of several is meant must not be guessed.
 void check_one_volume(const DicomItem& dataset, const FunctionalGroups& groups, const PixelFormat& format) {
   if (groups.frames() != static_cast<std::size_t>(format.frames))
@@ -149,9 +160,10 @@ std::vector<Slice> read_slices_of(const std::filesystem::path& path) {
   check_size(dataset.where(), format, format.frames);
   const FunctionalGroups groups(dataset);
   const bool is_enhanced = groups.frames() > 0;
-  if (is_enhanced)
+  if (is_enhanced) {
     check_one_volume(dataset, groups, format);
-  else if (format.frames != 1)
+    check_frame_types(dataset, groups);
+  } else if (format.frames != 1)
     throw Error(fmt::format("{}: {} is {}, expected 1 for a CT Image", dataset.where(), described(DCM_NumberOfFrames),
                             format.frames));
   std::vector<Slice> slices;

@@ -75,12 +75,18 @@ std::optional<std::pair<int, int>> jpeg_size(std::span<const Uint8> stream) {
 
 bool is_jpeg2000(E_TransferSyntax syntax) { return syntax == EXS_JPEG2000LosslessOnly || syntax == EXS_JPEG2000; }
 
+// The compressed pixels: an offset table, then the fragments of all frames (PS3.5 A.4); null where there are none.
+DcmPixelSequence* fragments_of(DcmPixelData& pixels, const DcmDataset& dataset) {
+  DcmPixelSequence* fragments = nullptr;
+  const bool is_found = pixels.getEncapsulatedRepresentation(dataset.getOriginalXfer(), nullptr, fragments).good();
+  return is_found ? fragments : nullptr;
+}
+
 // The compressed bytes of one frame, put together from their fragments (PS3.5 A.4); empty where they cannot be told
 // from those of other frames.
-std::vector<Uint8> frame_stream(DcmPixelData& pixels, const DcmDataset& dataset, int frame, int frames) {
-  DcmPixelSequence* fragments = nullptr;
+std::vector<Uint8> frame_stream(DcmPixelSequence* fragments, int frame, int frames) {
   Uint32 index = 0, end = 0;
-  if (pixels.getEncapsulatedRepresentation(dataset.getOriginalXfer(), nullptr, fragments).bad() ||
+  if (fragments == nullptr ||
       DcmCodec::determineStartFragment(static_cast<Uint32>(frame), frames, fragments, index).bad())
     return {};
   end = static_cast<Uint32>(fragments->card());
@@ -96,6 +102,14 @@ std::vector<Uint8> frame_stream(DcmPixelData& pixels, const DcmDataset& dataset,
     stream.insert(stream.end(), bytes, bytes + fragment->getLength());
   }
   return stream;
+}
+
+// A frame in RLE is one fragment (PS3.5 A.4.2).
+void expect_rle_frames(DcmPixelSequence* fragments, const PixelFormat& format, const std::string& where) {
+  const unsigned long found = fragments == nullptr || fragments->card() == 0 ? 0 : fragments->card() - 1;
+  if (found != static_cast<unsigned long>(format.frames))
+    throw Error(fmt::format("{}: {} holds {} frames in RLE, expected {}", where, described(DCM_PixelData), found,
+                            format.frames));
 }
 
 // The header of a frame in RLE: how many segments there are, one for each byte of a pixel, and where they begin (PS3.5
@@ -220,7 +234,9 @@ std::vector<std::uint8_t> decompressed_frame(const DicomFile& file, int frame) {
     throw Error(fmt::format("{}: {} is missing", where, described(DCM_PixelData)));
   auto& pixels = dynamic_cast<DcmPixelData&>(*element);
   const E_TransferSyntax syntax = dataset.getOriginalXfer();
-  const std::vector<Uint8> stream = frame_stream(pixels, dataset, frame, format.frames);
+  DcmPixelSequence* fragments = fragments_of(pixels, dataset);
+  if (syntax == EXS_RLELossless) expect_rle_frames(fragments, format, where);
+  const std::vector<Uint8> stream = frame_stream(fragments, frame, format.frames);
   if (is_jpeg2000(syntax)) return decoded_jpeg2000(stream, format, where);
   if (syntax == EXS_RLELossless)
     expect_rle_header(stream, format, where);

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <functional>
+#include <utility>
 
 namespace isoshift {
 namespace {
@@ -118,6 +119,11 @@ JawOpenings read_jaws(const std::vector<DicomItem>& positions, const std::vector
       openings.problems.push_back(
           fmt::format("{}: {} is left out: {}", item.where(), type.empty() ? "a beam limiting device" : type, problem));
   }
+  for (const auto& [axis, jaws] : {std::pair("X", openings.x), std::pair("Y", openings.y)})
+    if (jaws && jaws->to_mm <= jaws->from_mm)
+      openings.problems.push_back(fmt::format("{}: the jaws along {} are closed ({} to {} mm), so no field is drawn",
+                                              positions.front().where(), axis, rounded_mm(jaws->from_mm),
+                                              rounded_mm(jaws->to_mm)));
   return openings;
 }
 

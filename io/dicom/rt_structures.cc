@@ -72,6 +72,18 @@ void read_contours(const DicomItem& dataset, std::vector<Structure>& structures)
   }
 }
 
+// A structure may have several observations (PS3.3 C.8.8.8), which agree on what it is.
+void read_observation(const DicomItem& observation, std::vector<Structure>& structures) {
+  const std::string type = observation.text(DCM_RTROIInterpretedType).value_or("");
+  Structure& structure = referred_structure(structures, observation);
+  if (type.empty()) return;
+  if (!structure.interpreted_type.empty() && structure.interpreted_type != type)
+    throw Error(fmt::format("{}: {} of structure {} \"{}\" is {}, and {} in an earlier item", observation.where(),
+                            described(DCM_RTROIInterpretedType), structure.number, structure.name, type,
+                            structure.interpreted_type));
+  structure.interpreted_type = type;
+}
+
 bool equal_but_for_case(std::string_view one, std::string_view other) {
   const auto lower = [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c + ('a' - 'A')) : c; };
   return std::ranges::equal(one, other, {}, lower, lower);
@@ -102,8 +114,7 @@ RtStructures read_rt_structures(const std::filesystem::path& path) {
   }
   read_contours(dataset, read.structures);
   for (const DicomItem& observation : dataset.items(DCM_RTROIObservationsSequence))
-    referred_structure(read.structures, observation).interpreted_type =
-        observation.text(DCM_RTROIInterpretedType).value_or("");
+    read_observation(observation, read.structures);
   return read;
 }
 

@@ -327,6 +327,15 @@ TEST_F(CtSeriesTest, OfSeveralStacksNoneIsChosen) {
   EXPECT_THAT(error_of_reading(), testing::HasSubstr("holds 2 volumes (stack 1 at time 1, stack 2 at time 1)"));
 }
 
+TEST_F(CtSeriesTest, ALocalizerAmongTheFramesIsRefused) {
+  write_even(6);
+  convert_to_enhanced([](DicomItem d) {
+    DicomItem frame = d.items(DCM_PerFrameFunctionalGroupsSequence)[2];
+    frame.append_item(DCM_CTImageFrameTypeSequence).put(DCM_FrameType, "ORIGINAL\\PRIMARY\\LOCALIZER\\NONE");
+  });
+  EXPECT_THAT(error_of_reading(), testing::HasSubstr("frame 3: FrameType (0008,9007) says LOCALIZER"));
+}
+
 TEST_F(CtSeriesTest, PartOfAConcatenationIsRefused) {
   write_even(6);
   convert_to_enhanced([](DicomItem d) {

@@ -18,6 +18,7 @@
 #include "io/dicom/jpeg2000.h"
 #include "tests/support/command.h"
 #include "tests/support/small_study.h"
+#include "tests/support/testdata.h"
 
 namespace isoshift::decode_test {
 namespace {
@@ -324,6 +325,15 @@ TEST_F(DecodeTest, ASegmentOfRleBehindItsFrameIsRefused) {
         [&] { decompressed_frame(DicomFile::read(compressed, DicomFile::Extent::kWhole), 0); },
         ThrowsMessage<Error>(HasSubstr("the header of a frame in RLE is damaged: expected 2 segments, from byte 64")))
         << at;
+  }
+}
+
+TEST_F(DecodeTest, RleOfAnotherNumberOfFramesIsRefused) {
+  for (const char* number : {"1", "2", "99"}) {
+    const DicomFile file = DicomFile::read(testdata("enhanced/rle.dcm"), DicomFile::Extent::kWhole);
+    file.dataset().put(DCM_NumberOfFrames, number);
+    EXPECT_THAT([&] { decompressed_frame(file, 0); },
+                ThrowsMessage<Error>(HasSubstr(fmt::format("frames in RLE, expected {}", number))));
   }
 }
 

@@ -102,6 +102,16 @@ TEST_F(JawsTest, ClosedLeavesAtTheEndsAreNotOpen) {
                                                 Eigen::Vector2d(20, 10), Eigen::Vector2d(20, -10)));
 }
 
+TEST_F(JawsTest, ClosedJawsAreNamedAndDrawNoField) {
+  const JawOpenings jaws = of_exposure([](DicomItem exposure) {
+    add_device(exposure, DCM_BeamLimitingDeviceSequence, "ASYMX", {5, 5});
+    add_device(exposure, DCM_BeamLimitingDeviceSequence, "Y", {-40, 40});
+  });
+  EXPECT_THAT(outline_of(jaws), IsEmpty());
+  EXPECT_THAT(problem(), HasSubstr("the jaws along X are closed (5 to 5 mm), so no field is drawn"));
+  EXPECT_THAT(problem(), HasSubstr(study_.image(0).string()));
+}
+
 TEST_F(JawsTest, LeavesWithoutBoundariesAreLeftOutAndNamed) {
   const JawOpenings openings = of_leaves(kLeavesMm, {});
   EXPECT_EQ(described(openings), "X -25 to 25 mm");

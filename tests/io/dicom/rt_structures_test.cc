@@ -150,6 +150,23 @@ TEST_F(RtStructuresTest, NumbersThatDoNotTellWhatIsMeantAreRefused) {
   EXPECT_THAT(error_of_reading(), HasSubstr("ROINumber (3006,0022) is 1, as in an earlier item"));
 }
 
+TEST_F(RtStructuresTest, ObservationsOfOneStructureMustAgree) {
+  draw(study_, {{"Spine", {square_}}});
+  const auto observe = [&](const char* type) {
+    edit(study_.structures(), [type](DicomItem d) {
+      DicomItem observation = d.append_item(DCM_RTROIObservationsSequence);
+      observation.put(DCM_ReferencedROINumber, 1.0);
+      observation.put(DCM_RTROIInterpretedType, type);
+    });
+  };
+  observe("");
+  observe("ORGAN");
+  EXPECT_EQ(read_rt_structures(study_.structures()).structures.front().interpreted_type, "ORGAN");
+  observe("EXTERNAL");
+  EXPECT_THAT(error_of_reading(), HasSubstr("RTROIInterpretedType (3006,00A4) of structure 1 \"Spine\" is EXTERNAL, "
+                                            "and ORGAN in an earlier item"));
+}
+
 TEST_F(RtStructuresTest, MoreStructuresThanAnyFileNeedsAreRefused) {
   draw(study_, std::vector<DrawnStructure>(1001, {"Spine", {}}));
   EXPECT_THAT(error_of_reading(), HasSubstr("more than 1000 structures"));
