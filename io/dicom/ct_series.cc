@@ -362,6 +362,21 @@ Volume<float> assembled(std::vector<Slice>& slices, const Eigen::Matrix3d& axes,
   return resampled(slices, positions_mm, patient_from_voxel, count, spacing_mm);
 }
 
+// CT-1: what the slices are. Localizers are left aside before, where they say so (StudyFiles).
+void warn_of_image_type(const DicomItem& header, Notes& notes) {
+  const std::vector<std::string> types = header.texts(DCM_ImageType);
+  if (types.size() < 3)
+    notes.warnings.push_back(
+        fmt::format("{}: {} has {} values, expected at least 3, of which the third tells a slice "
+                    "from a localizer.\n       The file is taken as a slice",
+                    header.where(), described(DCM_ImageType), types.size()));
+  for (const std::string& type : types)
+    if (type == "MIP" || type == "MAX_IP" || type == "MINIP" || type == "MIN_IP")
+      notes.warnings.push_back(
+          fmt::format("the CT holds the largest or least of several values ({} says {}), not those of one moment",
+                      described(DCM_ImageType), type));
+}
+
 }  // namespace
 
 CtSeries read_ct_series(std::span<const std::filesystem::path> files, const Allowances& allowed, Notes& notes,
@@ -378,13 +393,7 @@ CtSeries read_ct_series(std::span<const std::filesystem::path> files, const Allo
   series.body_part_examined = header.text(DCM_BodyPartExamined).value_or("");
   series.patient_position = header.text(DCM_PatientPosition).value_or("");
   series.acquired_on = header.text(DCM_AcquisitionDate).value_or(header.text(DCM_SeriesDate).value_or(""));
-  for (const std::string& type : header.texts(DCM_ImageType))
-    if (type == "MIP" || type == "MAX_IP" || type == "MINIP" || type == "MIN_IP")
-      notes.warnings.push_back(
-          fmt::format("the CT holds the largest or least of several values ({} says {}), not those of "
-                      "one moment",
-                      described(DCM_ImageType), type));
-
+  warn_of_image_type(header, notes);
   std::vector<Slice> slices = read_slices(files, progress);
   if (std::ranges::any_of(slices, &Slice::is_lossy))
     notes.warnings.push_back("the CT has been compressed with loss (LossyImageCompression is 01)");

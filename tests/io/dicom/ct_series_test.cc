@@ -28,6 +28,7 @@ class CtSeriesTest : public testing::Test {
     d.put(DCM_SOPClassUID, "1.2.840.10008.5.1.4.1.1.2");
     d.put(DCM_SOPInstanceUID, fmt::format("1.2.3.{}", k + 1));
     d.put(DCM_StudyInstanceUID, "1.2");
+    d.put(DCM_ImageType, "ORIGINAL\\PRIMARY\\AXIAL");
     d.put(DCM_SeriesInstanceUID, "1.2.3");
     d.put(DCM_FrameOfReferenceUID, "1.2.4");
     d.put(DCM_ImagePositionPatient, std::span(position.data(), 3));
@@ -101,6 +102,7 @@ class CtSeriesTest : public testing::Test {
     shared.append_item(DCM_PixelMeasuresSequence).put(DCM_PixelSpacing, "0.5\\0.25");
     d.put(DCM_SOPClassUID, "1.2.840.10008.5.1.4.1.1.2.1");
     d.put(DCM_SOPInstanceUID, "1.2.3.99");
+    d.put(DCM_ImageType, "ORIGINAL\\PRIMARY\\VOLUME\\NONE");
     d.put(DCM_StudyInstanceUID, "1.2.5");
     d.put(DCM_SeriesInstanceUID, "1.2.3");
     d.put(DCM_FrameOfReferenceUID, "1.2.4");
@@ -433,6 +435,13 @@ TEST_F(CtSeriesTest, AProjectionOfSeveralPhasesIsWarnedOf) {
   edit_all([](DicomItem d) { d.put(DCM_ImageType, "DERIVED\\SECONDARY\\MIP"); });
   read();
   EXPECT_THAT(notes_.warnings, testing::ElementsAre(testing::HasSubstr("ImageType (0008,0008) says MIP")));
+}
+
+TEST_F(CtSeriesTest, ASliceThatDoesNotSayWhatItIsIsWarnedOf) {
+  write_even(6);
+  edit_all([](DicomItem d) { d.put(DCM_ImageType, "ORIGINAL\\PRIMARY"); });
+  read();
+  EXPECT_THAT(notes_.warnings, testing::ElementsAre(testing::HasSubstr("ImageType (0008,0008) has 2 values")));
 }
 
 TEST_F(CtSeriesTest, CompressionWithLossIsWarnedOf) {
