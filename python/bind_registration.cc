@@ -84,7 +84,13 @@ SetupResult register_for_python(const LoadedStudy& loaded, RegisterOptions optio
   SharedWork none;
   Observer nobody;
   const py::gil_scoped_release released;
-  const std::optional<SiteRules> site = chosen_site(named_site(options.site), options.anatomy);
+  const std::optional<SiteFile> site_file = named_site(options.site);
+  if (site_file && max_span_s_of(site_file) != loaded.max_span_s)
+    throw UsageError(
+        fmt::format("the site file allows {} s between X-rays (max_span_s), and the study was checked for {} s: name "
+                    "the site file in load_study(), too",
+                    max_span_s_of(site_file), loaded.max_span_s));
+  const std::optional<SiteRules> site = chosen_site(site_file, options.anatomy);
   SetupResult result = register_loaded(loaded.study, options, site, std::move(start), none, nobody);
   result.seconds_load = loaded.seconds;
   result.seconds_total = loaded.seconds + watch.seconds();
@@ -122,7 +128,9 @@ void bind_result(py::module_& module) {
       .def_property_readonly(
           "verdict", [](const SetupResult& result) { return std::string(to_string(result.verdict)); },
           "accepted, review or rejected.")
-      .def_readonly("reasons", &SetupResult::reasons, "Why the verdict is not accepted.")
+      .def_property_readonly(
+          "reasons", [](const SetupResult& result) { return texts_of(result.reasons); },
+          "Why the verdict is not accepted.")
       .def_property_readonly(
           "setup_error", [](const SetupResult& result) { return matrix_of(result.setup_error); },
           "Where the patient lies against the plan, shape (4, 4): anatomy planned at p is found at R p + t; room (IEC "

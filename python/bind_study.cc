@@ -6,6 +6,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <variant>
 
 #include "base/error.h"
@@ -15,6 +16,7 @@
 #include "io/study/study.h"
 #include "python/bindings.h"
 #include "workflow/observer.h"
+#include "workflow/register/setup_result_of.h"
 #include "workflow/register/study_options.h"
 
 namespace isoshift::python {
@@ -39,12 +41,14 @@ std::vector<std::string> allowances(const std::map<std::string, std::string>& al
   return texts;
 }
 
-std::shared_ptr<LoadedStudy> load_study_for_python(const StudyOptions& options) {
+std::shared_ptr<LoadedStudy> load_study_for_python(StudyOptions options, const std::filesystem::path& site) {
+  options.max_span_s = max_span_s_of(named_site(site));
   auto loaded = std::make_shared<LoadedStudy>();
   Observer nobody;
   const Stopwatch watch;
   loaded->study = load(options, loaded->notes, nobody);
   loaded->seconds = watch.seconds();
+  loaded->max_span_s = options.max_span_s;
   return loaded;
 }
 
@@ -151,7 +155,7 @@ void bind_study(py::module_& module) {
          const std::map<std::string, double>& gantry_angles_deg, std::optional<double> couch_angle_deg,
          std::optional<double> couch_pitch_deg, std::optional<double> couch_roll_deg, std::optional<double> sad_mm,
          std::optional<double> sid_mm, const std::vector<double>& rt_image_position, bool assume_centered,
-         const std::map<std::string, std::string>& allow) {
+         const std::map<std::string, std::string>& allow, const std::filesystem::path& site) {
         StudyOptions options;
         options.parts = {.study = folder,
                          .session = {.name = session, .date = date, .fraction = fraction, .is_latest = latest},
@@ -174,7 +178,7 @@ void bind_study(py::module_& module) {
         options.assume_centered = assume_centered;
         options.allow = allowances(allow);
         const py::gil_scoped_release released;
-        return load_study_for_python(options);
+        return load_study_for_python(std::move(options), site);
       },
       py::arg("folder") = "", py::kw_only(), py::arg("ct") = Paths(), py::arg("images") = Paths(), py::arg("plan") = "",
       py::arg("structures") = "", py::arg("session") = "", py::arg("date") = "", py::arg("fraction") = py::none(),
@@ -183,11 +187,11 @@ void bind_study(py::module_& module) {
       py::arg("gantry_angles_deg") = std::map<std::string, double>(), py::arg("couch_angle_deg") = py::none(),
       py::arg("couch_pitch_deg") = py::none(), py::arg("couch_roll_deg") = py::none(), py::arg("sad_mm") = py::none(),
       py::arg("sid_mm") = py::none(), py::arg("rt_image_position") = std::vector<double>(),
-      py::arg("assume_centered") = false, py::arg("allow") = std::map<std::string, std::string>(),
+      py::arg("assume_centered") = false, py::arg("allow") = std::map<std::string, std::string>(), py::arg("site") = "",
       "Read an exported study. What files lack is never guessed: the arguments supply it, as the flags of isoshift "
       "register. ct, images: a path or a list of paths. allow: what a failed check forbids, by its key, with the "
-      "reason. Raises Error naming file, attribute "
-      "and what was found.");
+      "reason. site: a site file, whose max_span_s says how far X-rays may be apart in time; register() takes the same "
+      "one. Raises Error naming file, attribute and what was found.");
 }
 
 }  // namespace isoshift::python

@@ -23,7 +23,8 @@ namespace py = pybind11;
 struct LoadedStudy {
   Study study;
   Notes notes;
-  double seconds = 0.0;  // that took
+  double seconds = 0.0;     // that took
+  double max_span_s = 0.0;  // between its views, by which it was checked
 };
 
 // Texts may hold the names of files, whose bytes need not be UTF-8: what is not is written as \\xNN.

@@ -80,8 +80,11 @@ struct SetupResult : Registration {
   };
   std::optional<Machine> machine;        // the machine profile that was applied
   std::string ct_series_uid, ct_sha256;  // of all its slices' files
-  std::string plan_uid, plan_class_uid;  // empty: there was no plan
-  std::string spatial_registration_uid;  // empty: none was written
+  // Nothing in these two: made by a version of isoshift that did not say.
+  std::optional<std::string> ct_frame_uid;       // FrameOfReferenceUID
+  std::optional<std::string> structure_set_uid;  // empty: there was none
+  std::string plan_uid, plan_class_uid;          // empty: there was no plan
+  std::string spatial_registration_uid;          // empty: none was written
   std::vector<std::string> overrides, warnings, left_aside;
 };
 

@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "geometry/patient_setup.h"
@@ -10,9 +11,11 @@
 
 namespace isoshift {
 
+constexpr std::string_view kIsocenterSurroundings = "the isocenter's surroundings";  // the target where no structure is
+
 // Places are where they were planned: mm from the isocenter, IEC 61217 fixed.
 struct Target {
-  std::string name;       // of the structure, or "the isocenter's surroundings"
+  std::string name;       // of the structure, or kIsocenterSurroundings and how far they reach
   std::string chosen_by;  // in words: "dose reference 1 of the plan", "--target"
   std::string surrogate;  // what of it X-rays show, in words: "bone within 20 mm"; empty: not looked for
   Eigen::Vector3d center_room_mm = Eigen::Vector3d::Zero();

@@ -71,6 +71,20 @@ void write_transform(const CheckedRegistration& checked, const std::filesystem::
   write_text(path, itk_transform(*matrix));
 }
 
+// Of a plan with several isocenters --isocenter names one.
+void check_is_planned(const Eigen::Vector3d& isocenter_mm, const RtPlan& plan) {
+  constexpr double kSamePlaceMm = 0.01;
+  const RtPlan::Beam* other = nullptr;
+  for (const RtPlan::Beam& beam : plan.beams) {
+    if (!beam.isocenter_patient_mm) continue;
+    if ((*beam.isocenter_patient_mm - isocenter_mm).norm() <= kSamePlaceMm) return;
+    other = &beam;
+  }
+  if (other != nullptr)
+    throw UsageError(fmt::format("--isocenter ({:.3f}) contradicts the plan, whose isocenter is ({:.3f}): give one",
+                                 fmt::join(isocenter_mm, ", "), fmt::join(*other->isocenter_patient_mm, ", ")));
+}
+
 // What the switches say, else the plan; nothing where neither says anything.
 std::optional<PlannedSetup> planned_setup(const CheckOptions& options) {
   PlannedSetup setup = {.couch_angle_deg = options.couch_angle_deg,
@@ -82,16 +96,12 @@ std::optional<PlannedSetup> planned_setup(const CheckOptions& options) {
   if (!options.patient_position.empty()) position = options.patient_position;
   if (!options.plan.empty()) {
     setup.plan = read_rt_plan(options.plan);
-    const Eigen::Vector3d planned_mm = common_isocenter(*setup.plan, setup.plan->beams);
     const auto planned_position = common_patient_position(*setup.plan, setup.plan->beams);
-    constexpr double kSamePlaceMm = 0.01;
-    if (isocenter && (*isocenter - planned_mm).norm() > kSamePlaceMm)
-      throw UsageError(fmt::format("--isocenter ({:.3f}) contradicts the plan, whose isocenter is ({:.3f}): give one",
-                                   fmt::join(*isocenter, ", "), fmt::join(planned_mm, ", ")));
+    if (!isocenter) isocenter = common_isocenter(*setup.plan, setup.plan->beams);
+    check_is_planned(*isocenter, *setup.plan);
     if (position && planned_position && *position != *planned_position)
       throw UsageError(fmt::format("--patient-position {} contradicts the plan, which says {}: give one", *position,
                                    *planned_position));
-    isocenter = planned_mm;
     if (!position) position = planned_position;
   }
   if (!isocenter && !position) return std::nullopt;

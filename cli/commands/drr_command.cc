@@ -46,6 +46,7 @@ void run_drr(const DrrOptions& options, Console& console) {
   const auto renderer = make_renderer(options.rendering.kind(), study.ct->hu, options.rendering.model(),
                                       beams_of(study), options.rendering.options());
   const std::array pose = {setup_error * study.planned_room_from_patient};
+  notes.warnings.insert(notes.warnings.end(), study.doubts.begin(), study.doubts.end());
   print_warnings(notes.warnings, console);
 
   std::string listing = fmt::format("rendered by {} on {}", to_string(renderer->kind()), renderer->device());

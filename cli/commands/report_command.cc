@@ -38,7 +38,11 @@ void run_report(const ReportOptions& options, Console& console) {
   SetupResult report = read_result(options.result);
   report.site = chosen_site(named_site(options.site), options.anatomy, report.site);
   check_target_is_the_sites(report, options);
-  OutputFolder output(options.output.empty() ? options.result : options.output, options.overwrite);
+  // A result may be replaced by its own report, but by nothing that takes the place of a folder around it.
+  const std::filesystem::path place = options.output.empty() ? options.result : options.output;
+  std::vector<std::filesystem::path> inputs = {options.site};
+  if (std::error_code none; !std::filesystem::equivalent(place, options.result, none)) inputs.push_back(options.result);
+  OutputFolder output(place, options.overwrite, inputs);
   write_result(report, output.path());
   if (options.site.empty())  // nothing in it has changed
     std::filesystem::copy_file(options.result / kResultFile, output.path() / kResultFile,

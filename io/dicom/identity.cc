@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cctype>
 #include <string_view>
 
 #include "base/error.h"
@@ -79,6 +80,17 @@ void make_writable(Identity& identity, const std::string& where, Notes& notes) {
         fmt::format("{}: {} is not as DICOM allows, and left out of what is written", where, described(tag)));
     (identity.*member).clear();
   }
+}
+
+std::string comparable_name(std::string name) {
+  name.erase(name.find_last_not_of("^ ") + 1);
+  std::ranges::transform(name, name.begin(), [](unsigned char c) { return std::tolower(c); });
+  return name;
+}
+
+std::string comparable_date(std::string date) {
+  std::erase(date, '.');
+  return date;
 }
 
 void put_identity(DicomItem& dataset, const Identity& identity) {

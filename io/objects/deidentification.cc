@@ -45,7 +45,8 @@ const Replaced kReplacedTexts[] = {
     {DCM_TreatmentMachineName, "Machine"},
     {DCM_RTImageLabel, "Image"},
     {DCM_RTPlanLabel, "Plan"},
-    {DCM_StructureSetLabel, "Structure set"},
+    {DCM_StructureSetLabel, "Structures"},
+    {DCM_StackID, "Stack"},
     {DCM_ROIName, "Structure"},
     {DCM_BeamName, "Beam"},
     {DCM_ContentLabel, "CONTENT"},
@@ -116,8 +117,8 @@ bool is_kept(const DcmTagKey& tag, std::string_view uid) {
 }
 
 // Beside them all groups are removed, that of the file meta information too, which is made anew.
-constexpr std::array<Uint16, 12> kKeptGroups = {0x0008, 0x0018, 0x0020, 0x0028, 0x0070, 0x3002,
-                                                0x3004, 0x3006, 0x3008, 0x300A, 0x300C, 0x300E};
+constexpr std::array<Uint16, 13> kKeptGroups = {0x0008, 0x0018, 0x0020, 0x0028, 0x0070, 0x3002, 0x3004,
+                                                0x3006, 0x3008, 0x300A, 0x300C, 0x300E, 0x5200};
 const DcmTagKey kKeptOfOtherGroups[] = {DCM_PurposeOfReferenceCodeSequence, DCM_ConceptNameCodeSequence};
 
 bool is_among(std::span<const DcmTagKey> tags, const DcmTagKey& tag) { return std::ranges::count(tags, tag) > 0; }

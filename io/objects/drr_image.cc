@@ -16,6 +16,16 @@ namespace {
 
 constexpr double kLineIntegralPerStored = 0.001;
 
+// The beginning of a text in UTF-8, whole characters only.
+std::string first_characters(const std::string& text, std::size_t count) {
+  std::size_t end = 0;
+  for (std::size_t found = 0; end < text.size(); ++end) {
+    const bool begins_one = (static_cast<unsigned char>(text[end]) & 0xC0) != 0x80;
+    if (begins_one && found++ == count) break;
+  }
+  return text.substr(0, end);
+}
+
 void put_general(DicomItem dataset, const Study& study, std::size_t index, const std::string& series_instance_uid) {
   put_header(dataset, {.identity = study.ct->identity,
                        .sop_class_uid = UID_RTImageStorage,
@@ -74,7 +84,7 @@ void write_drr_image(const Study& study, std::size_t index, const Image<float>& 
   DicomFile file;
   DicomItem dataset = file.dataset();
   put_general(dataset, study, index, series_instance_uid);
-  dataset.put(DCM_RTImageLabel, image.label.substr(0, 16));
+  dataset.put(DCM_RTImageLabel, first_characters(image.label, 16));
   dataset.put(DCM_RTImageDescription, is_as_planned ? "DRR, patient as planned" : "DRR, patient off plan");
   dataset.put(DCM_DerivationDescription, fmt::format("DRR of the planning CT as {} should have seen it", image.label));
   dataset.put(DCM_FrameOfReferenceUID, is_as_planned ? study.ct->frame_of_reference_uid : new_uid());

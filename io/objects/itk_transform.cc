@@ -109,6 +109,8 @@ Eigen::Isometry3d read_itk_transform(const std::filesystem::path& path) {
   const std::string name = path.string();
   const Written written = written_in(path);
   const std::vector<double>& numbers = written.parameters;
+  if (const std::size_t count = written.fixed_parameters.size(); count == 1 || count == 2)
+    throw Error(fmt::format("{}: has {} FixedParameters, expected the 3 of a center", name, count));
   const auto expect = [&](std::size_t count) {
     if (numbers.size() != count)
       throw Error(fmt::format("{}: {} has {} parameters, expected {}", name, written.kind, numbers.size(), count));

@@ -10,16 +10,12 @@
 #include <vector>
 
 #include "io/dicom/dicom_dataset.h"
+#include "io/dicom/identity.h"
 
 namespace isoshift {
 namespace {
 
 bool is_of_word(char c) { return std::isalnum(static_cast<unsigned char>(c)) != 0; }
-
-std::string in_small_letters(std::string text) {
-  std::ranges::transform(text, text.begin(), [](unsigned char c) { return std::tolower(c); });
-  return text;
-}
 
 std::string text_of(std::chrono::year_month_day day, std::string_view separator) {
   return fmt::format("{:04}{}{:02}{}{:02}", static_cast<int>(day.year()), separator, static_cast<unsigned>(day.month()),
@@ -44,6 +40,10 @@ Pseudonyms::Pseudonyms() {
   days_ = std::uniform_int_distribution(1, 3650)(random);
 }
 
+void Pseudonyms::stands_for(const std::string& original, const std::string& by) {
+  if (!original.empty()) originals_.try_emplace(original, by);
+}
+
 std::string Pseudonyms::uid(const std::string& original) {
   std::string& known = uids_[original];
   if (known.empty()) known = new_uid();
@@ -60,7 +60,7 @@ std::string Pseudonyms::text(std::string_view kind, const std::string& original)
 }
 
 std::string Pseudonyms::patient_name(const std::string& original) {
-  const std::string known = text("Patient", in_small_letters(original));
+  const std::string known = text("Patient", comparable_name(original));
   stands_for(original, known);
   return known;
 }
@@ -79,7 +79,7 @@ std::string Pseudonyms::patient_id(const std::string& original, const std::strin
 
 std::string Pseudonyms::birth_date(const std::string& original) {
   constexpr std::chrono::year_month_day kFirst(std::chrono::year(1850) / 1 / 1);
-  std::string& known = birth_dates_[original];
+  std::string& known = birth_dates_[comparable_date(original)];
   if (known.empty()) known = text_of(std::chrono::sys_days(kFirst) + std::chrono::days(birth_dates_.size() - 1), "");
   stands_for(original, known);
   return known;
@@ -115,8 +115,25 @@ std::string Pseudonyms::in(std::string sentence) const {
   std::vector<std::pair<std::string_view, std::string_view>> all(originals_.begin(), originals_.end());
   std::ranges::sort(all, std::greater(), [](const auto& pair) { return std::pair(pair.first.size(), pair.first); });
   for (const auto& [original, by] : all)
-    if (original.size() >= kShortest) replace_word(sentence, original, by);
-  return sentence;
+    if (original.size() >= kShortest)
+      replace_word(sentence, original, by);
+    else
+      replace_word(sentence, fmt::format("\"{}\"", original), fmt::format("\"{}\"", by));
+  return with_moved_dates(sentence);
+}
+
+// "20260301", "2026-03-01 10:15:00": digits that are no part of a longer number or UID.
+std::string Pseudonyms::with_moved_dates(const std::string& sentence) const {
+  static const std::regex written(
+      "(^|[^0-9A-Za-z.+-])((?:19|20)[0-9]{6}|(?:19|20)[0-9]{2}([.-])[0-9]{2}\\3[0-9]{2})(?![0-9A-SU-Za-z]|[.-][0-9])");
+  std::string moved;
+  auto rest = sentence.begin();
+  for (std::sregex_iterator found(sentence.begin(), sentence.end(), written), end; found != end; ++found) {
+    const std::string to = date(found->str(2));
+    moved.append(rest, (*found)[2].first).append(to.empty() ? found->str(2) : to);
+    rest = (*found)[2].second;
+  }
+  return moved.append(rest, sentence.end());
 }
 
 }  // namespace isoshift

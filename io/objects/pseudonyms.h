@@ -18,7 +18,7 @@ class Pseudonyms {
   // "Structure 3" for the third of that kind.
   std::string text(std::string_view kind, const std::string& original);
 
-  // "Patient 1": names that differ only in the case of letters are the same.
+  // "Patient 1" for all names that comparable_name() makes the same.
   std::string patient_name(const std::string& original);
 
   // "ANON 1": one ID of two issuers is of two patients; an ID without an issuer is of the first one that was met.
@@ -33,13 +33,19 @@ class Pseudonyms {
   std::string date(const std::string& original) const;
 
   // Anything else that in() replaces, such as the name of a file. Of several pseudonyms the first counts there.
-  void stands_for(const std::string& original, const std::string& by) { originals_.try_emplace(original, by); }
+  void stands_for(const std::string& original, const std::string& by);
+
+  // Whether anything stands for this text.
+  bool knows(const std::string& original) const { return originals_.contains(original); }
 
   // What stands for a text as a whole; else, in a sentence, for every original of three characters and more that stands
-  // in it as a word: shorter ones may be words and numbers of the sentence itself.
+  // in it as a word, and for shorter ones in quotation marks: without, they may be words and numbers of the sentence
+  // itself. Dates in it are moved.
   std::string in(std::string sentence) const;
 
  private:
+  std::string with_moved_dates(const std::string& sentence) const;
+
   int days_;
   int patients_ = 0;
   std::map<std::string, std::string, std::less<>> uids_;

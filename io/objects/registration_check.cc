@@ -90,7 +90,8 @@ class Checker {
   void check_items() {
     const std::vector<DicomItem> items = dataset_.items(DCM_RegistrationSequence);
     if (items.empty()) error(fmt::format("dataset: {} has no item", described(DCM_RegistrationSequence)));
-    int others = 0, unmoved = 0;
+    int others = 0;
+    std::set<std::string> unmoved;  // frames
     for (std::size_t n = 0; n < items.size(); ++n) {
       const std::string name = fmt::format("item {}", n + 1);
       const std::string frame = frame_of(items[n], name);
@@ -104,18 +105,19 @@ class Checker {
       if (!is_identity && frame == result_.registered_frame_uid)
         ambiguous(fmt::format("{}: moves the registered frame against itself", name));
       check_places(items[n], name, frame, matrix->matrix());
-      if (is_identity) {
-        unmoved += !frame.empty() && frame != result_.registered_frame_uid ? 1 : 0;
-        continue;
-      }
-      ++others;
+      const bool is_other_frame = !frame.empty() && frame != result_.registered_frame_uid;
+      if (is_identity && is_other_frame) unmoved.insert(frame);
+      if (!is_identity) ++others;
+      // An identity counts where nothing else moves: the frames coincide.
+      if (is_identity && (!is_other_frame || others > 0)) continue;
       result_.registered_from_source = matrix;
       result_.source_frame_uid = frame;
       result_.source_is_that_of_images = !items[n].items(DCM_ReferencedImageSequence).empty();
     }
+    if (others == 0 && unmoved.size() > 1) result_.registered_from_source.reset();  // which one is meant is not known
     if (others > 1)
       ambiguous(fmt::format("{} items are not the identity. SlicerRT multiplies all matrices of a file", others));
-    if (others > 0 && unmoved > 0 && means_one_matrix_)
+    if (others > 0 && !unmoved.empty() && means_one_matrix_)
       ambiguous(
           "it registers several frames, one of them by an identity: which of them is that of the treatment is not "
           "known");

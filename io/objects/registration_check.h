@@ -23,7 +23,7 @@ struct CheckedRegistration {
   Identity identity;
   bool is_by_isoshift = false;                     // its Manufacturer says so
   std::string registered_frame_uid;                // dataset-level Frame of Reference UID: usually the planning CT's
-  std::string source_frame_uid;                    // of the item that is not the identity
+  std::string source_frame_uid;                    // of the one item of another frame
   bool source_is_that_of_images = false;           // that item lists images: their frame's origin may lie anywhere
   std::set<std::string> referenced_instance_uids;  // of all images and objects that it names anywhere
   // Takes a point of the source frame to the registered one (PS3.3 C.20.2.1.1), as it stands in the file, if there is

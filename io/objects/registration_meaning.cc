@@ -45,7 +45,8 @@ std::string why_origin_is_unknown(const CheckedRegistration& checked) {
 
 // Where the machine's isocenter lies in the source frame. Nothing, and a finding, where nobody says.
 std::optional<Eigen::Vector3d> source_isocenter(CheckedRegistration& checked, bool asks_for_shift,
-                                                const std::optional<Eigen::Vector3d>& supplied_mm) {
+                                                const std::optional<Eigen::Vector3d>& supplied_mm,
+                                                const std::string& says_where) {
   if (const auto why = why_it_begins_at_isocenter(checked)) {
     if (asks_for_shift && !is_from_room(checked))
       checked.note("its source frame is taken to begin at the isocenter: " + *why);
@@ -54,7 +55,7 @@ std::optional<Eigen::Vector3d> source_isocenter(CheckedRegistration& checked, bo
   if (supplied_mm && !checked.source_frame_uid.empty()) {
     checked.note(fmt::format(
         "the machine's isocenter lies at ({:.3f}) mm of its source frame {}, by {}{}", fmt::join(*supplied_mm, ", "),
-        checked.source_frame_uid, option("source-isocenter"),
+        checked.source_frame_uid, says_where,
         checked.is_by_isoshift
             ? ""
             : "; the axes of that frame are taken as those of the patient as set up on the couch (HFS: x left, y "
@@ -79,7 +80,13 @@ bool plan_fits(CheckedRegistration& checked, const RtPlan& plan) {
     checked.error(fmt::format("the couch shift is not known: {}. {}", finding.message, next));
     fits = false;
   }
-  if (!plan.frame_of_reference_uid) {
+  if (!plan.frame_of_reference_uid && plan.geometry == "TREATMENT_DEVICE") {
+    checked.error(
+        fmt::format("the couch shift is not known: {}: {} is TREATMENT_DEVICE and {} is missing, so nothing says where "
+                    "its isocenter lies in the registered frame. {}",
+                    plan.path.string(), described(DCM_RTPlanGeometry), described(DCM_FrameOfReferenceUID), next));
+    fits = false;
+  } else if (!plan.frame_of_reference_uid) {
     checked.note(fmt::format("{}: {} is missing; taken as that of the registered frame, {}", plan.path.string(),
                              described(DCM_FrameOfReferenceUID), checked.registered_frame_uid));
   } else if (*plan.frame_of_reference_uid == checked.source_frame_uid) {
@@ -179,7 +186,8 @@ void refuse_contradicting_isocenter(std::span<const CheckedRegistration> all,
 }
 
 RegistrationMeaning meaning_of(CheckedRegistration& checked, const std::optional<PlannedSetup>& setup,
-                               const std::optional<Eigen::Vector3d>& source_isocenter_mm) {
+                               const std::optional<Eigen::Vector3d>& source_isocenter_mm,
+                               const std::string& says_where) {
   RegistrationMeaning meaning;
   const std::optional<Eigen::Isometry3d> as_written = rigid_of(checked);
   if (!as_written) {
@@ -188,7 +196,7 @@ RegistrationMeaning meaning_of(CheckedRegistration& checked, const std::optional
     return meaning;
   }
   const bool fits = !setup || !setup->plan || plan_fits(checked, *setup->plan);
-  meaning.source_isocenter_mm = source_isocenter(checked, setup.has_value(), source_isocenter_mm);
+  meaning.source_isocenter_mm = source_isocenter(checked, setup.has_value(), source_isocenter_mm, says_where);
   if (!meaning.source_isocenter_mm) return meaning;
   Eigen::Isometry3d matrix = *as_written, inverse = as_written->inverse();
   matrix.translate(*meaning.source_isocenter_mm);

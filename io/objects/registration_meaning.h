@@ -8,6 +8,7 @@
 #include <span>
 #include <string>
 
+#include "base/option_name.h"
 #include "geometry/patient_setup.h"
 #include "io/dicom/rt_plan.h"
 #include "io/objects/registration_check.h"
@@ -48,9 +49,10 @@ struct RegistrationMeaning {
 };
 
 // Adds findings: notes on what was assumed and on what prevents a number. If `setup` asks for the couch shift, what
-// prevents it is an error.
+// prevents it is an error. `says_where`: who says where the machine's isocenter lies in the source frame.
 RegistrationMeaning meaning_of(CheckedRegistration& checked, const std::optional<PlannedSetup>& setup,
-                               const std::optional<Eigen::Vector3d>& source_isocenter_mm);
+                               const std::optional<Eigen::Vector3d>& source_isocenter_mm,
+                               const std::string& says_where = option("source-isocenter"));
 
 struct RegistrationDifference {
   double translation_mm = 0.0;  // between the points of the CT that the two have at the machine's isocenter

@@ -303,15 +303,18 @@ Json view_json(const SetupResult::View& view) {
 Json references_json(const SetupResult& report) {
   Json images = Json::array();
   for (const SetupResult::View& view : report.views) images.push_back(view.sop_instance_uid);
-  return {{"ct_series", report.ct_series_uid},
-          {"ct_sha256", report.ct_sha256},
-          {"plan", or_null(report.plan_uid)},
-          {"plan_class", report.plan_class_uid},
-          {"plan_label", report.plan_label},
-          {"plan_approval", report.plan_approval},
-          {"plan_sha256", report.plan_sha256},
-          {"images", images},
-          {"spatial_registration", or_null(report.spatial_registration_uid)}};
+  Json json = {{"ct_series", report.ct_series_uid},
+               {"ct_sha256", report.ct_sha256},
+               {"plan", or_null(report.plan_uid)},
+               {"plan_class", report.plan_class_uid},
+               {"plan_label", report.plan_label},
+               {"plan_approval", report.plan_approval},
+               {"plan_sha256", report.plan_sha256},
+               {"images", images},
+               {"spatial_registration", or_null(report.spatial_registration_uid)}};
+  if (report.ct_frame_uid) json["ct_frame_of_reference"] = *report.ct_frame_uid;
+  if (report.structure_set_uid) json["structure_set"] = or_null(*report.structure_set_uid);
+  return json;
 }
 
 }  // namespace

@@ -268,6 +268,9 @@ SetupResult report_from(const Json& json) {
   report.plan_class_uid = references.at("plan_class");
   report.ct_series_uid = references.at("ct_series");
   report.ct_sha256 = references.at("ct_sha256");
+  // Results of before 2026-11-29 do not say.
+  if (references.contains("ct_frame_of_reference")) report.ct_frame_uid = references.at("ct_frame_of_reference");
+  if (references.contains("structure_set")) report.structure_set_uid = text_from(references.at("structure_set"));
   report.spatial_registration_uid = text_from(references.at("spatial_registration"));
   report.patient_position = json.at("patient_position");
   report.isocenter_patient_mm = vector_from<3>(json.at("isocenter_patient_mm"));

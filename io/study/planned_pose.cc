@@ -73,31 +73,43 @@ std::vector<Finding> isocenter_doubts(const Study& study, const std::vector<RtPl
                    described(DCM_IsocenterPosition), other->number, fmt::join(*other->isocenter_patient_mm, ", "))}};
 }
 
+bool treats(const RtPlan::Beam& beam) { return beam.delivery_type != "SETUP"; }
+
 // What is treated against what was imaged: X-rays refer to setup beams.
-std::vector<Finding> treatment_doubts(const Study& study) {
+std::vector<Finding> treated_position_doubts(const Study& study) {
   std::vector<Finding> doubts;
-  const RtPlan::Beam* elsewhere = nullptr;
-  bool is_treated_here = false;
-  for (const RtPlan::Beam& beam : study.plan->beams) {
-    if (beam.delivery_type == "SETUP") continue;
-    if (beam.patient_position && *beam.patient_position != to_string(study.patient_position))
+  for (const RtPlan::Beam& beam : study.plan->beams)
+    if (treats(beam) && beam.patient_position && *beam.patient_position != to_string(study.patient_position))
       doubts.push_back(
           {"plan-mismatch", fmt::format("the patient lies in {}, and beam {} of the plan treats in {} ({})",
                                         to_string(study.patient_position), beam.number, *beam.patient_position,
                                         described(DCM_PatientPosition))});
-    if (!beam.isocenter_patient_mm) continue;
-    if ((*beam.isocenter_patient_mm - study.isocenter_patient_mm).norm() <= kSameIsocenterMm)
-      is_treated_here = true;
-    else
-      elsewhere = &beam;
+  return doubts;
+}
+
+std::vector<Finding> treated_isocenter_doubts(const Study& study) {
+  const RtPlan::Beam* elsewhere = nullptr;
+  for (const RtPlan::Beam& beam : study.plan->beams) {
+    if (!treats(beam) || !beam.isocenter_patient_mm) continue;
+    if ((*beam.isocenter_patient_mm - study.isocenter_patient_mm).norm() <= kSameIsocenterMm) return {};
+    elsewhere = &beam;
   }
-  if (elsewhere != nullptr && !is_treated_here)
-    doubts.push_back(
-        {"plan-mismatch",
-         fmt::format("the X-rays' beams have their isocenter at ({}) mm, and no beam that treats has it: that of "
-                     "beam {} is ({}) mm ({})",
-                     fmt::join(study.isocenter_patient_mm, ", "), elsewhere->number,
-                     fmt::join(*elsewhere->isocenter_patient_mm, ", "), described(DCM_IsocenterPosition))});
+  if (elsewhere == nullptr) return {};
+  return {{"plan-mismatch",
+           fmt::format("the X-rays' beams have their isocenter at ({}) mm, and no beam that treats has it: that of "
+                       "beam {} is ({}) mm ({})",
+                       fmt::join(study.isocenter_patient_mm, ", "), elsewhere->number,
+                       fmt::join(*elsewhere->isocenter_patient_mm, ", "), described(DCM_IsocenterPosition))}};
+}
+
+// What of the plan contradicts where the patient lies. An isocenter typed in that is no beam's is said once.
+std::vector<Finding> plan_doubts(const StudyRequest& request, const Study& study,
+                                 const std::vector<RtPlan::Beam>& beams) {
+  std::vector<Finding> doubts = treated_position_doubts(study);
+  std::vector<Finding> of_isocenter;
+  if (request.isocenter_patient_mm) of_isocenter = isocenter_doubts(study, beams);
+  if (of_isocenter.empty()) of_isocenter = treated_isocenter_doubts(study);
+  std::ranges::move(of_isocenter, std::back_inserter(doubts));
   return doubts;
 }
 
@@ -110,8 +122,6 @@ void place_patient(const StudyRequest& request, const std::vector<RtPlan::Beam>&
     study.isocenter_patient_mm = *request.isocenter_patient_mm;
     notes.overrides.push_back(fmt::format("{}: ({}) mm by {}", described(DCM_IsocenterPosition),
                                           fmt::join(study.isocenter_patient_mm, ", "), option("isocenter")));
-    std::ranges::move(unsettled(isocenter_doubts(study, beams), request.allowed, notes),
-                      std::back_inserter(study.doubts));
     check_isocenter_of_images(study, request.allowed, notes);
   } else if (study.plan) {
     study.isocenter_patient_mm = common_isocenter(*study.plan, beams);
@@ -133,8 +143,9 @@ void place_patient(const StudyRequest& request, const std::vector<RtPlan::Beam>&
     notes.warnings.push_back(fmt::format("the CT was scanned in {}, the patient is treated in {} ({})",
                                          study.ct->patient_position, to_string(study.patient_position),
                                          described(DCM_PatientPosition)));
-  if (study.plan && !request.isocenter_patient_mm)
-    std::ranges::move(unsettled(treatment_doubts(study), request.allowed, notes), std::back_inserter(study.doubts));
+  if (study.plan)
+    std::ranges::move(unsettled(plan_doubts(request, study, beams), request.allowed, notes),
+                      std::back_inserter(study.doubts));
   warn_of_planned_table(study, beams, notes);
   warn_of_planned_displacement(beams, notes);
   study.planned_room_from_patient =

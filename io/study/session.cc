@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <cmath>
 #include <iterator>
 #include <optional>
@@ -15,19 +14,6 @@
 
 namespace isoshift {
 namespace {
-
-// Systems differ in capital letters, and in empty components at the end of a name (PS3.5 6.2.1.1).
-std::string comparable_name(std::string name) {
-  name.erase(name.find_last_not_of("^ ") + 1);
-  std::ranges::transform(name, name.begin(), [](unsigned char c) { return std::toupper(c); });
-  return name;
-}
-
-// Old systems write dots (PS3.5 6.2).
-std::string comparable_date(std::string date) {
-  std::erase(date, '.');
-  return date;
-}
 
 // What a table read-out says of two images; nothing where it is the same, or missing in one of them.
 std::optional<Finding> table_finding(const TableReadOut& read_out, const RtImage& image, const RtImage& reference) {

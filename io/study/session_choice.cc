@@ -13,9 +13,9 @@
 namespace isoshift {
 namespace {
 
-std::string date_of(const SessionFiles& session) {
-  constexpr std::size_t kDate = 10;  // 2026-03-01
-  return session.images.back().acquired.substr(0, kDate);
+// Whether an X-ray of the session was taken on that day, "2026-03-01": sessions may go on after midnight.
+bool is_of_day(const SessionFiles& session, const std::string& day) {
+  return std::ranges::any_of(session.images, [&](const auto& image) { return image.acquired.starts_with(day); });
 }
 
 std::string as_asked(const SessionChoice& choice) {
@@ -56,7 +56,7 @@ SessionFiles chosen_session(const SessionChoice& choice, const std::vector<Sessi
   std::vector<SessionFiles> fitting;
   for (const SessionFiles& session : sessions) {
     if (!session.name.starts_with(choice.name)) continue;
-    if (!choice.date.empty() && date_of(session) != choice.date) continue;
+    if (!choice.date.empty() && !is_of_day(session, choice.date)) continue;
     if (choice.fraction && !fraction_of(session))
       fail(fmt::format("{}: {} is missing or differs within the session, so that its fraction is not known",
                        session.images.front().file.string(), isoshift::described(DCM_FractionNumber)));

@@ -258,13 +258,39 @@ def test_names_of_files_need_not_be_utf_8(folder, tmp_path):
     with open(os.fsencode(copy) + b"/not\xffes.txt", "w", encoding="ascii") as file:
         file.write("no DICOM")
     assert any("not\\xffes.txt" in text for text in isoshift.load_study(copy).left_aside)
+    # A review whose reason names files.
+    strange = os.fsencode(tmp_path) + b"/stud\xff"
+    os.rename(os.fsencode(copy), strange)
+    images = sorted(pathlib.Path(os.fsdecode(strange)).glob("RTIMAGE/*.dcm"))
+    first, second = (pydicom.dcmread(image) for image in images)
+    second.GantryAngle, second.RTImageLabel = first.GantryAngle, first.RTImageLabel
+    for name in ("TableTopVerticalPosition", "TableTopLongitudinalPosition", "TableTopLateralPosition"):
+        for image in (first, second):
+            if name in image:
+                del image[name]
+    for path, image in zip(images, (first, second)):
+        image.save_as(path)
+    reasons = isoshift.register(isoshift.load_study(os.fsdecode(strange)), search=False).reasons
+    assert any("stud\\xff" in reason for reason in reasons), reasons
 
 
-def test_a_site_decides_and_times_are_told(study):
-    result = isoshift.register(study, site=SOURCE / "testdata" / "config" / "site" / "linac.json").as_dict()
+def test_a_site_decides_and_times_are_told(folder, study):
+    site = SOURCE / "testdata" / "config" / "site" / "linac.json"
+    result = isoshift.register(isoshift.load_study(folder, site=site), site=site).as_dict()
     assert result["site"] is not None and isoshift.register(study).as_dict()["site"] is None
     seconds = result["seconds"]
     assert 0 < seconds["load"] < seconds["total"] and seconds["register"] < seconds["total"]
+
+
+def test_the_span_of_a_site_counts(folder, study, tmp_path):
+    site = tmp_path / "site.json"
+    text = (SOURCE / "testdata" / "config" / "site" / "linac.json").read_text()
+    assert '"max_span_s": 120' in text
+    site.write_text(text.replace('"max_span_s": 120', '"max_span_s": 5'))
+    with pytest.raises(isoshift.Error, match=r"allows 5 s between X-rays .* name the site file in load_study\(\), too"):
+        isoshift.register(study, site=site)
+    result = isoshift.register(isoshift.load_study(folder, site=site), site=site)
+    assert result.verdict == "review" and any("more than 5 s" in reason for reason in result.reasons)
 
 
 def test_an_object_is_of_the_study_of_its_result(study, tmp_path):

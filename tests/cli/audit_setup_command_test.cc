@@ -208,6 +208,35 @@ TEST_F(AuditSetupCommandTest, ReadsRegistrationObjectsByTheXraysTheyName) {
   EXPECT_THAT(found["not_compared"], HasSubstr("PatientID (0010,0020) differs"));
 }
 
+// An object that registers another frame, such as one written the wrong way around, has no shift of the session's.
+TEST_F(AuditSetupCommandTest, AnObjectOfAnotherRegisteredFrameIsNotCompared) {
+  const SmallStudy study;
+  ASSERT_EQ(run_command({"register", study.path().string(), "-o", (results() / "a").string()}).exit_status, 0);
+  const fs::path objects = folder_ / "used";
+  fs::create_directories(objects);
+  fs::copy_file(results() / "a" / "spatial_registration.dcm", objects / "a.dcm");
+  edit(objects / "a.dcm", [](DicomItem d) {
+    const std::string source = d.items(DCM_RegistrationSequence)[1].required_text(DCM_FrameOfReferenceUID);
+    const std::string ct = d.required_text(DCM_FrameOfReferenceUID);
+    d.put(DCM_FrameOfReferenceUID, source);
+    d.items(DCM_RegistrationSequence)[0].put(DCM_FrameOfReferenceUID, source);
+    d.items(DCM_RegistrationSequence)[1].put(DCM_FrameOfReferenceUID, ct);
+    d.put(DCM_Manufacturer, "Other");
+  });
+  const auto session = [&] {
+    const CommandOutcome outcome = run({"--used", objects.string(), "--json", "--source-isocenter", "0,0,0"});
+    EXPECT_EQ(outcome.exit_status, 0) << outcome.err;
+    return Json::parse(outcome.out)["sessions"][0];
+  };
+  EXPECT_TRUE(session()["used"]["lateral_mm"].is_null());
+  EXPECT_THAT(session()["not_compared"], HasSubstr("and the session's CT has "));
+  // A result of before 2026-11-29 does not name the frame: the registration object beside it does.
+  Json result = Json::parse(text_of(results() / "a/result.json"));
+  result["references"].erase("ct_frame_of_reference");
+  replace_text(results() / "a/result.json", result.dump());
+  EXPECT_THAT(session()["not_compared"], HasSubstr("and the session's CT has "));
+}
+
 TEST_F(AuditSetupCommandTest, WhatCannotBeAuditedIsAnError) {
   fs::create_directories(results());
   EXPECT_THAT(run().err, HasSubstr("holds no result of isoshift"));

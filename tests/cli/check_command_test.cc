@@ -315,7 +315,10 @@ TEST_F(CheckCommandTest, ThePlanOfAnotherFrameIsRefusedAndOneWithoutIsNoted) {
                                      ", the registered frame, is " + registered));
   EXPECT_THAT(outcome.out, Not(HasSubstr("a couch shift of")));
 
-  const std::string silent = copy_of(plan(), "silent.dcm", [](DicomItem d) { d.erase(DCM_FrameOfReferenceUID); });
+  const std::string silent = copy_of(plan(), "silent.dcm", [](DicomItem d) {
+    d.erase(DCM_FrameOfReferenceUID);
+    d.put(DCM_RTPlanGeometry, "PATIENT");
+  });
   const CommandOutcome noted = run_command({"check", ours(), "--plan", silent});
   EXPECT_EQ(noted.exit_status, 0) << noted.out;
   EXPECT_THAT(noted.out, HasSubstr("note   " + silent + ": FrameOfReferenceUID (0020,0052) is missing"));
@@ -354,9 +357,8 @@ TEST_F(CheckCommandTest, TwoThatCannotBeComparedAreAnError) {
   EXPECT_EQ(origins.exit_status, 1);
   EXPECT_THAT(origins.out, HasSubstr("difference: not known\n  error  " + foreign() + ": its source frame 1.2.3.4"));
 
-  const std::string without_matrix = copy_of(ours(), "identity.dcm", [](DicomItem d) {
-    const Eigen::Matrix4d identity = Eigen::Matrix4d::Identity();
-    matrix_item(d).put(DCM_FrameOfReferenceTransformationMatrix, std::span(identity.data(), 16));
+  const std::string without_matrix = copy_of(ours(), "without.dcm", [](DicomItem d) {
+    d.items(DCM_RegistrationSequence)[1].erase(DCM_MatrixRegistrationSequence);
   });
   const CommandOutcome matrices = run_command({"check", ours(), without_matrix});
   EXPECT_EQ(matrices.exit_status, 1);
@@ -383,6 +385,38 @@ TEST_F(CheckCommandTest, WhatContradictsThePlanIsRefused) {
   EXPECT_EQ(position.exit_status, 2);
   EXPECT_THAT(position.err, HasSubstr("--patient-position FFS contradicts the plan, which says HFS"));
   EXPECT_EQ(run_command({"check", ours(), "--plan", plan(), "--patient-position", "HFS"}).exit_status, 0);
+}
+
+TEST_F(CheckCommandTest, OfAPlanWithTwoIsocentersOneIsNamed) {
+  const std::string two = copy_of(plan(), "two.dcm", [](DicomItem d) {
+    DicomItem beam = d.append_item(DCM_BeamSequence);
+    beam.put(DCM_BeamNumber, 9.0);
+    beam.append_item(DCM_ControlPointSequence).put(DCM_IsocenterPosition, "1\\2\\3");
+  });
+  EXPECT_THAT(run_command({"check", ours(), "--plan", two}).err, HasSubstr("beams have different isocenters"));
+  const std::string isocenter = fmt::format("{},{},{}", isocenter_.x(), isocenter_.y(), isocenter_.z());
+  const CommandOutcome named = run_command({"check", ours(), "--plan", two, "--isocenter", isocenter});
+  EXPECT_EQ(named.exit_status, 0) << named.err;
+  EXPECT_EQ(named.out, run_command({"check", ours(), "--plan", plan()}).out);
+}
+
+TEST_F(CheckCommandTest, APlanThatLiesNowhereGivesNoShift) {
+  const std::string nowhere =
+      copy_of(plan(), "nowhere.dcm", [](DicomItem d) { d.erase(DCM_FrameOfReferenceUID); });  // TREATMENT_DEVICE
+  const CommandOutcome outcome = run_command({"check", ours(), "--plan", nowhere});
+  EXPECT_EQ(outcome.exit_status, 1);
+  EXPECT_THAT(outcome.out, HasSubstr("nothing says where its isocenter lies in the registered frame"));
+  EXPECT_THAT(outcome.out, Not(HasSubstr("a couch shift of")));
+}
+
+// Two frames that coincide: the machine's isocenter lies where it lies in the source frame.
+TEST_F(CheckCommandTest, AnIdentityIsAMatrix) {
+  const std::string file = ours_from("1.2.3.4", Eigen::Matrix4d::Identity(), "identity.dcm", "Somebody");
+  const std::string isocenter = fmt::format("{},{},{}", isocenter_.x(), isocenter_.y(), isocenter_.z());
+  const CommandOutcome outcome =
+      run_command({"check", file, "--plan", plan(), "--source-isocenter", isocenter, "--json"});
+  EXPECT_EQ(outcome.exit_status, 0) << outcome.out;
+  expect_shift(checked(outcome), {0, 0, 0, 0, 0, 0}, 1e-9);
 }
 
 TEST_F(CheckCommandTest, AnObjectThatMeansSeveralThingsGivesNoNumber) {

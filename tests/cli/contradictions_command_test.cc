@@ -190,6 +190,21 @@ TEST_F(ContradictionsCommandTest, ABeamThatTreatsElsewhereThanItWasImagedNeedsAR
   EXPECT_EQ(register_study(study_).exit_status, 3);
   EXPECT_THAT(result_of(study_)["reasons"].dump(),
               HasSubstr("no beam that treats has it: that of beam 9 is (-2.5, 38, -410) mm"));
+  EXPECT_EQ(register_study(study_, {"--isocenter", "-12.5,38,-410", "--overwrite"}).exit_status, 3);
+}
+
+TEST_F(ContradictionsCommandTest, AnIsocenterTypedInSettlesNoPosition) {
+  edit(study_.plan(), [](DicomItem plan) {
+    DicomItem setup = plan.append_item(DCM_PatientSetupSequence);
+    setup.put(DCM_PatientSetupNumber, 2.0);
+    setup.put(DCM_PatientPosition, "HFP");
+    DicomItem beam = plan.append_item(DCM_BeamSequence);
+    beam.put(DCM_BeamNumber, 9.0);
+    beam.put(DCM_TreatmentDeliveryType, "TREATMENT");
+    beam.put(DCM_ReferencedPatientSetupNumber, 2.0);
+  });
+  EXPECT_EQ(register_study(study_, {"--isocenter", "-12.5,38,-410"}).exit_status, 3);
+  EXPECT_THAT(result_of(study_)["reasons"].dump(), HasSubstr("beam 9 of the plan treats in HFP"));
 }
 
 TEST_F(ContradictionsCommandTest, APlanForAnotherTableIsWarnedOf) {

@@ -4,11 +4,15 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <array>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <set>
+#include <vector>
 
+#include "base/error.h"
 #include "base/text_file.h"
+#include "io/dicom/ct_series.h"
 #include "io/study/study_files.h"
 #include "tests/support/pose_near.h"
 #include "tests/support/small_study.h"
@@ -70,6 +74,55 @@ TEST_F(DeidentifyCommandTest, TheStudyRegistersAsBefore) {
   ASSERT_EQ(again.exit_status, 0) << again.err;
   EXPECT_THAT(read_setup_error(path("after/result.json")),
               PoseNear(read_setup_error(path("before/result.json")), 1e-9, 1e-9));
+}
+
+// The frames of an Enhanced CT lie where they lay, and two stacks stay two.
+TEST_F(DeidentifyCommandTest, AnEnhancedCtStaysTheSameVolume) {
+  for (const auto& entry : std::filesystem::directory_iterator(study_.path() / "CT"))
+    std::filesystem::remove(entry.path());
+  const std::filesystem::path ct = study_.path() / "CT/enhanced.dcm";
+  std::filesystem::copy_file(testdata("enhanced/plain.dcm"), ct);
+  const auto first_frame = [](const DicomItem& d) {
+    return d.items(DCM_PerFrameFunctionalGroupsSequence)[0].items(DCM_FrameContentSequence)[0];
+  };
+  edit(ct, [&](DicomItem d) {
+    first_frame(d).put(DCM_StackID, "Adalgunde");
+    first_frame(d).put(DCM_FrameComments, "Adalgunde");
+  });
+  const auto refusal_of = [](const std::filesystem::path& file) -> std::string {
+    try {
+      Notes notes;
+      read_ct_series(std::array{file}, {}, notes, {});
+      return "none";
+    } catch (const Error& error) {
+      return error.what();
+    }
+  };
+  ASSERT_EQ(run_command({"deidentify", study_.path().string(), "-o", path("stacks")}).exit_status, 0);
+  EXPECT_THAT(refusal_of(ct), HasSubstr("holds 2 volumes"));
+  EXPECT_THAT(refusal_of(path("stacks/CT/00001.dcm")), HasSubstr("holds 2 volumes"));
+  EXPECT_THAT(text_of_file(path("stacks/CT/00001.dcm")), Not(HasSubstr("Adalgunde")));
+
+  edit(ct, [&](DicomItem d) { first_frame(d).put(DCM_StackID, "1"); });
+  ASSERT_EQ(run_command({"deidentify", study_.path().string(), "-o", path("safe")}).exit_status, 0);
+  Notes notes;
+  const CtSeries before = read_ct_series(std::array{ct}, {}, notes, {}),
+                 after = read_ct_series(std::array{std::filesystem::path(path("safe/CT/00001.dcm"))}, {}, notes, {});
+  EXPECT_EQ(after.hu.voxels, before.hu.voxels);
+  EXPECT_TRUE(after.hu.patient_from_voxel.isApprox(before.hu.patient_from_voxel));
+}
+
+TEST_F(DeidentifyCommandTest, NamesAndDatesThatAreTheSameStayTheSame) {
+  edit(study_.plan(), [](DicomItem d) {
+    d.put(DCM_PatientName, "FEATHERSTONE^ADALGUNDE^^");
+    d.put(DCM_PatientBirthDate, "1950.01.02");
+  });
+  for (const std::filesystem::path& image : files_below({study_.path() / "RTIMAGE"}))
+    edit(image, [](DicomItem d) { d.put(DCM_PatientBirthDate, "19500102"); });
+  for (int k = 0; k < 36; ++k) edit(study_.ct_slice(k), [](DicomItem d) { d.put(DCM_PatientBirthDate, "19500102"); });
+  ASSERT_EQ(run_command({"register", study_.path().string(), "-o", path("before")}).exit_status, 0);
+  ASSERT_EQ(run_command({"deidentify", study_.path().string(), "-o", path("safe")}).exit_status, 0);
+  EXPECT_EQ(run_command({"register", path("safe"), "-o", path("after")}).exit_status, 0);
 }
 
 TEST_F(DeidentifyCommandTest, WhatIsWrittenIsStillWholeDicom) {
@@ -162,6 +215,61 @@ TEST_F(BundleCommandTest, WordsOfPeopleAreLeftOut) {
   ASSERT_EQ(run_command({"bundle", path("allowed"), study_.path().string(), "-o", path("bundle")}).exit_status, 0);
   expect_tells_nothing(path("bundle"));
   EXPECT_THAT(text_of_file(path("bundle/result/result.json")), HasSubstr("(allowed by time-span)"));
+}
+
+// Who knows one date knows by how much all are moved.
+TEST_F(BundleCommandTest, DatesAndMachinesInMessagesAreReplacedToo) {
+  for (int k = 0; k < 36; ++k) edit(study_.ct_slice(k), [](DicomItem d) { d.put(DCM_AcquisitionDate, "20260401"); });
+  edit(study_.image(1), [](DicomItem d) { d.put(DCM_RadiationMachineName, "L9"); });
+  ASSERT_NE(run_command({"register", study_.path().string(), "-o", path("warned")}).exit_status, 1);
+  const std::string before = text_of_file(path("warned/result.json"));
+  EXPECT_THAT(before, testing::AllOf(HasSubstr("20260401"), HasSubstr("20260301"), HasSubstr("\\\"L9\\\"")));
+  ASSERT_EQ(run_command({"bundle", path("warned"), study_.path().string(), "-o", path("bundle")}).exit_status, 0);
+  for (const std::filesystem::path& file : files_below({path("bundle")}))
+    for (const char* told : {"20260401", "20260301", "2026-03-01", "\"L9", "L9\""})
+      EXPECT_EQ(text_of_file(file).find(told), std::string::npos) << file << " tells " << told;
+}
+
+TEST_F(BundleCommandTest, WhatIsEmptyStaysEmpty) {
+  ASSERT_EQ(run_command({"bundle", path("Featherstone"), study_.path().string(), "-o", path("bundle")}).exit_status, 0);
+  const auto views_of = [&](const char* folder) {
+    return nlohmann::json::parse(text_of_file(path(folder) + "/result.json"))["views"];
+  };
+  EXPECT_EQ(views_of("bundle/result")[0]["irradiated_field"]["doubt"],
+            views_of("Featherstone")[0]["irradiated_field"]["doubt"]);
+}
+
+// Of several structure sets that which was registered, with no name left in the result.
+TEST_F(BundleCommandTest, TheStructureSetIsThatOfTheResult) {
+  const std::vector<Eigen::Vector3d> square = rectangle(small_phantom().placement.isocenter_patient_mm, 60, 60);
+  draw(study_, {{"Featherstone PTV", {square}}, {"Featherstone cord", {square}}});
+  const std::filesystem::path other = study_.path() / "other.dcm";
+  std::filesystem::copy_file(study_.structures(), other);
+  edit(other, [](DicomItem d) {
+    d.put(DCM_SOPInstanceUID, "1.2.3.4.5");
+    for (DicomItem roi : d.items(DCM_StructureSetROISequence)) roi.put(DCM_ROIName, "of another set");
+  });
+  ASSERT_NE(run_command({"register", study_.path().string(), "-o", path("drawn"), "--structures",
+                         study_.structures().string(), "--target", "Featherstone PTV"})
+                .exit_status,
+            1);
+  ASSERT_EQ(run_command({"bundle", path("drawn"), study_.path().string(), "-o", path("bundle")}).exit_status, 0);
+  expect_tells_nothing(path("bundle"));
+  EXPECT_THAT(text_of_file(path("bundle/result/result.json")), HasSubstr("\"Structure 1\""));
+  EXPECT_EQ(files_below({path("bundle/study/RTSTRUCT")}).size(), 1U);
+
+  std::filesystem::remove(study_.structures());
+  const CommandOutcome without = run_command({"bundle", path("drawn"), study_.path().string(), "-o", path("none")});
+  EXPECT_EQ(without.exit_status, 1);
+  EXPECT_THAT(without.err, HasSubstr("the study does not hold the structure set of the result"));
+}
+
+TEST_F(BundleCommandTest, AReportDoesNotReplaceTheBundleAroundItsResult) {
+  ASSERT_EQ(run_command({"bundle", path("Featherstone"), study_.path().string(), "-o", path("bundle")}).exit_status, 0);
+  const CommandOutcome outcome = run_command({"report", path("bundle/result"), "-o", path("bundle"), "--overwrite"});
+  EXPECT_EQ(outcome.exit_status, 1);
+  EXPECT_THAT(outcome.err, HasSubstr("holds " + path("bundle/result") + ", which is read"));
+  EXPECT_TRUE(std::filesystem::exists(path("bundle/study/CT/00001.dcm")));
 }
 
 TEST_F(BundleCommandTest, AnotherStudyIsRefused) {

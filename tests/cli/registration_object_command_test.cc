@@ -121,6 +121,36 @@ TEST_F(RegistrationObjectCommandTest, AnIsocenterThatMeansNothingIsRefused) {
   EXPECT_EQ(refused({"--start", object_in("set")}), 2);  // it begins at the isocenter, and says so
 }
 
+// The X-rays' frame does not begin at the isocenter, and they say where in it the isocenter lies.
+TEST_F(RegistrationObjectCommandTest, AnIsocenterThatContradictsTheXraysIsRefused) {
+  for (int view = 0; view < 2; ++view)
+    edit(study_.image(view), [](DicomItem d) {
+      d.put(DCM_FrameOfReferenceUID, "1.2.3.4.77");
+      d.put(DCM_IsocenterPosition, "9\\-150\\-251");
+    });
+  write_object();
+  const Strings judged = {"register", study_.path().string(), "--no-search", "--start", object_in("set")};
+  ASSERT_EQ(run(judged, "judged").exit_status, 3);
+  EXPECT_THAT(read_setup_error(path("judged/result.json")), PoseNear(pose_, 1e-6, 1e-6));
+  EXPECT_THAT(result_in("judged")["warnings"].dump(), HasSubstr("by IsocenterPosition (300A,012C) of the X-rays"));
+  Strings other = judged;
+  other.insert(other.end(), {"--source-isocenter", "14,-146,-251"});
+  const CommandOutcome outcome = run(other, "other");
+  EXPECT_EQ(outcome.exit_status, 2);
+  EXPECT_THAT(outcome.err, HasSubstr("--source-isocenter 14,-146,-251 contradicts the X-rays, whose IsocenterPosition "
+                                     "(300A,012C) in the same frame is (9, -150, -251) mm"));
+}
+
+TEST_F(RegistrationObjectCommandTest, AResultAboutAnotherCtIsNoStart) {
+  ASSERT_EQ(run({"register", study_.path().string()}, "found").exit_status, 0);
+  nlohmann::json result = result_in("found");
+  result["references"]["ct_frame_of_reference"] = "1.2.3";
+  std::ofstream(path("other.json")) << result;
+  const CommandOutcome outcome = run({"register", study_.path().string(), "--start", path("other.json")}, "refused");
+  EXPECT_EQ(outcome.exit_status, 1);
+  EXPECT_THAT(outcome.err, HasSubstr("is about a CT in another frame of reference than the study's"));
+}
+
 TEST_F(RegistrationObjectCommandTest, OneOfAnotherCtOrPatientIsNoStart) {
   write_object();
   const auto refusal = [&](const std::function<void(DicomItem)>& change) {

@@ -72,6 +72,17 @@ TEST_F(SessionChoiceCommandTest, ADayIsChosen) {
   EXPECT_EQ(register_with({"--date", "yesterday"}).exit_status, 2);
 }
 
+TEST_F(SessionChoiceCommandTest, ASessionThatGoesOnAfterMidnightIsOfBothDays) {
+  edit(study_ / "RTIMAGE/KV_G000.dcm", [](DicomItem d) { d.put(DCM_AcquisitionTime, "235950"); });
+  edit(study_ / "RTIMAGE/KV_G090.dcm", [](DicomItem d) {
+    d.put(DCM_AcquisitionDate, "20260302");
+    d.put(DCM_AcquisitionTime, "000010");
+  });
+  EXPECT_EQ(register_with({"--date", "2026-03-01"}).exit_status, 0);
+  EXPECT_THAT(found(), PoseNear(first_, 0.5, 3.0));
+  EXPECT_THAT(register_with({"--date", "2026-03-02"}).err, HasSubstr("2 sessions are of 2026-03-02"));
+}
+
 TEST_F(SessionChoiceCommandTest, AFractionIsChosenWhereTheXraysNumberIt) {
   const CommandOutcome unknown = register_with({"--fraction", "2"});
   EXPECT_EQ(unknown.exit_status, 1);

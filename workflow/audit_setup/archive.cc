@@ -13,6 +13,8 @@
 #include "base/error.h"
 #include "base/local_time.h"
 #include "geometry/rotation.h"
+#include "io/objects/registration_check.h"
+#include "io/objects/spatial_registration.h"
 #include "io/report/result_folder.h"
 #include "setup/shown_shift.h"
 #include "workflow/results_below.h"
@@ -48,6 +50,13 @@ struct ReadSession {
   std::optional<double> made_on;                 // seconds of UTC; nothing: unknown
 };
 
+// Results of before 2026-11-29 do not say, but the registration object beside them does.
+std::string ct_frame_of(const SetupResult& result, const fs::path& folder) {
+  if (result.ct_frame_uid) return *result.ct_frame_uid;
+  const fs::path registration = folder / kRegistrationFile;
+  return fs::exists(registration) ? check_registration(registration).registered_frame_uid : "";
+}
+
 ReadSession read_session(const fs::path& folder, std::string name, ComparedShift compared) {
   ReadSession read{.session = {.name = std::move(name), .folder = folder}, .frames = {}, .made_on = {}};
   AuditedSession& session = read.session;
@@ -57,6 +66,7 @@ ReadSession read_session(const fs::path& folder, std::string name, ComparedShift
     session.verdict = result.verdict;
     session.reasons = result.reasons;
     session.identity = result.identity;
+    session.ct_frame_uid = ct_frame_of(result, folder);
     for (const SetupResult::View& view : result.views) {
       session.xrays.insert(view.sop_instance_uid);
       read.frames.emplace(view.sop_instance_uid, view.frame);

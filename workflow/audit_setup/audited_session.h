@@ -36,6 +36,7 @@ struct AuditedSession {
   // What registration objects are matched by, and need to become a couch shift.
   Identity identity;
   std::set<std::string> xrays;  // SOPInstanceUIDs
+  std::string ct_frame_uid;     // FrameOfReferenceUID; empty: not known
   PlannedSetup planned;
 
   std::string verdict_in_words() const { return verdict ? std::string(to_string(*verdict)) : "unreadable"; }

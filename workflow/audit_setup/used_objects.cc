@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <map>
+#include <set>
 
 #include "base/error.h"
 #include "geometry/rotation.h"
@@ -10,6 +11,7 @@
 #include "io/objects/registration_check.h"
 #include "io/objects/registration_meaning.h"
 #include "io/study/session.h"
+#include "io/study/study_files.h"
 #include "workflow/audit_setup/used_shifts.h"
 
 namespace isoshift {
@@ -19,21 +21,17 @@ namespace fs = std::filesystem;
 
 std::vector<CheckedRegistration> registrations_below(const fs::path& folder, std::vector<std::string>& of_no_use) {
   if (!fs::is_directory(folder)) throw Error(fmt::format("{}: is not a folder", folder.string()));
-  std::vector<fs::path> files;
-  const auto may_be_object = [](const fs::path& path) {
-    return path.extension() == ".dcm" || beginning_of(path) == Beginning::kDicom;
-  };
-  for (const auto& entry : fs::recursive_directory_iterator(folder))
-    if (entry.is_regular_file() && may_be_object(entry.path())) files.push_back(entry.path());
-  std::ranges::sort(files);
+  std::set<fs::path> unsearchable;
   std::vector<CheckedRegistration> objects;
-  for (const fs::path& file : files) {
+  for (const fs::path& file : files_below({folder}, {}, &unsearchable)) {
     try {
-      objects.push_back(check_registration(file));
+      if (file.extension() == ".dcm" || beginning_of(file) == Beginning::kDicom)
+        objects.push_back(check_registration(file));
     } catch (const Error& error) {
       of_no_use.emplace_back(error.what());
     }
   }
+  for (const fs::path& path : unsearchable) of_no_use.push_back(fmt::format("{}: cannot be searched", path.string()));
   if (objects.empty())
     throw Error(fmt::format("{}: holds no Spatial Registration object{}", folder.string(),
                             of_no_use.empty() ? "" : "; " + of_no_use.front()));
@@ -46,6 +44,12 @@ std::string use_object(CheckedRegistration& object, const std::optional<Eigen::V
   for (const Finding& finding :
        patient_findings({&session.identity, "session " + session.name}, {&object.identity, object.path.string()}))
     return finding.message;
+  if (session.ct_frame_uid.empty())
+    return fmt::format("{}: the result of the session does not say in which frame of reference its CT is ({})",
+                       object.path.string(), described(DCM_FrameOfReferenceUID));
+  if (object.registered_frame_uid != session.ct_frame_uid)
+    return fmt::format("{}: registers the frame {}, and the session's CT has {} ({})", object.path.string(),
+                       object.registered_frame_uid, session.ct_frame_uid, described(DCM_FrameOfReferenceUID));
   const RegistrationMeaning meaning = meaning_of(object, session.planned, source_isocenter_mm);
   if (!meaning.couch_shift) {
     const auto error = std::ranges::find_if(object.findings, [](const RegistrationFinding& finding) {

@@ -49,7 +49,7 @@ std::vector<StudyFiles::Image> images_of(const SetupResult& result, const std::v
   return images;
 }
 
-// What of the study the result names: its structure set not among it.
+// What of the study the result names, but for its structure set.
 StudyFiles named_files(const SetupResult& result, const StudyFiles& study) {
   StudyFiles files;
   for (const StudyFiles::Ct& ct : study.cts)
@@ -72,9 +72,17 @@ StudyFiles named_files(const SetupResult& result, const StudyFiles& study) {
   return files;
 }
 
-// The same with the structure set that registration takes.
+// The same with the structure set that was registered, or, where an old result does not say, that registration takes.
 StudyFiles registered_files(const SetupResult& result, const StudyFiles& study) {
   StudyFiles files = named_files(result, study);
+  if (result.structure_set_uid) {
+    if (result.structure_set_uid->empty()) return files;
+    const auto registered =
+        std::ranges::find(study.structures, *result.structure_set_uid, &StudyFiles::Structures::sop_instance_uid);
+    expect_found(registered != study.structures.end(), "structure set", *result.structure_set_uid);
+    files.structures.push_back(*registered);
+    return files;
+  }
   StudyFiles candidates = files;
   candidates.structures = study.structures;
   candidates.images.insert(candidates.images.end(), files.other_xrays.begin(), files.other_xrays.end());

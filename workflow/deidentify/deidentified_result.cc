@@ -1,8 +1,14 @@
 #include "workflow/deidentify/deidentified_result.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <string>
+#include <string_view>
 #include <vector>
+
+#include "base/error.h"
+#include "io/dicom/dicom_dataset.h"
 
 namespace isoshift {
 namespace {
@@ -24,6 +30,18 @@ void replace_in(std::vector<std::string>& messages, const Pseudonyms& pseudonyms
 
 void replace_name(std::string& name, const char* kind, Pseudonyms& pseudonyms) {
   if (!name.empty()) name = pseudonyms.text(kind, name);
+}
+
+// The name of a structure of the study's structure set, by which messages of the result may name it, too.
+void replace_structure(std::string& name, Pseudonyms& pseudonyms) {
+  constexpr std::string_view kCentroid = "centroid of ";
+  const bool is_centroid = name.starts_with(kCentroid);
+  const std::string structure = is_centroid ? name.substr(kCentroid.size()) : name;
+  if (structure.empty() || structure.starts_with(kIsocenterSurroundings)) return;
+  if (!pseudonyms.knows(structure))
+    throw Error(fmt::format("the study does not hold the structure set of the result: it has no structure \"{}\" ({})",
+                            structure, described(DCM_ROIName)));
+  name = (is_centroid ? std::string(kCentroid) : "") + pseudonyms.in(structure);
 }
 
 void replace_uid(std::string& uid, Pseudonyms& pseudonyms) {
@@ -51,7 +69,7 @@ void replace_in(SetupResult::View& view, Pseudonyms& pseudonyms) {
   view.match.field.doubt = pseudonyms.in(view.match.field.doubt);
   view.acquired = pseudonyms.date(view.acquired);
   replace_name(view.machine, "Machine", pseudonyms);
-  for (ViewPicture::Outline& outline : view.picture.structures) outline.name = pseudonyms.in(outline.name);
+  for (ViewPicture::Outline& outline : view.picture.structures) replace_structure(outline.name, pseudonyms);
 }
 
 void replace_in(SiteRules& site, Pseudonyms& pseudonyms) {
@@ -68,6 +86,8 @@ SetupResult deidentified(SetupResult result, Pseudonyms& pseudonyms) {
   result.identity = deidentified(result.identity, pseudonyms);
   for (std::string* uid : {&result.ct_series_uid, &result.plan_uid, &result.spatial_registration_uid})
     replace_uid(*uid, pseudonyms);
+  if (result.ct_frame_uid) replace_uid(*result.ct_frame_uid, pseudonyms);
+  if (result.structure_set_uid) replace_uid(*result.structure_set_uid, pseudonyms);
   for (SetupResult::View& view : result.views) replace_in(view, pseudonyms);
   replace_name(result.plan_label, "Plan", pseudonyms);
   result.made_on = pseudonyms.date(result.made_on);
@@ -77,14 +97,14 @@ SetupResult deidentified(SetupResult result, Pseudonyms& pseudonyms) {
     replace_name(result.start->file, "File", pseudonyms);
     replace_name(result.start->set_by, "Person", pseudonyms);
   }
-  for (SetupResult::Point& point : result.points) point.name = pseudonyms.in(point.name);
+  for (SetupResult::Point& point : result.points) replace_structure(point.name, pseudonyms);
   if (result.target) {
-    result.target->name = pseudonyms.in(result.target->name);
+    replace_structure(result.target->name, pseudonyms);
     result.target->chosen_by = pseudonyms.in(result.target->chosen_by);
     result.target->surrogate = pseudonyms.in(result.target->surrogate);
   }
   for (Alternative& alternative : result.alternatives) alternative.description = pseudonyms.in(alternative.description);
-  for (StructureMotion& structure : result.structures) structure.name = pseudonyms.in(structure.name);
+  for (StructureMotion& structure : result.structures) replace_structure(structure.name, pseudonyms);
   for (std::vector<std::string>* messages : {&result.region, &result.reasons, &result.overrides, &result.warnings})
     replace_in(*messages, pseudonyms);
   result.left_aside.clear();

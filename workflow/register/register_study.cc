@@ -75,7 +75,7 @@ SetupResult register_study(const RegisterOptions& options, SharedWork& shared, O
 
   Notes notes;
   StudyOptions named = options.study;
-  if (site_file && site_file->sessions) named.max_span_s = site_file->sessions->max_span_s;
+  named.max_span_s = max_span_s_of(site_file);
   if (const auto failure = options.registration.rendering.failed_gpu())
     notes.warnings.push_back(fmt::format("{}; rendered on the CPU instead", *failure));
   const Study study = load(named, notes, observer, shared.cts);

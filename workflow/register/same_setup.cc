@@ -42,6 +42,10 @@ void require_same_setup(const Json& file, const std::string& name, const Study& 
   try {
     if (file.contains("patient") && file.at("patient").at("id") != study.ct->identity.patient_id)
       throw Error(fmt::format("{}: is of another patient than the study (PatientID)", name));
+    if (const Json frame = file.value("references", Json::object()).value("ct_frame_of_reference", Json());
+        !frame.is_null() && frame != study.ct->frame_of_reference_uid)
+      throw Error(fmt::format("{}: is about a CT in another frame of reference than the study's ({})", name,
+                              described(DCM_FrameOfReferenceUID)));
     if (file.contains("patient_position") && file.at("patient_position") != position)
       throw Error(fmt::format("{}: its patient position is {}, and that of the study {}: {}", name,
                               file.at("patient_position").get<std::string>(), position, kWhy));

@@ -83,6 +83,10 @@ std::optional<SiteFile> named_site(const std::filesystem::path& file) {
   return file.empty() ? std::nullopt : std::optional(read_site_file(file));
 }
 
+double max_span_s_of(const std::optional<SiteFile>& site) {
+  return site && site->sessions ? site->sessions->max_span_s : kDefaultUntoldSpanS;
+}
+
 std::optional<SiteRules> chosen_site(const std::optional<SiteFile>& file, const std::string& anatomy,
                                      std::optional<SiteRules> before) {
   if (!file && !anatomy.empty())
@@ -141,6 +145,8 @@ SetupResult setup_result_of(const Study& study, std::span<const FixedImage> imag
   if (study.machine) result.machine = {study.machine->name, study.machine->sha256};
   result.ct_series_uid = study.ct->series_instance_uid;
   result.ct_sha256 = study.ct->sha256;
+  result.ct_frame_uid = study.ct->frame_of_reference_uid;
+  result.structure_set_uid = study.structures ? study.structures->sop_instance_uid : "";
   if (study.plan) {
     result.plan_label = study.plan->label;
     result.plan_approval = study.plan->approval_status;

@@ -17,6 +17,9 @@ namespace isoshift {
 // The site file of --site; nothing if the user names none.
 std::optional<SiteFile> named_site(const std::filesystem::path& file);
 
+// How far X-rays of one setup may be apart in time (s), where no read-outs tell that the table stood still.
+double max_span_s_of(const std::optional<SiteFile>& site);
+
 // The site's decisions about results of this anatomy, by --site FILE and --anatomy NAME. Without a site file returns
 // `before`. Without an anatomy ("") takes the anatomy of `before`, or else the site's default. Throws UsageError for an
 // anatomy that the site file does not have, and for an anatomy without a site file.

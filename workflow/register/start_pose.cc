@@ -1,6 +1,7 @@
 #include "workflow/register/start_pose.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include "base/error.h"
 #include "base/json_file.h"
@@ -47,14 +48,23 @@ Start start_of_object(CheckedRegistration object, const Study& study,
     throw Error(fmt::format("{}: registers the frame {}, and the CT has {} ({}): a start must be of the same CT", name,
                             object.registered_frame_uid, study.ct->frame_of_reference_uid,
                             described(DCM_FrameOfReferenceUID)));
-  if (!source_isocenter_mm) source_isocenter_mm = isocenter_of_xrays(study, object.source_frame_uid);
+  const std::optional<Eigen::Vector3d> of_xrays_mm = isocenter_of_xrays(study, object.source_frame_uid);
+  constexpr double kSameIsocenterMm = 0.5;
+  if (source_isocenter_mm && of_xrays_mm && (*source_isocenter_mm - *of_xrays_mm).norm() > kSameIsocenterMm)
+    throw UsageError(
+        fmt::format("{} contradicts the X-rays, whose {} in the same frame is ({}) mm: leave the switch out",
+                    option("source-isocenter", fmt::format("{}", fmt::join(*source_isocenter_mm, ","))),
+                    described(DCM_IsocenterPosition), fmt::join(*of_xrays_mm, ", ")));
+  const std::string says_where =
+      source_isocenter_mm ? option("source-isocenter") : described(DCM_IsocenterPosition) + " of the X-rays";
+  if (!source_isocenter_mm) source_isocenter_mm = of_xrays_mm;
   const PlannedSetup setup{.plan = std::nullopt,
                            .patient_position = study.patient_position,
                            .isocenter_patient_mm = study.isocenter_patient_mm,
                            .couch_angle_deg = deg_from_rad(study.table.yaw_rad()),
                            .couch_pitch_deg = deg_from_rad(study.table.pitch_rad),
                            .couch_roll_deg = deg_from_rad(study.table.roll_rad)};
-  const RegistrationMeaning meaning = meaning_of(object, setup, source_isocenter_mm);
+  const RegistrationMeaning meaning = meaning_of(object, setup, source_isocenter_mm, says_where);
   for (const RegistrationFinding& finding : object.findings) {
     if (finding.is_error && !meaning.setup_error) throw Error(fmt::format("{}: {}", name, finding.text));
     notes.warnings.push_back(fmt::format("{}: {}", file.filename().string(), finding.text));

@@ -32,7 +32,7 @@ std::vector<Eigen::Vector3d> directions_all_around() {
 }
 
 Target surroundings(std::string chosen_by) {
-  Target target{.name = fmt::format("the isocenter's surroundings, {:.0f} mm", kSurroundingsMm),
+  Target target{.name = fmt::format("{}, {:.0f} mm", kIsocenterSurroundings, kSurroundingsMm),
                 .chosen_by = std::move(chosen_by)};
   for (const Eigen::Vector3d& direction : directions_all_around())
     target.extent_room_mm.push_back(kSurroundingsMm * direction);

@@ -77,6 +77,19 @@ TEST_F(DrrImageTest, IsInTheFrameOfTheCtOnlyAsPlanned) {
   EXPECT_EQ(off.isocenter_mm, Eigen::Vector3d(0.0, 0.0, 0.0));  // the origin of its frame
 }
 
+TEST_F(DrrImageTest, LabelsAreCutBetweenCharacters) {
+  edit(study_.image(0), [](DicomItem d) {
+    d.put(DCM_SpecificCharacterSet, "ISO_IR 192");
+    d.put(DCM_RTImageLabel,
+          "Sch\xC3\xA4"
+          "del von vorn \xC3\x84\xC3\x96");  // 18 characters
+  });
+  ASSERT_EQ(render().exit_status, 0);
+  EXPECT_EQ(DicomFile::read(drr(1), DicomFile::Extent::kHeader).dataset().text(DCM_RTImageLabel),
+            "Sch\xC3\xA4"
+            "del von vorn");
+}
+
 // A DRR in an X-ray's place is refused, and registers at its own pose where that is allowed.
 TEST_F(DrrImageTest, IsRefusedAsAnXrayUnlessAllowed) {
   ASSERT_EQ(render().exit_status, 0);

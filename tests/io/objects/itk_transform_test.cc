@@ -91,6 +91,8 @@ TEST_F(ItkTransform, WhatIsNoRigidTransformIsNamed) {
               HasSubstr("a.tfm: Parameters: holds \"x\", which is not a finite number"));
   EXPECT_THAT(refusal(first + "Transform: AffineTransform_double_3_3\nParameters: 1 2\n"),
               HasSubstr("a.tfm: AffineTransform has 2 parameters, expected 12"));
+  EXPECT_THAT(refusal(first + "Transform: TranslationTransform_double_3_3\nParameters: 1 2 3\nFixedParameters: 1 2\n"),
+              HasSubstr("a.tfm: has 2 FixedParameters, expected the 3 of a center"));
   EXPECT_THAT(refusal(first + "Transform: AffineTransform_double_3_3\nParameters: 2 0 0 0 2 0 0 0 2 0 0 0\n"),
               HasSubstr("a.tfm: is not rigid"));
 }

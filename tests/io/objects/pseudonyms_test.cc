@@ -19,9 +19,11 @@ TEST(Pseudonyms, AreTheSameForTheSame) {
   EXPECT_EQ(pseudonyms.text("Structure", "ptv"), "Structure 2");
   EXPECT_EQ(pseudonyms.patient_name("Smith^John"), "Patient 1");
   EXPECT_EQ(pseudonyms.patient_name("SMITH^JOHN"), "Patient 1");
+  EXPECT_EQ(pseudonyms.patient_name("Smith^John^^ "), "Patient 1");
   EXPECT_EQ(pseudonyms.patient_name("Smith^Jane"), "Patient 2");
   EXPECT_EQ(pseudonyms.birth_date("19570301"), "18500101");
   EXPECT_EQ(pseudonyms.birth_date("19570302"), "18500102");
+  EXPECT_EQ(pseudonyms.birth_date("1957.03.02"), "18500102");
   EXPECT_EQ(pseudonyms.birth_date("19570301"), "18500101");
   EXPECT_NE(Pseudonyms().uid("1.2.3"), uid);
 }
@@ -62,6 +64,23 @@ TEST(Pseudonyms, ReplaceWordsOfSentences) {
             "CT/00001.dcm: Image 2, Image 1 and kv1 at 0 " + pseudonyms.uid("1.2.3"));
   EXPECT_EQ(pseudonyms.in("MKV1"), "MKV1");
   EXPECT_EQ(pseudonyms.in("0"), "Image 3");
+  EXPECT_EQ(pseudonyms.in("0 is \"0\""), "0 is \"Image 3\"");
+}
+
+TEST(Pseudonyms, NothingStandsForNothing) {
+  Pseudonyms pseudonyms;
+  pseudonyms.patient_id("7", "");
+  EXPECT_EQ(pseudonyms.in(""), "");
+}
+
+TEST(Pseudonyms, DatesOfSentencesAreMoved) {
+  const Pseudonyms pseudonyms;
+  const std::string day = pseudonyms.date("20260301"), other_day = pseudonyms.date("2026-04-01");
+  EXPECT_EQ(pseudonyms.in("taken on 20260301, before the CT of 2026-04-01 10:15:00"),
+            "taken on " + day + ", before the CT of " + other_day + " 10:15:00");
+  EXPECT_EQ(pseudonyms.in("2026-04-01T10:15:00"), other_day + "T10:15:00");
+  for (const char* none : {"1.2.20260301.4", "20260301.5 mm", "120260301", "20261301", "a20260301"})
+    EXPECT_EQ(pseudonyms.in(none), none);
 }
 
 }  // namespace
