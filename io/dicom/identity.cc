@@ -8,6 +8,7 @@
 #include <string_view>
 
 #include "base/error.h"
+#include "base/utf8.h"
 
 namespace isoshift {
 namespace {
@@ -30,10 +31,7 @@ const Attribute kAttributes[] = {
     {DCM_ReferringPhysicianName, &Identity::referring_physician},
 };
 
-// Of UTF-8: the bytes that begin one.
-std::ptrdiff_t characters(std::string_view text) {
-  return std::ranges::count_if(text, [](char c) { return (static_cast<unsigned char>(c) & 0xC0) != 0x80; });
-}
+std::ptrdiff_t characters(std::string_view text) { return std::ranges::count_if(text, begins_character); }
 
 // Whether the value is one of its VR (PS3.5 6.2). The groups of a name (alphabetic=ideographic=phonetic) count each.
 bool is_allowed(const DcmTagKey& tag, std::string_view text) {

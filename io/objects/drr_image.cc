@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "base/error.h"
+#include "base/utf8.h"
 #include "geometry/rotation.h"
 #include "io/dicom/decode.h"
 #include "io/objects/object_header.h"
@@ -19,10 +20,8 @@ constexpr double kLineIntegralPerStored = 0.001;
 // The beginning of a text in UTF-8, whole characters only.
 std::string first_characters(const std::string& text, std::size_t count) {
   std::size_t end = 0;
-  for (std::size_t found = 0; end < text.size(); ++end) {
-    const bool begins_one = (static_cast<unsigned char>(text[end]) & 0xC0) != 0x80;
-    if (begins_one && found++ == count) break;
-  }
+  for (std::size_t found = 0; end < text.size(); ++end)
+    if (begins_character(text[end]) && found++ == count) break;
   return text.substr(0, end);
 }
 

@@ -10,6 +10,7 @@
 #include <functional>
 
 #include "base/error.h"
+#include "base/utf8.h"
 
 namespace isoshift {
 namespace {
@@ -43,7 +44,7 @@ std::string shortened(std::string_view utf8) {
   constexpr std::size_t kMostBytes = 2000;
   if (utf8.size() <= kMostBytes) return std::string(utf8);
   std::size_t end = kMostBytes;
-  while (end > 0 && (static_cast<unsigned char>(utf8[end]) & 0xC0) == 0x80) --end;  // not within a character
+  while (end > 0 && !begins_character(utf8[end])) --end;  // not within a character
   return std::string(utf8.substr(0, end)) + "…";
 }
 

@@ -10,6 +10,7 @@
 #include "base/error.h"
 #include "base/option_name.h"
 #include "geometry/rotation.h"
+#include "io/study/session.h"
 
 namespace isoshift {
 namespace {
@@ -40,8 +41,6 @@ void warn_of_planned_table(const Study& study, const std::vector<RtPlan::Beam>& 
     compare("roll", beam.roll_deg, study.table.roll_rad);
   }
 }
-
-constexpr double kSameIsocenterMm = 0.5;
 
 // An X-ray in the CT's frame of reference says where the machine's isocenter lay in it (docs/dicom.md, D2).
 void check_isocenter_of_images(const Study& study, const Allowances& allowed, Notes& notes) {

@@ -54,7 +54,6 @@ std::vector<Finding> setting_doubts(std::span<const RtImage> images) {
       doubts.push_back({"table-moved", fmt::format("{} is of fraction {}, {} of {} ({})", image.label,
                                                    *image.fraction_number, images.front().label,
                                                    *images.front().fraction_number, described(DCM_FractionNumber))});
-  constexpr double kSameIsocenterMm = 0.5;
   for (const RtImage& image : images)
     if (image.isocenter_mm && images.front().isocenter_mm &&
         (*image.isocenter_mm - *images.front().isocenter_mm).norm() > kSameIsocenterMm)

@@ -13,6 +13,8 @@
 
 namespace isoshift {
 
+constexpr double kSameIsocenterMm = 0.5;  // isocenters that lie no farther apart are the same
+
 // A file with a patient, as messages name it.
 struct PatientInput {
   const Identity* identity;

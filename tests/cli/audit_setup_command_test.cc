@@ -41,6 +41,16 @@ class AuditSetupCommandTest : public testing::Test {
     return run_command(flags);
   }
 
+  // An archive of one result, "a", and a folder with a copy of its registration object, "a.dcm".
+  fs::path objects_of_a_result() const {
+    const SmallStudy study;
+    EXPECT_EQ(run_command({"register", study.path().string(), "-o", (results() / "a").string()}).exit_status, 0);
+    const fs::path objects = folder_ / "used";
+    fs::create_directories(objects);
+    fs::copy_file(results() / "a" / "spatial_registration.dcm", objects / "a.dcm");
+    return objects;
+  }
+
   TemporaryFolder folder_;
 };
 
@@ -187,11 +197,7 @@ TEST_F(AuditSetupCommandTest, TheJsonSaysWhatItWasMadeFrom) {
 
 // What register wrote is its own used shift; the object of another patient, or of no session, is of no use.
 TEST_F(AuditSetupCommandTest, ReadsRegistrationObjectsByTheXraysTheyName) {
-  const SmallStudy study;
-  ASSERT_EQ(run_command({"register", study.path().string(), "-o", (results() / "a").string()}).exit_status, 0);
-  const fs::path objects = folder_ / "used";
-  fs::create_directories(objects);
-  fs::copy_file(results() / "a" / "spatial_registration.dcm", objects / "a.dcm");
+  const fs::path objects = objects_of_a_result();
   fs::remove(results() / "a" / "spatial_registration.dcm");
   const auto session = [&] {
     const CommandOutcome outcome = run({"--used", objects.string(), "--json"});
@@ -210,11 +216,7 @@ TEST_F(AuditSetupCommandTest, ReadsRegistrationObjectsByTheXraysTheyName) {
 
 // An object that registers another frame, such as one written the wrong way around, has no shift of the session's.
 TEST_F(AuditSetupCommandTest, AnObjectOfAnotherRegisteredFrameIsNotCompared) {
-  const SmallStudy study;
-  ASSERT_EQ(run_command({"register", study.path().string(), "-o", (results() / "a").string()}).exit_status, 0);
-  const fs::path objects = folder_ / "used";
-  fs::create_directories(objects);
-  fs::copy_file(results() / "a" / "spatial_registration.dcm", objects / "a.dcm");
+  const fs::path objects = objects_of_a_result();
   edit(objects / "a.dcm", [](DicomItem d) {
     const std::string source = d.items(DCM_RegistrationSequence)[1].required_text(DCM_FrameOfReferenceUID);
     const std::string ct = d.required_text(DCM_FrameOfReferenceUID);

@@ -18,6 +18,14 @@ using testing::HasSubstr;
 
 class ContradictionsCommandTest : public testing::Test {
  protected:
+  // One more beam, which treats.
+  static DicomItem treating_beam(DicomItem plan) {
+    DicomItem beam = plan.append_item(DCM_BeamSequence);
+    beam.put(DCM_BeamNumber, 9.0);
+    beam.put(DCM_TreatmentDeliveryType, "TREATMENT");
+    return beam;
+  }
+
   SmallStudy study_;
 };
 
@@ -182,10 +190,7 @@ TEST_F(ContradictionsCommandTest, AnIsocenterThatIsNotThePlansNeedsAReview) {
 
 TEST_F(ContradictionsCommandTest, ABeamThatTreatsElsewhereThanItWasImagedNeedsAReview) {
   edit(study_.plan(), [](DicomItem plan) {
-    DicomItem beam = plan.append_item(DCM_BeamSequence);
-    beam.put(DCM_BeamNumber, 9.0);
-    beam.put(DCM_TreatmentDeliveryType, "TREATMENT");
-    beam.append_item(DCM_ControlPointSequence).put(DCM_IsocenterPosition, "-2.5\\38\\-410");
+    treating_beam(plan).append_item(DCM_ControlPointSequence).put(DCM_IsocenterPosition, "-2.5\\38\\-410");
   });
   EXPECT_EQ(register_study(study_).exit_status, 3);
   EXPECT_THAT(result_of(study_)["reasons"].dump(),
@@ -198,10 +203,7 @@ TEST_F(ContradictionsCommandTest, AnIsocenterTypedInSettlesNoPosition) {
     DicomItem setup = plan.append_item(DCM_PatientSetupSequence);
     setup.put(DCM_PatientSetupNumber, 2.0);
     setup.put(DCM_PatientPosition, "HFP");
-    DicomItem beam = plan.append_item(DCM_BeamSequence);
-    beam.put(DCM_BeamNumber, 9.0);
-    beam.put(DCM_TreatmentDeliveryType, "TREATMENT");
-    beam.put(DCM_ReferencedPatientSetupNumber, 2.0);
+    treating_beam(plan).put(DCM_ReferencedPatientSetupNumber, 2.0);
   });
   EXPECT_EQ(register_study(study_, {"--isocenter", "-12.5,38,-410"}).exit_status, 3);
   EXPECT_THAT(result_of(study_)["reasons"].dump(), HasSubstr("beam 9 of the plan treats in HFP"));

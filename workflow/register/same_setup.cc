@@ -16,7 +16,7 @@ namespace {
 
 using Json = nlohmann::json;
 
-constexpr double kSameIsocenterMm = 0.01;  // as results round it
+constexpr double kRoundedIsocenterMm = 0.01;  // as results round it
 constexpr const char* kWhy = "a setup error is about the planned pose, so that both must have the same one";
 
 void require_same_angle(double found_deg, double expected_rad, const char* angle, const std::string& name) {
@@ -51,7 +51,7 @@ void require_same_setup(const Json& file, const std::string& name, const Study& 
                               file.at("patient_position").get<std::string>(), position, kWhy));
     if (file.contains("isocenter_patient_mm")) {
       const auto mm = file.at("isocenter_patient_mm").get<std::array<double, 3>>();
-      if ((Eigen::Vector3d(mm.data()) - study.isocenter_patient_mm).norm() > kSameIsocenterMm)
+      if ((Eigen::Vector3d(mm.data()) - study.isocenter_patient_mm).norm() > kRoundedIsocenterMm)
         throw Error(fmt::format("{}: its isocenter is ({:.2f}), and that of the study ({:.2f}): {}", name,
                                 fmt::join(mm, ", "), fmt::join(study.isocenter_patient_mm, ", "), kWhy));
     }

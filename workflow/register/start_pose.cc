@@ -49,7 +49,6 @@ Start start_of_object(CheckedRegistration object, const Study& study,
                             object.registered_frame_uid, study.ct->frame_of_reference_uid,
                             described(DCM_FrameOfReferenceUID)));
   const std::optional<Eigen::Vector3d> of_xrays_mm = isocenter_of_xrays(study, object.source_frame_uid);
-  constexpr double kSameIsocenterMm = 0.5;
   if (source_isocenter_mm && of_xrays_mm && (*source_isocenter_mm - *of_xrays_mm).norm() > kSameIsocenterMm)
     throw UsageError(
         fmt::format("{} contradicts the X-rays, whose {} in the same frame is ({}) mm: leave the switch out",
