@@ -18,9 +18,13 @@
 #include <vector>
 
 #include "base/error.h"
+#include "base/output_folder.h"
 #include "base/version.h"
 #include "cli/commands/commands.h"
+#include "cli/completion.h"
+#include "cli/help_formatter.h"
 #include "cli/man_pages.h"
+#include "cli/suggestion.h"
 #include "io/report/canvas.h"
 
 namespace isoshift {
@@ -28,13 +32,23 @@ namespace {
 
 constexpr const char* kDescription =
     "isoshift compares the planning CT with the X-rays taken in the treatment room, finds how far the patient lies "
-    "off\n"
-    "plan, and says how the couch must move. Not for clinical use unless validated by the site.\n\n"
+    "off plan, and says how the couch must move. Not for clinical use unless validated by the site.\n\n"
     "Example:\n"
     "  isoshift inspect exported/            # what is in the folder, and what is missing\n"
-    "  isoshift register exported/ -o out    # finds the shift; writes out/report.txt, result.json, ...\n";
+    "  isoshift register exported/ -o out    # finds the shift; writes the report\n";
 
-constexpr const char* kFooter = "\nExit status: 0 accepted (or done), 1 failed, 2 usage, 3 review, 4 rejected.";
+constexpr const char* kFooter =
+    "\nisoshift help COMMAND explains a command.\n"
+    "Exit status: 0 accepted (or done), 1 failed, 2 usage, 3 review, 4 rejected.";
+
+// Every command and family below an app.
+template <class App, class Do>
+void for_each_command(App& app, const Do& act) {
+  for (auto* command : app.get_subcommands({})) {
+    act(*command);
+    for_each_command(*command, act);
+  }
+}
 
 // Names of files and sessions may hold what a terminal would obey.
 int say(Console& console, const std::exception& error, int status) {
@@ -61,60 +75,107 @@ void expect_whole_numbers(CLI::App& command) {
   }
 }
 
+using AddCommand = void (*)(CLI::App& app, Console& console, int& exit_status);
+
+// Commands that stand together under a name: isoshift room watch.
+CLI::App& add_family(CLI::App& app, const char* name, const char* description) {
+  CLI::App& family = *app.add_subcommand(name, description);
+  family.require_subcommand(1);
+  return family;
+}
+
 void add_commands(CLI::App& app, Console& console, int& exit_status) {
+  app.formatter(std::make_shared<HelpFormatter>(terminal_columns()));
+  app.get_formatter()->column_width(28);
   app.footer(kFooter);
   app.require_subcommand(1);
   app.set_version_flag("--version", fmt::format("isoshift {} ({})", kVersion, kCommit));
-  app.get_formatter()->column_width(34);
-  add_inspect_command(app, console, exit_status);
-  add_check_command(app, console, exit_status);
-  add_report_command(app, console, exit_status);
-  add_register_command(app, console, exit_status);
-  add_batch_command(app, console, exit_status);
-  add_drr_command(app, console, exit_status);
-  add_phantom_command(app, console, exit_status);
-  add_deidentify_command(app, console, exit_status);
-  add_bundle_command(app, console, exit_status);
-  add_evaluate_command(app, console, exit_status);
-  add_track_command(app, console, exit_status);
-  add_predict_command(app, console, exit_status);
-  add_commission_command(app, console, exit_status);
-  add_geometry_command(app, console, exit_status);
-  add_scout_command(app, console, exit_status);
-  add_watch_command(app, console, exit_status);
-  add_serve_command(app, console, exit_status);
-  add_view_command(app, console, exit_status);
-  add_release_command(app, console, exit_status);
-  add_delete_command(app, console, exit_status);
-  add_audit_command(app, console, exit_status);
-  add_audit_setup_command(app, console, exit_status);
-  add_bench_command(app, console, exit_status);
-  for (CLI::App* command : app.get_subcommands({})) expect_whole_numbers(*command);
+  const auto add = [&](CLI::App& parent, const char* group, std::initializer_list<AddCommand> commands) {
+    const std::size_t before = parent.get_subcommands({}).size();
+    for (const AddCommand command : commands) command(parent, console, exit_status);
+    const std::vector<CLI::App*> all = parent.get_subcommands({});
+    for (std::size_t n = before; n < all.size(); ++n) all[n]->group(group);
+  };
+  add(app, "Register",
+      {add_inspect_command, add_register_command, add_batch_command, add_view_command, add_track_command});
+  add(app, "Check and share", {add_report_command, add_check_command, add_deidentify_command, add_bundle_command});
+  add(app, "Try and measure",
+      {add_drr_command, add_phantom_command, add_evaluate_command, add_predict_command, add_bench_command});
+  CLI::App& room =
+      add_family(app, "room", "Run a treatment room: register X-rays as they arrive, show and release them");
+  CLI::App& qa = add_family(app, "qa", "Commission and supervise: localization, imagers, CT scouts, a year of shifts");
+  for (CLI::App* family : {&room, &qa}) family->group("Room and quality assurance");
+  add(room, "Commands",
+      {add_watch_command, add_serve_command, add_release_command, add_delete_command, add_audit_command});
+  add(qa, "Commands", {add_commission_command, add_geometry_command, add_scout_command, add_audit_setup_command});
+  for_each_command(app, [](CLI::App& command) { expect_whole_numbers(command); });
 }
 
+// How a command is called behind `isoshift`: "room watch".
+std::string path_of(const CLI::App& command) {
+  const CLI::App* parent = command.get_parent();
+  return parent == nullptr ? "" : path_of(*parent) + (path_of(*parent).empty() ? "" : " ") + command.get_name();
+}
+
+// The command that these words would call, were it not mistyped; nothing where none is like it.
+std::string command_like(const CLI::App& app, std::string_view word) {
+  std::vector<std::string> names, paths;
+  for_each_command(app, [&](const CLI::App& command) {
+    names.push_back(command.get_name());
+    paths.push_back(path_of(command));
+  });
+  const std::string name = suggestion(word, names);
+  return name.empty() ? "" : paths[static_cast<std::size_t>(std::ranges::find(names, name) - names.begin())];
+}
+
+std::string did_you_mean(const std::string& what) { return what.empty() ? "" : "; did you mean " + what + "?"; }
+
 // CLI11 would say only that a command is missing, or of what stands before it that the command lacks it.
-void check_command(const CLI::App& app, std::span<const char* const> words) {
+void check_command(const CLI::App& app, std::span<const std::string> words) {
+  if (words.empty()) return;
   std::vector<std::string> names;
   for (const CLI::App* command : app.get_subcommands({})) names.push_back(command->get_name());
-  const auto is_command = [&](std::string_view word) { return std::ranges::count(names, word) > 0; };
-  const auto command = std::ranges::find_if(words, is_command);
-  if (words.empty() || command == words.begin()) return;
-  const std::string_view first = words.front();
-  if (!first.starts_with('-'))
-    throw UsageError(fmt::format("there is no command {}; the commands are {}", first, fmt::join(names, ", ")));
-  if (command != words.end() && app.get_option_no_throw(std::string(first)) == nullptr)
-    throw UsageError(fmt::format("{} belongs behind the command: isoshift {} ... {}", first, *command, first));
+  const auto command = std::ranges::find_first_of(words, names);
+  const std::string &first = words.front(), path = path_of(app);
+  if (command == words.begin()) return check_command(*app.get_subcommand(first), words.subspan(1));
+  if (names.empty()) return;
+  const std::string program = path.empty() ? "isoshift" : "isoshift " + path;
+  if (!first.starts_with('-')) {
+    const std::string meant = command_like(app, first);
+    throw UsageError(
+        meant.empty() ? fmt::format("{} has no command {}; its commands are {}", program, first, fmt::join(names, ", "))
+                      : fmt::format("{} has no command {}; did you mean isoshift {}?", program, first, meant));
+  }
+  if (command != words.end() && app.get_option_no_throw(first) == nullptr)
+    throw UsageError(fmt::format("{} belongs behind the command: {} {} ... {}", first, program, *command, first));
+}
+
+// What CLI11 did not expect, each with what it probably was to be.
+std::string unexpected_words(const CLI::App& app) {
+  const CLI::App* command = &app;
+  while (!command->get_subcommands().empty()) command = command->get_subcommands().back();
+  std::vector<std::string> flags, complaints;
+  for (const CLI::Option* option : command->get_options())
+    for (const std::string& name : option->get_lnames()) flags.push_back("--" + name);
+  for (const std::string& word : app.remaining(true)) {
+    const std::string name = word.substr(0, word.find('='));
+    complaints.push_back(word.starts_with('-')
+                             ? fmt::format("isoshift {} has no flag {}{}", path_of(*command), name,
+                                           did_you_mean(suggestion(name, flags)))
+                             : fmt::format("isoshift {} does not expect {}", path_of(*command), word));
+  }
+  return fmt::format("{}", fmt::join(complaints, "\n       "));
 }
 
 // "--site: " for the value of a flag.
-std::string flag_before(std::span<const char* const> words, std::size_t n) {
+std::string flag_before(std::span<const std::string> words, std::size_t n) {
   const std::string_view before = n > 0 ? words[n - 1] : "";
   return before.starts_with('-') ? std::string(before) + ": " : "";
 }
 
 // An empty value comes from a variable of a script that is unset: what it was meant to switch on would be left out. No
 // limit holds for what is not a number.
-void check_words(std::span<const char* const> words) {
+void check_words(std::span<const std::string> words) {
   for (std::size_t n = 0; n < words.size(); ++n) {
     const std::string_view word = words[n];
     const std::size_t equals = word.starts_with("--") ? word.find('=') : word.npos;
@@ -153,6 +214,7 @@ void write_manual(const std::filesystem::path& folder) {
   CLI::App app(kDescription, "isoshift");
   add_commands(app, console, exit_status);
   write_man_pages(app, folder);
+  replace_text(folder / "isoshift.bash", bash_completion(app));
 }
 
 int run_isoshift(int argc, const char* const* argv, Console& console) {
@@ -160,10 +222,19 @@ int run_isoshift(int argc, const char* const* argv, Console& console) {
   CLI::App app(kDescription, "isoshift");
   add_commands(app, console, exit_status);
   try {
-    const auto words = std::span(argv, static_cast<std::size_t>(argc)).subspan(1);
+    std::vector<std::string> words(argv + 1, argv + argc);
+    if (!words.empty() && words.front() == "help") {  // isoshift help room watch
+      words.erase(words.begin());
+      words.push_back("--help");
+    }
     check_command(app, words);
     check_words(words);
-    app.parse(argc, argv);
+    std::ranges::reverse(words);  // as CLI11 takes them
+    app.parse(words);
+  } catch (const CLI::ExtrasError&) {
+    console.err << "error: " << printable_lines(unexpected_words(app))
+                << "\n       isoshift COMMAND --help explains the flags\n";
+    return kExitUsage;
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() == 0) {  // the help, or the version
       app.exit(error, console.out, console.err);

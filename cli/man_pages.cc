@@ -2,11 +2,17 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <sstream>
+
 #include "base/output_folder.h"
 #include "base/version.h"
+#include "cli/help_formatter.h"
 
 namespace isoshift {
 namespace {
+
+constexpr std::size_t kColumns = 76;  // of lines that man does not fill
 
 // A text as roff takes it: as it is.
 std::string roff(const std::string& text) {
@@ -26,7 +32,15 @@ std::string roff(const std::string& text) {
 }
 
 // Lines that are to stay lines.
-std::string preformatted(const std::string& text) { return ".nf\n" + roff(text) + "\n.fi\n"; }
+std::string preformatted(const std::string& text) { return ".nf\n" + roff(wrapped(text, kColumns)) + "\n.fi\n"; }
+
+// A text that is filled, but begins a line where its author did.
+std::string paragraph(const std::string& text) {
+  std::string page;
+  std::istringstream lines(text);
+  for (std::string line; std::getline(lines, line);) page += (page.empty() ? "" : ".br\n") + roff(line) + "\n";
+  return page;
+}
 
 std::string options_of(const CLI::App& command) {
   const CLI::Formatter formatter;
@@ -36,8 +50,8 @@ std::string options_of(const CLI::App& command) {
     for (const CLI::Option* option : command.get_options()) {
       if (option->get_group() != group || group.empty()) continue;
       entries +=
-          fmt::format(".TP\n\\fB{}\\fR{}\n{}\n", roff(formatter.make_option_name(option, option->get_positional())),
-                      roff(formatter.make_option_opts(option)), roff(option->get_description()));
+          fmt::format(".TP\n\\fB{}\\fR{}\n{}", roff(formatter.make_option_name(option, option->get_positional())),
+                      roff(formatter.make_option_opts(option)), paragraph(option->get_description()));
     }
     if (entries.empty()) continue;
     if (group != "Options") page += ".SS " + roff(group) + "\n";
@@ -46,31 +60,37 @@ std::string options_of(const CLI::App& command) {
   return page;
 }
 
-std::string page_of(const CLI::App& command, const std::string& name, const std::string& summary) {
+std::string page_name(std::string called) {
+  std::ranges::replace(called, ' ', '-');
+  return called;
+}
+
+// The page of a command, and those of the commands below it. `called`: as in a shell, "isoshift room watch", whose page
+// is isoshift-room-watch(1).
+void write_pages(const CLI::App& command, const std::string& called, const std::string& summary,
+                 const std::filesystem::path& folder) {
+  const std::string name = page_name(called);
+  const auto commands = command.get_subcommands({});
   std::string page = fmt::format(".TH {} 1 \"\" \"isoshift {}\"\n.SH NAME\n{} \\- {}\n", roff(name), kVersion,
                                  roff(name), roff(summary));
-  const auto commands = command.get_subcommands([](const CLI::App*) { return true; });
-  page += fmt::format(".SH SYNOPSIS\n\\fBisoshift\\fR {}\n",
-                      commands.empty() ? roff(command.get_name()) + " [OPTIONS]" : "COMMAND [OPTIONS]");
-  if (!commands.empty()) page += ".SH DESCRIPTION\n" + preformatted(command.get_description());
+  page += fmt::format(".SH SYNOPSIS\n\\fB{}\\fR {}[OPTIONS]\n", roff(called), commands.empty() ? "" : "COMMAND ");
+  if (command.get_parent() == nullptr) page += ".SH DESCRIPTION\n" + preformatted(command.get_description());
   page += ".SH OPTIONS\n" + options_of(command);
-  if (!commands.empty()) {
-    page += ".SH COMMANDS\n";
-    for (const CLI::App* one : commands)
-      page += fmt::format(".TP\n\\fBisoshift\\-{}\\fR(1)\n{}\n", roff(one->get_name()), roff(one->get_description()));
+  if (!commands.empty()) page += ".SH COMMANDS\n";
+  for (const CLI::App* below : commands) {
+    const std::string called_below = called + " " + below->get_name();
+    page += fmt::format(".TP\n\\fB{}\\fR(1)\n{}", roff(page_name(called_below)), paragraph(below->get_description()));
+    write_pages(*below, called_below, below->get_description(), folder);
   }
-  return page + ".SH NOTES\n" + preformatted(command.get_footer());
+  if (!command.get_footer().empty()) page += ".SH NOTES\n" + preformatted(command.get_footer());
+  replace_text(folder / (name + ".1"), page);
 }
 
 }  // namespace
 
 void write_man_pages(const CLI::App& app, const std::filesystem::path& folder) {
   std::filesystem::create_directories(folder);
-  replace_text(folder / "isoshift.1",
-               page_of(app, "isoshift", "2D/3D registration of treatment-room X-rays with the planning CT"));
-  for (const CLI::App* command : app.get_subcommands([](const CLI::App*) { return true; }))
-    replace_text(folder / fmt::format("isoshift-{}.1", command->get_name()),
-                 page_of(*command, "isoshift-" + command->get_name(), command->get_description()));
+  write_pages(app, "isoshift", "2D/3D registration of treatment-room X-rays with the planning CT", folder);
 }
 
 }  // namespace isoshift

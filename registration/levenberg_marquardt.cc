@@ -1,8 +1,9 @@
 #include "registration/levenberg_marquardt.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+
+#include "geometry/linear_algebra.h"
 
 namespace isoshift {
 namespace {
@@ -17,11 +18,10 @@ Eigen::VectorXd best_step(const Eigen::VectorXd& gradient, Eigen::MatrixXd curva
   Eigen::VectorXd step;
   for (int n = 0; n < kMostSteps; ++n) {
     curvature.diagonal().array() += added;
-    const Eigen::LLT<Eigen::MatrixXd> roots(curvature);
-    step = roots.solve(gradient);
+    step = solve_symmetric(curvature, gradient);
     const double length = step.norm();
     if (length <= kLonger * radius) break;
-    added = step.squaredNorm() / roots.matrixL().solve(step).squaredNorm() * (length - radius) / radius;
+    added = step.squaredNorm() / step.dot(solve_symmetric(curvature, step).col(0)) * (length - radius) / radius;
   }
   return step;
 }

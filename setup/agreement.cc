@@ -1,11 +1,9 @@
 #include "setup/agreement.h"
 
-#include <boost/math/distributions/binomial.hpp>
-#include <boost/math/distributions/normal.hpp>
-#include <boost/math/distributions/students_t.hpp>
 #include <cmath>
 #include <map>
 
+#include "base/distributions.h"
 #include "base/mean_and_sd.h"
 
 namespace isoshift {
@@ -14,9 +12,7 @@ namespace {
 constexpr double kTail = 0.025;  // on each side of a 95 % interval
 
 // Standard errors that half of the 95 % interval is wide.
-double standard_errors(std::size_t freedom) {
-  return quantile(complement(boost::math::students_t(static_cast<double>(freedom)), kTail));
-}
+double standard_errors(std::size_t freedom) { return students_t_quantile(static_cast<double>(freedom), kTail); }
 
 }  // namespace
 
@@ -47,16 +43,12 @@ Agreement agreement_of(std::span<const double> differences, std::span<const std:
 
 double sigmas_hardly_exceeded(std::size_t errors) {
   constexpr double kCases = 0.01;
-  return quantile(complement(boost::math::normal(), 0.5 * kCases / static_cast<double>(errors)));
+  return normal_quantile(0.5 * kCases / static_cast<double>(errors));
 }
 
 Share share_of(std::size_t of, std::size_t total) {
-  using Binomial = boost::math::binomial_distribution<>;
-  const auto trials = static_cast<double>(total), successes = static_cast<double>(of);
-  return {.of = of,
-          .total = total,
-          .low = Binomial::find_lower_bound_on_p(trials, successes, kTail),
-          .high = Binomial::find_upper_bound_on_p(trials, successes, kTail)};
+  const ShareBounds bounds = clopper_pearson(static_cast<double>(total), static_cast<double>(of), kTail);
+  return {.of = of, .total = total, .low = bounds.low, .high = bounds.high};
 }
 
 }  // namespace isoshift

@@ -32,7 +32,7 @@ void add_bundle_command(CLI::App& app, Console& console, int& exit_status);
 void add_evaluate_command(CLI::App& app, Console& console, int& exit_status);
 void add_bench_command(CLI::App& app, Console& console, int& exit_status);
 
-// Writes the manual pages of all commands into a folder.
+// Writes the manual pages of all commands into a folder, and isoshift.bash, which completes them.
 void write_manual(const std::filesystem::path& folder);
 
 // The whole program: parses the command line, runs the command, and turns every exception into a message and an exit

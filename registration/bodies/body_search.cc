@@ -2,11 +2,10 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 
 #include "base/stopwatch.h"
+#include "geometry/linear_algebra.h"
 #include "registration/bodies/body_objective.h"
 #include "registration/levenberg_marquardt.h"
 
@@ -74,9 +73,8 @@ StageReport report_of(const BodyStage& stage, const OptimizerResult& climbed, do
 
 double image_share(const Eigen::Matrix3d& covariance, const Eigen::Matrix3d& on_loose_springs) {
   // Variances of what images alone show do not grow; those of what springs alone hold grow fourfold.
-  const Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::Matrix3d> growth(on_loose_springs, covariance,
-                                                                         Eigen::EigenvaluesOnly);
-  return std::clamp((4.0 - growth.eigenvalues().maxCoeff()) / 3.0, 0.0, 1.0);
+  const double growth = generalized_eigenvalues(on_loose_springs, covariance).maxCoeff();
+  return std::clamp((4.0 - growth) / 3.0, 0.0, 1.0);
 }
 
 std::vector<float> RenderedBodies::line_integrals(const Objective& pixels, const BodyPoses& poses,
@@ -126,11 +124,11 @@ BodyCertainty certainty_of(const BodyScene& scene, const BodyPoses& poses, const
   const BodyObjective::Parts parts = objective.parts(slots, at_base);
   const QuadraticModel images = parts.of_all_views();
   const Eigen::MatrixXd motions = slots.motions_of_bodies(at_base);
-  const auto solver = Eigen::MatrixXd(images.curvature + parts.springs.curvature).ldlt();
+  const Eigen::MatrixXd held = images.curvature + parts.springs.curvature;
   const Eigen::MatrixXd loose = images.curvature + 0.25 * parts.springs.curvature;
-  return {.covariance = motions * solver.solve(motions.transpose()),
-          .covariance_on_loose_springs = motions * loose.ldlt().solve(motions.transpose()),
-          .motions_left = motions * solver.solve(images.gradient + parts.springs.gradient)};
+  return {.covariance = product(motions, solve_symmetric(held, motions.transpose())),
+          .covariance_on_loose_springs = product(motions, solve_symmetric(loose, motions.transpose())),
+          .motions_left = product(motions, solve_symmetric(held, images.gradient + parts.springs.gradient))};
 }
 
 }  // namespace isoshift

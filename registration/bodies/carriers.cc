@@ -4,6 +4,7 @@
 #include <limits>
 #include <numeric>
 
+#include "geometry/linear_algebra.h"
 #include "geometry/rotation.h"
 
 namespace isoshift {
@@ -99,11 +100,11 @@ CarriedTarget Carriers::target_at(const BodyPoses& poses, const BodyCertainty& c
   CarriedTarget target{.setup_error = setup_error_at(poses)};
   target.deformation_mm = off_from(target.setup_error, poses).most_mm;
   const Eigen::MatrixXd per_motions = motion_per_motions();
-  target.covariance = per_motions * certainty.covariance * per_motions.transpose();
-  const Eigen::MatrixXd to_center = place_per_motion(target.setup_error * center_room_mm_) * per_motions;
-  target.image_share = image_share(to_center * certainty.covariance * to_center.transpose(),
-                                   to_center * certainty.covariance_on_loose_springs * to_center.transpose());
-  target.left_mm = (to_center * certainty.motions_left).norm();
+  target.covariance = propagated(per_motions, certainty.covariance);
+  const Eigen::MatrixXd to_center = product(place_per_motion(target.setup_error * center_room_mm_), per_motions);
+  target.image_share = image_share(propagated(to_center, certainty.covariance),
+                                   propagated(to_center, certainty.covariance_on_loose_springs));
+  target.left_mm = product(to_center, certainty.motions_left).norm();
   return target;
 }
 

@@ -1,6 +1,7 @@
 #include "registration/bodies/pose_slots.h"
 
 #include "geometry/rotation.h"
+#include "geometry/linear_algebra.h"
 #include "registration/pose_parameters.h"
 
 namespace isoshift {
@@ -37,7 +38,7 @@ Eigen::Matrix<double, 6, 6> PoseSlots::motions(std::size_t slot, std::span<const
   // Turning about a center c is turning about the isocenter and moving by c x rotation.
   Eigen::Matrix<double, 6, 6> about_isocenter = Eigen::Matrix<double, 6, 6>::Identity();
   about_isocenter.topRightCorner<3, 3>() = cross_matrix(center_room_mm_[slot]);
-  return about_isocenter * motions_per_parameter(parameters.subspan(kParameters * slot, kParameters));
+  return product(about_isocenter, motions_per_parameter(parameters.subspan(kParameters * slot, kParameters)));
 }
 
 Eigen::MatrixXd PoseSlots::motions_of_bodies(std::span<const double> parameters) const {

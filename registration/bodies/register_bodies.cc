@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "base/stopwatch.h"
+#include "geometry/linear_algebra.h"
 #include "geometry/rotation.h"
 #include "geometry/seen_motions.h"
 #include "geometry/voxel_box.h"
@@ -52,7 +53,7 @@ void report_match(const BodyScene& scene, const Carriers& carriers, const Carrie
   const PoseSlots slots(scene.bodies, scene.fine.apart, poses);
   const std::vector<double> at_base(PoseSlots::kParameters * slots.count(), 0.0);
   const BodyObjective::Parts parts = objective.parts(slots, at_base);
-  const Eigen::MatrixXd target_motion = carriers.motion_per_motions() * slots.motions_of_bodies(at_base);
+  const Eigen::MatrixXd target_motion = product(carriers.motion_per_motions(), slots.motions_of_bodies(at_base));
   const std::vector<Vector3d> points = points_near(target.setup_error * center_room_mm);
   for (std::size_t view = 0; view < level.size(); ++view) {
     ViewMatch& match = result.views[view];
@@ -63,13 +64,12 @@ void report_match(const BodyScene& scene, const Carriers& carriers, const Carrie
     const QuadraticModel& alone = parts.views[view];
     const Eigen::MatrixXd held = alone.curvature + parts.springs.curvature +
                                  kSpring * Eigen::MatrixXd::Identity(alone.curvature.rows(), alone.curvature.cols());
-    const auto solver = held.ldlt();
     const Eigen::MatrixXd seen =
-        seen_motions(level[view].view, points) / pixels_per_mm(level[view].view) * target_motion;
+        product(seen_motions(level[view].view, points) / pixels_per_mm(level[view].view), target_motion);
     const auto count = static_cast<double>(points.size());
-    const Eigen::VectorXd wanted = solver.solve(alone.gradient + parts.springs.gradient);
-    match.contradiction = {.mm = (seen * wanted).norm() / std::sqrt(count),
-                           .sigma_mm = std::sqrt((seen * solver.solve(seen.transpose())).trace() / count)};
+    const Eigen::VectorXd wanted = solve_symmetric(held, alone.gradient + parts.springs.gradient);
+    match.contradiction = {.mm = product(seen, wanted).norm() / std::sqrt(count),
+                           .sigma_mm = std::sqrt(product(seen, solve_symmetric(held, seen.transpose())).trace() / count)};
   }
 }
 
@@ -92,8 +92,8 @@ std::vector<BodyMotion> motions_of(const JointedBodies& bodies, const BodyRender
     Eigen::MatrixXd difference = -target_motion;
     difference.middleCols<6>(static_cast<Eigen::Index>(6 * n)) += Eigen::Matrix<double, 6, 6>::Identity();
     const Eigen::Matrix<double, 3, 6> at_center = place_per_motion(poses[n].front() * renderers.center_patient_mm(n));
-    const Eigen::MatrixXd per_motions = target.setup_error.linear().transpose() * at_center * difference;
-    const Vector3d variance = (per_motions * certainty.covariance * per_motions.transpose()).diagonal();
+    const Eigen::MatrixXd per_motions = product(target.setup_error.linear().transpose() * at_center, difference);
+    const Vector3d variance = propagated(per_motions, certainty.covariance).diagonal();
     Eigen::MatrixXd own = Eigen::MatrixXd::Zero(3, difference.cols());
     own.middleCols<6>(static_cast<Eigen::Index>(6 * n)) = at_center;
     motions.push_back({.name = body.name,
@@ -103,8 +103,8 @@ std::vector<BodyMotion> motions_of(const JointedBodies& bodies, const BodyRender
                        .rotation_rad = rotation_vector(against.linear()),
                        .sigma_mm = kSigmaOfMotions * variance.cwiseSqrt(),
                        .carries_target = carriers.shares()[n],
-                       .image_share = image_share(own * certainty.covariance * own.transpose(),
-                                                  own * certainty.covariance_on_loose_springs * own.transpose()),
+                       .image_share = image_share(propagated(own, certainty.covariance),
+                                                  propagated(own, certainty.covariance_on_loose_springs)),
                        .breathes = body.breathes});
   }
   return motions;

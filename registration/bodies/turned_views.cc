@@ -5,6 +5,7 @@
 #include <utility>
 #include <vector>
 
+#include "geometry/linear_algebra.h"
 #include "registration/bodies/body_objective.h"
 #include "registration/bodies/pose_slots.h"
 #include "registration/objective.h"
@@ -23,7 +24,7 @@ struct PoseInView {
   Eigen::VectorXd gradient;
   Eigen::MatrixXd curvature;
 
-  Eigen::VectorXd step() const { return curvature.ldlt().solve(gradient); }
+  Eigen::VectorXd step() const { return solve_symmetric(curvature, gradient); }
 };
 
 }  // namespace
@@ -87,14 +88,14 @@ class TurnedViews::Implementation {
     const QuadraticModel& by_slots = parts.views[view];
     Eigen::MatrixXd together(by_slots.gradient.size(), 6);
     for (std::size_t slot = 0; slot < slots.count(); ++slot)
-      together.middleRows<6>(static_cast<Eigen::Index>(6 * slot)) = slots.motions(slot, at_base).inverse() * ways;
+      together.middleRows<6>(static_cast<Eigen::Index>(6 * slot)) = product(inverse(slots.motions(slot, at_base)), ways);
     // What the view does not see is held.
     Eigen::VectorXd held = Eigen::VectorXd::Constant(6, kSpring);
     held.tail<3>() *= kLeverMm * kLeverMm;
     return {.room_from_patient = room_from_patient,
             .value = by_slots.value,
-            .gradient = together.transpose() * by_slots.gradient,
-            .curvature = together.transpose() * by_slots.curvature * together + Eigen::MatrixXd(held.asDiagonal())};
+            .gradient = transposed_product(together, by_slots.gradient),
+            .curvature = pulled_back(together, by_slots.curvature) + Eigen::MatrixXd(held.asDiagonal())};
   }
 
   const BodyScene& scene_;

@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/LU>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -12,6 +11,7 @@
 
 #include "base/error.h"
 #include "base/median.h"
+#include "geometry/linear_algebra.h"
 #include "registration/preprocess/image_operations.h"
 #include "registration/preprocess/preprocess.h"
 
@@ -145,9 +145,9 @@ std::optional<Background> background_of(const Image<float>& image, const Eigen::
       normal += rows[n] * rows[n].transpose();
       right += values[n] * rows[n];
     }
-    const Eigen::FullPivLU<Eigen::Matrix3d> solver(normal);
-    if (!solver.isInvertible()) return std::nullopt;
-    plane = solver.solve(right);
+    const Eigen::VectorXd sizes = symmetric_eigen(normal).values;
+    if (!(sizes[0] > 1e-12 * sizes[2])) return std::nullopt;
+    plane = solve_symmetric(normal, right);
   }
   return Background{.value = plane[0], .slope = plane.tail<2>()};
 }

@@ -3,7 +3,6 @@
 #include <ceres/ceres.h>
 #include <fmt/format.h>
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -12,6 +11,7 @@
 
 #include "base/error.h"
 #include "base/median.h"
+#include "geometry/linear_algebra.h"
 #include "registration/pose_parameters.h"
 
 namespace isoshift {
@@ -264,8 +264,8 @@ class Adjustment {
     for (int row = 0; row < sparse.num_rows; ++row)
       for (int n = sparse.rows[static_cast<std::size_t>(row)]; n < sparse.rows[static_cast<std::size_t>(row) + 1]; ++n)
         jacobian(row, sparse.cols[static_cast<std::size_t>(n)]) = sparse.values[static_cast<std::size_t>(n)];
-    const Eigen::MatrixXd information = jacobian.transpose() * jacobian;
-    return information.ldlt().solve(Eigen::MatrixXd::Identity(information.rows(), information.cols()));
+    const Eigen::MatrixXd information = transposed_product(jacobian, jacobian);
+    return solve_symmetric(information, Eigen::MatrixXd::Identity(information.rows(), information.cols()));
   }
 
   void add_pose_sigmas(const Eigen::MatrixXd& variances, BundleAdjustment& adjustment) const {

@@ -1,9 +1,9 @@
 #include "registration/imager/imager_effect.h"
 
-#include <Eigen/QR>
 #include <map>
 #include <vector>
 
+#include "geometry/linear_algebra.h"
 #include "geometry/target_error.h"
 
 namespace isoshift {
@@ -46,11 +46,10 @@ Uncertainty uncertainty_by_imagers(std::span<const ImagerInView> views, Dof dof)
     row += count;
   }
   const Eigen::Index axes = dof == Dof::kRigid ? 6 : 3;
-  const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> solver(by_motions.leftCols(axes));
   Uncertainty uncertainty;
   for (const auto& [imager, errors] : by_errors) {
-    const Eigen::MatrixXd motions = solver.solve(errors);
-    uncertainty.covariance.topLeftCorner(axes, axes) += motions * motions.transpose();
+    const Eigen::MatrixXd motions = least_squares(by_motions.leftCols(axes), errors);
+    uncertainty.covariance.topLeftCorner(axes, axes) += product(motions, motions.transpose());
   }
   return uncertainty;
 }

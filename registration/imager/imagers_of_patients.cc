@@ -1,13 +1,12 @@
 #include "registration/imager/imagers_of_patients.h"
 
-#include <Eigen/Cholesky>
-#include <Eigen/QR>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <map>
 
 #include "base/error.h"
+#include "geometry/linear_algebra.h"
 #include "registration/imager/imager_effect.h"
 
 namespace isoshift {
@@ -22,7 +21,7 @@ constexpr double kFreedom = 4.0;  // of the t-distribution
 // The motions that look like a unit of each error in a view.
 Eigen::Matrix<double, 6, kImagerParameters> motions_like_errors(const ImagerModel& model) {
   const SeenBy seen = seen_by(model);
-  return seen.motions.colPivHouseholderQr().solve(seen.errors);
+  return least_squares(seen.motions, seen.errors);
 }
 
 // What a session tells of the errors, its own pose eliminated: errors' information * errors = seen.
@@ -33,36 +32,36 @@ struct Told {
   double freedom = 0.0;  // how many numbers that are
 
   double misfit(const Eigen::VectorXd& errors) const {
-    return squares - 2.0 * errors.dot(seen) + errors.dot(information * errors);
+    return squares - 2.0 * errors.dot(seen) + pulled_back(errors, information).value();
   }
 };
 
 Told told_by(const PatientSession& session, std::size_t imagers) {
   const auto parameters = static_cast<Eigen::Index>(imagers * kImagerParameters);
   Told told{.information = Eigen::MatrixXd::Zero(parameters, parameters), .seen = Eigen::VectorXd::Zero(parameters)};
-  Eigen::Matrix<double, 6, 6> of_pose = Eigen::Matrix<double, 6, 6>::Zero();
+  Eigen::MatrixXd of_pose = Eigen::MatrixXd::Zero(6, 6);
   Eigen::MatrixXd pose_by_errors = Eigen::MatrixXd::Zero(6, parameters);
   Motion pose_seen = Motion::Zero();
   for (const PatientView& view : session.views) {
-    Eigen::Matrix<double, 6, 6> covariance = view.wanted.covariance;
+    Eigen::MatrixXd covariance = view.wanted.covariance;
     covariance.diagonal().head<3>().array() += kFloorMm * kFloorMm;
     covariance.diagonal().tail<3>().array() += kFloorRad * kFloorRad;
-    const Eigen::Matrix<double, 6, 6> weight = covariance.inverse();
+    const Eigen::MatrixXd weight = inverse(covariance);
     Eigen::MatrixXd like = Eigen::MatrixXd::Zero(6, parameters);
     like.middleCols<kImagerParameters>(static_cast<Eigen::Index>(view.imager * kImagerParameters)) =
         motions_like_errors(view.model);
-    told.information += like.transpose() * weight * like;
-    told.seen += like.transpose() * weight * view.wanted.motion;
-    told.squares += view.wanted.motion.dot(weight * view.wanted.motion);
+    told.information += pulled_back(like, weight);
+    told.seen += transposed_product(like, product(weight, view.wanted.motion));
+    told.squares += pulled_back(view.wanted.motion, weight).value();
     of_pose += weight;
-    pose_by_errors += weight * like;
-    pose_seen += weight * view.wanted.motion;
+    pose_by_errors += product(weight, like);
+    pose_seen += product(weight, view.wanted.motion);
     told.freedom += 6.0;
   }
-  const Eigen::LDLT<Eigen::Matrix<double, 6, 6>> solver(of_pose);
-  told.information -= pose_by_errors.transpose() * solver.solve(pose_by_errors);
-  told.seen -= pose_by_errors.transpose() * solver.solve(pose_seen);
-  told.squares -= pose_seen.dot(solver.solve(pose_seen));
+  const Eigen::MatrixXd pose_alone = solve_symmetric(of_pose, pose_seen);
+  told.information -= transposed_product(pose_by_errors, solve_symmetric(of_pose, pose_by_errors));
+  told.seen -= transposed_product(pose_by_errors, pose_alone);
+  told.squares -= transposed_product(pose_seen, pose_alone).value();
   told.freedom -= 6.0;
   return told;
 }
@@ -104,8 +103,8 @@ Fit fitted(std::span<const Told> sessions, std::size_t imagers) {
     }
     fit.misfit = std::sqrt(squares / freedom);
     const double scale = 1.0 / std::max(1.0, fit.misfit * fit.misfit);
-    fit.covariance = (scale * information + prior).inverse();
-    fit.errors = fit.covariance * (scale * seen);
+    fit.covariance = inverse(scale * information + prior);
+    fit.errors = product(fit.covariance, scale * seen);
   }
   return fit;
 }

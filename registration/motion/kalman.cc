@@ -1,6 +1,7 @@
 #include "registration/motion/kalman.h"
 
-#include <Eigen/Cholesky>
+#include "geometry/linear_algebra.h"
+
 
 namespace isoshift {
 namespace {
@@ -15,7 +16,7 @@ ConstantVelocityKalman::State ConstantVelocityKalman::at(double time_s) const {
   const Eigen::Index n = mean_.size() / 2;
   Eigen::MatrixXd step = Eigen::MatrixXd::Identity(2 * n, 2 * n);
   step.topRightCorner(n, n).diagonal().setConstant(dt);
-  State state{.mean = step * mean_, .covariance = step * covariance_ * step.transpose()};
+  State state{.mean = product(step, mean_), .covariance = propagated(step, covariance_)};
   state.covariance.topLeftCorner(n, n).diagonal().array() += acceleration_noise_ * dt * dt * dt / 3.0;
   state.covariance.topRightCorner(n, n).diagonal().array() += acceleration_noise_ * dt * dt / 2.0;
   state.covariance.bottomLeftCorner(n, n).diagonal().array() += acceleration_noise_ * dt * dt / 2.0;
@@ -37,9 +38,9 @@ void ConstantVelocityKalman::take(double time_s, const Eigen::VectorXd& position
   }
   const State predicted = at(time_s);
   const Eigen::MatrixXd innovation = predicted.covariance.topLeftCorner(n, n) + covariance_mm2;
-  const Eigen::MatrixXd gain = innovation.ldlt().solve(predicted.covariance.topRows(n)).transpose();  // P H' S^-1
-  mean_ = predicted.mean + gain * (position_mm - predicted.mean.head(n));
-  covariance_ = predicted.covariance - gain * predicted.covariance.topRows(n);
+  const Eigen::MatrixXd gain = solve_symmetric(innovation, predicted.covariance.topRows(n)).transpose();  // P H' S^-1
+  mean_ = predicted.mean + product(gain, position_mm - predicted.mean.head(n));
+  covariance_ = predicted.covariance - product(gain, predicted.covariance.topRows(n));
   covariance_ = 0.5 * (covariance_ + covariance_.transpose()).eval();
   time_s_ = time_s;
 }

@@ -1,14 +1,11 @@
 #include "registration/motion/periodic_model.h"
 
-#include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
-#include <Eigen/QR>
-
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 
 #include "base/error.h"
+#include "geometry/linear_algebra.h"
 
 namespace isoshift {
 namespace {
@@ -36,7 +33,7 @@ Eigen::MatrixXd fitted(const std::vector<double>& phases_rad, const std::vector<
     design.row(row) << harmonics(phases_rad[static_cast<std::size_t>(row)], count), 1.0;
     values.row(row) = positions_mm[static_cast<std::size_t>(row)];
   }
-  return design.colPivHouseholderQr().solve(values).topRows(2 * count);
+  return least_squares(design, values).topRows(2 * count);
 }
 
 std::vector<double> even_phases(std::size_t count) {
@@ -64,7 +61,7 @@ PeriodicTrajectory::PeriodicTrajectory(const std::vector<double>& times_s,
     : coefficients_(fitted(phases_of(times_s, period_s), positions_mm, kHarmonics)) {}
 
 Eigen::VectorXd PeriodicTrajectory::at(double phase_rad) const {
-  return (harmonics(phase_rad, static_cast<int>(coefficients_.rows() / 2)) * coefficients_).transpose();
+  return transposed_product(coefficients_, harmonics(phase_rad, static_cast<int>(coefficients_.rows() / 2)).transpose());
 }
 
 Eigen::VectorXd PeriodicTrajectory::derivative_at(double phase_rad) const {
@@ -74,7 +71,7 @@ Eigen::VectorXd PeriodicTrajectory::derivative_at(double phase_rad) const {
     row[2 * n] = -order * row[2 * n + 1];
     row[2 * n + 1] = order * cosine;
   }
-  return (row * coefficients_).transpose();
+  return transposed_product(coefficients_, row.transpose());
 }
 
 std::optional<double> period_of(const std::vector<double>& times_s, const std::vector<Eigen::VectorXd>& positions_mm) {
@@ -84,8 +81,8 @@ std::optional<double> period_of(const std::vector<double>& times_s, const std::v
   Eigen::MatrixXd all(count, positions_mm.front().size());
   for (Eigen::Index n = 0; n < count; ++n) all.row(n) = positions_mm[static_cast<std::size_t>(n)];
   all.rowwise() -= all.colwise().mean().eval();
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> axes((all.transpose() * all).eval());
-  const Eigen::VectorXd along = all * axes.eigenvectors().rightCols(1);
+  const SymmetricEigen axes = symmetric_eigen(transposed_product(all, all));
+  const Eigen::VectorXd along = product(all, axes.vectors.rightCols(1));
   std::vector<double> grid;
   std::size_t next = 1;
   for (double time_s = times_s.front(); time_s <= times_s.back() && next < times_s.size(); time_s += kGridS) {
@@ -175,7 +172,7 @@ void PeriodicModelKalman::advance(double dt, Eigen::VectorXd& mean, Eigen::Matri
   mean[0] += dt * mean[1];
   Eigen::MatrixXd step = Eigen::MatrixXd::Identity(mean.size(), mean.size());
   step(0, 1) = dt;
-  covariance = step * covariance * step.transpose();
+  covariance = propagated(step, covariance);
   covariance(0, 0) += options_.phase_noise * options_.phase_noise * dt;
   covariance(1, 1) += options_.speed_noise * options_.speed_noise * dt;
   covariance(2, 2) += options_.depth_noise * options_.depth_noise * dt;
@@ -185,10 +182,11 @@ void PeriodicModelKalman::advance(double dt, Eigen::VectorXd& mean, Eigen::Matri
 void PeriodicModelKalman::correct(const Eigen::VectorXd& position_mm, const Eigen::MatrixXd& covariance_mm2) {
   const Eigen::MatrixXd h = measured_from_state(mean_);
   const Eigen::VectorXd expected = mean_.tail(position_mm.size()) + mean_[2] * trajectory_->at(mean_[0]);
-  const Eigen::MatrixXd innovation = h * covariance_ * h.transpose() + covariance_mm2;
-  const Eigen::MatrixXd gain = innovation.ldlt().solve(h * covariance_).transpose();
-  mean_ += gain * (position_mm - expected);
-  covariance_ -= gain * h * covariance_;
+  const Eigen::MatrixXd innovation = propagated(h, covariance_) + covariance_mm2;
+  const Eigen::MatrixXd measured = product(h, covariance_);
+  const Eigen::MatrixXd gain = solve_symmetric(innovation, measured).transpose();
+  mean_ += product(gain, position_mm - expected);
+  covariance_ -= product(gain, measured);
   covariance_ = 0.5 * (covariance_ + covariance_.transpose()).eval();
   mean_[0] = std::remainder(mean_[0], kTurn);
   mean_[1] = std::clamp(mean_[1], kTurn / kLongestPeriodS, kTurn / kShortestPeriodS);
@@ -217,7 +215,7 @@ Prediction PeriodicModelKalman::predict(double time_s) const {
   const Eigen::Index axes = last_mm_.size();
   const Eigen::MatrixXd h = measured_from_state(mean);
   return {.position_mm = mean.tail(axes) + mean[2] * trajectory_->at(mean[0]),
-          .sigma_mm = (h * covariance * h.transpose()).diagonal().cwiseSqrt()};
+          .sigma_mm = propagated(h, covariance).diagonal().cwiseSqrt()};
 }
 
 }  // namespace isoshift

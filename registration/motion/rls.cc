@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "geometry/linear_algebra.h"
+
 namespace isoshift {
 
 // Between the measurements around a moment, linearly.
@@ -26,10 +28,10 @@ std::optional<Eigen::VectorXd> RecursiveLeastSquares::regressors(double time_s) 
 }
 
 void RecursiveLeastSquares::learn(const Eigen::VectorXd& f, const Eigen::VectorXd& target) {
-  const Eigen::VectorXd projected = inverse_ * f;
+  const Eigen::VectorXd projected = product(inverse_, f);
   const Eigen::VectorXd gain = projected / (options_.forgetting + f.dot(projected));
-  weights_ += gain * (target - weights_.transpose() * f).transpose();
-  inverse_ = (inverse_ - gain * projected.transpose()) / options_.forgetting;
+  weights_ += product(gain, (target - transposed_product(weights_, f)).transpose());
+  inverse_ = (inverse_ - product(gain, projected.transpose())) / options_.forgetting;
   inverse_ = 0.5 * (inverse_ + inverse_.transpose()).eval();
   // Forgetting without anything new would let it grow without end.
   const double largest = static_cast<double>(f.size()) / options_.regularization;
@@ -63,7 +65,7 @@ bool RecursiveLeastSquares::is_warm() const { return learned_ > weights_.rows() 
 Prediction RecursiveLeastSquares::predict(double time_s) const {
   const Sample& last = samples_.back();
   if (!is_warm()) return {.position_mm = origin_ + last.position, .sigma_mm = std::nullopt};
-  Eigen::VectorXd way = weights_.transpose() * *regressors(last.time_s) - last.position;
+  Eigen::VectorXd way = transposed_product(weights_, *regressors(last.time_s)) - last.position;
   // Never much farther than it ever moved within the latency.
   constexpr double kFarther = 1.5;
   if (const double length = way.norm(); length > kFarther * farthest_mm_) way *= kFarther * farthest_mm_ / length;

@@ -1,12 +1,13 @@
 #include "registration/preprocess/field_sides.h"
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <span>
 
 #include "base/median.h"
+#include "geometry/linear_algebra.h"
 
 namespace isoshift {
 namespace {
@@ -90,7 +91,7 @@ double misfit_of(const Block& block, const Basis& basis) {
   const Vector right = weighted.transpose() * block.intensity;
   const double square = block.intensity.dot(block.weight.cwiseProduct(block.intensity));
   normal.diagonal() += 1e-6 * normal.trace() * Vector(0.01, 1.0, 1.0, 0.01, 1.0);
-  const Vector solution = normal.ldlt().solve(right);
+  const Vector solution = solve_symmetric(normal, right);
   const double left = std::max(0.0, square - 2.0 * solution.dot(right) + solution.dot(normal * solution));
   return std::log(left + kMisfitFloor);
 }

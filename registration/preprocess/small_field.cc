@@ -1,12 +1,13 @@
 #include "registration/preprocess/small_field.h"
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <opencv2/imgproc.hpp>
 
 #include "base/median.h"
+#include "geometry/linear_algebra.h"
 
 namespace isoshift {
 namespace {
@@ -114,7 +115,7 @@ Shape circle_through(const std::vector<Eigen::Vector2d>& outline) {
     design.row(row) << 2.0 * at.x(), 2.0 * at.y(), 1.0;
     squares[row] = at.squaredNorm();
   }
-  const Eigen::Vector3d solution = design.colPivHouseholderQr().solve(squares);
+  const Eigen::Vector3d solution = least_squares(design, squares);
   const Eigen::Vector2d middle = outline.front() + solution.head<2>();
   const double radius = std::sqrt(solution[2] + solution.head<2>().squaredNorm());
   std::vector<double> off;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "geometry/linear_algebra.h"
 #include "geometry/rotation.h"
 #include "geometry/seen_motions.h"
 #include "geometry/target_error.h"
@@ -95,8 +96,8 @@ WantedMotion without_spring(const std::vector<double>& parameters, const PoseInf
   const Eigen::Map<const Eigen::VectorXd> held(parameters.data(), static_cast<Eigen::Index>(parameters.size()));
   Eigen::Matrix<double, 6, 1> units = Eigen::Matrix<double, 6, 1>::Ones();
   units.tail<3>() /= kLeverMm;
-  return {.motion = units.asDiagonal() * information.held_curvature(kWeakSpring).inverse() *
-                    information.held_curvature(kSpring) * held,
+  return {.motion = units.asDiagonal() * product(inverse(information.held_curvature(kWeakSpring)),
+                                                product(information.held_curvature(kSpring), held)),
           .covariance = units.asDiagonal() * information.covariance(kWeakSpring) * units.asDiagonal()};
 }
 
@@ -158,8 +159,8 @@ Contradictions contradictions(const RendererPyramid& renderers, const FixedViews
     const Eigen::Map<const Eigen::VectorXd> parameters(wanted.parameters.data(),
                                                        static_cast<Eigen::Index>(wanted.parameters.size()));
     result.of_views.push_back(
-        {.mm = (motions * parameters).norm() / std::sqrt(targets),
-         .sigma_mm = std::sqrt((motions * wanted.covariance * motions.transpose()).trace() / targets)});
+        {.mm = product(motions, parameters).norm() / std::sqrt(targets),
+         .sigma_mm = std::sqrt(propagated(motions, wanted.covariance).trace() / targets)});
   }
   if (dof == Dof::kRigid) result.turn = turn_between(alone, room_from_patient);
   return result;

@@ -1,12 +1,11 @@
 #include "registration/quality/uncertainty.h"
 
-#include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <map>
 
 #include "base/parallel.h"
+#include "geometry/linear_algebra.h"
 #include "registration/pose_parameters.h"
 
 namespace isoshift {
@@ -90,7 +89,7 @@ Normalized normalized(std::span<const float> list, const PixelJacobian& jacobian
   result.values /= norm;
   result.derivative.rowwise() -= result.derivative.colwise().mean().eval();
   result.derivative /= norm;
-  result.derivative -= (result.values * (result.values.transpose() * result.derivative)).eval();
+  result.derivative -= product(result.values, transposed_product(result.values, result.derivative));
   return result;
 }
 
@@ -127,14 +126,14 @@ Sandwich sandwich_of(const Objective& objective, std::size_t view, const Lineari
     const Eigen::VectorXd x = centered(of_xray).normalized();
     const Normalized d = normalized(of_drr, jacobian);
     // What does not correlate at all does not bend the similarity.
-    sandwich.curvature += x.dot(d.values) * d.derivative.transpose() * d.derivative;
+    sandwich.curvature += x.dot(d.values) * transposed_product(d.derivative, d.derivative);
     const Eigen::VectorXd residual = x - d.values;
     for (Eigen::Index n = 0; n < residual.size(); ++n)
       scores.col(tiles[static_cast<std::size_t>(n)]) += residual[n] * d.derivative.row(n).transpose();
   };
   add(comparison.xray_gradients().along_row, drr.along_row, change.along_row);
   add(comparison.xray_gradients().along_column, drr.along_column, change.along_column);
-  sandwich.scatter = scores * scores.transpose();
+  sandwich.scatter = product(scores, scores.transpose());
   return sandwich;
 }
 
@@ -164,8 +163,7 @@ Eigen::MatrixXd PoseInformation::held_curvature(double spring) const {
 }
 
 Eigen::MatrixXd PoseInformation::covariance(double spring) const {
-  const Eigen::MatrixXd bread = held_curvature(spring).inverse();
-  return bread * scatter * bread;
+  return propagated(inverse(held_curvature(spring)), scatter);
 }
 
 PoseInformation pose_information(Objective& objective, const Eigen::Isometry3d& room_from_patient,
@@ -183,10 +181,10 @@ std::optional<Uncertainty> estimated_uncertainty(Objective& objective, const Eig
   const int axes = options.translation_only ? 3 : 6;
   const Sandwich sandwich = sandwich_at(objective, room_from_patient, axes);
   constexpr double kSingular = 1e-6;
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(sandwich.curvature);
-  if (!(eigen.eigenvalues().minCoeff() > kSingular * eigen.eigenvalues().maxCoeff())) return std::nullopt;
-  const Eigen::MatrixXd bread = sandwich.curvature.inverse();
-  const Eigen::MatrixXd covariance = small_sample(sandwich, axes) * bread * sandwich.scatter * bread;
+  const Eigen::VectorXd curvatures = symmetric_eigen(sandwich.curvature).values;
+  if (!(curvatures.minCoeff() > kSingular * curvatures.maxCoeff())) return std::nullopt;
+  const Eigen::MatrixXd covariance =
+      small_sample(sandwich, axes) * propagated(inverse(sandwich.curvature), sandwich.scatter);
   // From parameters to motions: rotation vectors in rad.
   Eigen::Matrix<double, 6, 1> units = Eigen::Matrix<double, 6, 1>::Ones();
   units.tail<3>() /= kLeverMm;

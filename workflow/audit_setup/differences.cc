@@ -1,11 +1,11 @@
 #include "workflow/audit_setup/differences.h"
 
 #include <algorithm>
-#include <boost/math/distributions/students_t.hpp>
 #include <cmath>
 #include <functional>
 #include <utility>
 
+#include "base/distributions.h"
 #include "base/median.h"
 
 namespace isoshift {
@@ -104,8 +104,8 @@ double threshold_for(const DifferencesFound& found) {
     fewest = fewest == 0 ? axis.count : std::min(fewest, axis.count);
   }
   if (values == 0) return 0.0;
-  const boost::math::students_t t(kMadEfficiency * static_cast<double>(fewest - 1));
-  return quantile(complement(t, 0.5 * kFalseOutliers / static_cast<double>(values)));
+  return students_t_quantile(kMadEfficiency * static_cast<double>(fewest - 1),
+                             0.5 * kFalseOutliers / static_cast<double>(values));
 }
 
 }  // namespace

@@ -1,19 +1,19 @@
 #include "workflow/audit_setup/drift.h"
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <algorithm>
-#include <boost/math/distributions/students_t.hpp>
 #include <cmath>
 #include <functional>
 #include <iterator>
 #include <map>
 #include <set>
 
+#include "base/distributions.h"
+
 namespace isoshift {
 namespace {
 
 using Eigen::VectorXd;
-using StudentsT = boost::math::students_t;
 
 // Of values about a fit, mm or degrees. Values that are all alike, such as the rotations of a couch that cannot rotate,
 // have none but that of their rounding, which says nothing.
@@ -34,7 +34,7 @@ struct LineFit {
     return LineFit{.change = change, .variance = scatter / xx, .freedom = freedom};
   }
   double t() const { return change == 0.0 ? 0.0 : std::abs(change) / std::sqrt(variance); }
-  double p() const { return 2.0 * cdf(complement(StudentsT(freedom), t())); }
+  double p() const { return 2.0 * students_t_tail(freedom, t()); }
 };
 
 // What the means of patients tell of a change, and what sessions tell within their patients: two independent answers.
@@ -82,8 +82,7 @@ class PatientSeries {
     if (weights > 0.0) {
       fit.change /= weights;
       // Satterthwaite's degrees of freedom of the weighted mean.
-      const StudentsT t(weights * weights / uncertainty);
-      fit.change_within = quantile(complement(t, kDriftTail)) / std::sqrt(weights);
+      fit.change_within = students_t_quantile(weights * weights / uncertainty, kDriftTail) / std::sqrt(weights);
     }
     fit.base = y_means_.mean() - fit.change * x_means.mean();
     return fit;

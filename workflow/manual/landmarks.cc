@@ -2,14 +2,12 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
-#include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
 #include <string>
 
 #include "base/error.h"
+#include "geometry/linear_algebra.h"
 #include "geometry/rotation.h"
 
 namespace isoshift {
@@ -42,9 +40,9 @@ Meeting meeting(std::span<const XrayView> views, const std::vector<std::optional
     sum += across(ray) * ray.source_room_mm;
   }
   // Of two rays the smallest eigenvalue is 1 - cos of the angle between them.
-  if (Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(normals).eigenvalues()[0] < 1.0 - std::cos(kLeastAngleRad))
+  if (symmetric_eigen(normals).values[0] < 1.0 - std::cos(kLeastAngleRad))
     throw Error(fmt::format("{}: the views look from nearly one direction", where));
-  Meeting result{.point_room_mm = normals.ldlt().solve(sum)};
+  Meeting result{.point_room_mm = solve_symmetric(normals, sum)};
   for (const Ray& ray : rays)
     result.apart_mm = std::max(result.apart_mm, (across(ray) * (result.point_room_mm - ray.source_room_mm)).norm());
   return result;
@@ -53,16 +51,15 @@ Meeting meeting(std::span<const XrayView> views, const std::vector<std::optional
 bool are_on_a_line(const Eigen::Matrix3Xd& points) {
   const Eigen::Matrix3Xd centered = points.colwise() - points.rowwise().mean().eval();
   const Eigen::Matrix3d spread = centered * centered.transpose() / static_cast<double>(points.cols());
-  return Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(spread).eigenvalues()[1] < kLeastBesideMm * kLeastBesideMm;
+  return symmetric_eigen(spread).values[1] < kLeastBesideMm * kLeastBesideMm;
 }
 
 // The columns of `to` from those of `from`.
 Eigen::Isometry3d motion_between(const Eigen::Matrix3Xd& from, const Eigen::Matrix3Xd& to) {
-  if (from.cols() > 2) return Eigen::Isometry3d(Eigen::umeyama(from, to, false));
+  if (from.cols() > 2) return rigid_motion_between(from, to);
   Eigen::Isometry3d motion = Eigen::Isometry3d::Identity();
   if (from.cols() == 2)
-    motion.linear() =
-        Eigen::Quaterniond::FromTwoVectors(from.col(1) - from.col(0), to.col(1) - to.col(0)).toRotationMatrix();
+    motion.linear() = rotation_between(from.col(1) - from.col(0), to.col(1) - to.col(0));
   motion.translation() = to.rowwise().mean() - motion.linear() * from.rowwise().mean();
   return motion;
 }
