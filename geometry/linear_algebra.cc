@@ -4,7 +4,6 @@
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <Eigen/QR>
-#include <Eigen/SVD>
 
 namespace isoshift {
 
@@ -39,11 +38,20 @@ Eigen::VectorXd generalized_eigenvalues(const MatrixView& a, const MatrixView& b
 }
 
 Eigen::Isometry3d rigid_motion_between(const Eigen::Matrix3Xd& from, const Eigen::Matrix3Xd& to) {
-  return Eigen::Isometry3d(Eigen::umeyama(from, to, false));
-}
-
-Eigen::Matrix3d rotation_between(const Eigen::Vector3d& from, const Eigen::Vector3d& to) {
-  return Eigen::Quaterniond::FromTwoVectors(from, to).toRotationMatrix();
+  const Eigen::Vector3d from_mean = from.rowwise().mean(), to_mean = to.rowwise().mean();
+  Eigen::Matrix3d s = Eigen::Matrix3d::Zero();
+  for (Eigen::Index n = 0; n < from.cols(); ++n) s += (from.col(n) - from_mean) * (to.col(n) - to_mean).transpose();
+  const Eigen::Vector3d turn(s(1, 2) - s(2, 1), s(2, 0) - s(0, 2), s(0, 1) - s(1, 0));
+  Eigen::Matrix4d form;  // of quaternions (x, y, z, w)
+  form.topLeftCorner<3, 3>() = s + s.transpose() - s.trace() * Eigen::Matrix3d::Identity();
+  form.topRightCorner<3, 1>() = turn;
+  form.bottomLeftCorner<1, 3>() = turn.transpose();
+  form(3, 3) = s.trace();
+  const Eigen::Vector4d best = symmetric_eigen(form).vectors.col(3);
+  Eigen::Isometry3d motion = Eigen::Isometry3d::Identity();
+  motion.linear() = Eigen::Quaterniond(best).normalized().toRotationMatrix();
+  motion.translation() = to_mean - motion.linear() * from_mean;
+  return motion;
 }
 
 }  // namespace isoshift

@@ -1,7 +1,7 @@
 #pragma once
-// Dense linear algebra of small matrices. Eigen's inverses, decompositions and products of matrices whose sizes are known
-// at run time cost every source that uses them 2 to 30 s to compile (bench/results/build-time.md): so they are compiled
-// once, in linear_algebra.cc. What runs per pixel or per voxel uses Eigen's types of fixed size directly.
+// Dense linear algebra of small matrices. Eigen's inverses, decompositions and products of matrices whose sizes are
+// known at run time cost every source that uses them 2 to 30 s to compile (bench/results/build-time.md): so they are
+// compiled once, in linear_algebra.cc. What runs per pixel or per voxel uses Eigen's types of fixed size directly.
 
 #include <Eigen/Geometry>
 
@@ -35,10 +35,9 @@ SymmetricEigen symmetric_eigen(const MatrixView& symmetric);
 // Of the pencil a x = lambda b x, smallest first. Precondition: b is positive definite.
 Eigen::VectorXd generalized_eigenvalues(const MatrixView& a, const MatrixView& b);
 
-// The rigid motion that takes the columns of `from` closest to those of `to` (Umeyama, PAMI 13, 1991). Precondition: three
-// points or more, not on a line.
+// The rigid motion that takes the columns of `from` closest to those of `to`, by a quaternion (Horn, JOSA A 4, 1987):
+// Eigen's umeyama() does it by a decomposition that takes 20 s to compile. Precondition: three points or more, not on a
+// line.
 Eigen::Isometry3d rigid_motion_between(const Eigen::Matrix3Xd& from, const Eigen::Matrix3Xd& to);
-// The smallest rotation that turns one direction into another.
-Eigen::Matrix3d rotation_between(const Eigen::Vector3d& from, const Eigen::Vector3d& to);
 
 }  // namespace isoshift
