@@ -61,6 +61,7 @@ tell_section() {
 }
 tell_section run DEPENDS_ON
 tell_section build BUILD_DEPENDENCY_OF
+tell_section python BUILD_DEPENDENCY_OF
 tell_section test TEST_DEPENDENCY_OF
 [ -x "$program" ] || { echo "sbom.sh: $program: there is no such program: what it loads is not known" >&2; exit 0; }
 ldd "$program" | awk '$2 == "=>" && $3 ~ /^\// {print $3; print "/usr" $3}' |

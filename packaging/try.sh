@@ -35,9 +35,11 @@ install_inside() {
 if [ -z "$package" ]; then
   fresh_debian
   git clone -q . "$root/src"
-  inside bash -c 'cd /src && time ./dev demo && apt-get install -y -qq --no-install-recommends dpkg-dev file && cd build/demo && cpack'
+  inside bash -c 'cd /src && time ./dev demo'
+  inside bash -c 'cd /src && apt-get install -y -qq --no-install-recommends $(for section in python package; do packaging/packages.sh "$0" $section | cut -f 1; done) &&
+    cmake --preset package >/dev/null && cmake --build --preset package && cd build/package && cpack' "$release"
   mkdir -p "build/debian-$release"
-  cp "$root"/src/build/demo/*.deb "build/debian-$release"
+  cp "$root"/src/build/package/*.deb "build/debian-$release"
   package=$(ls -t "build/debian-$release"/isoshift_*.deb | head -n 1)
 fi
 

@@ -17,9 +17,17 @@ for unit in packaging/isoshift-watch.service packaging/isoshift-serve.service "$
   grep -qx 'SystemCallFilter=seccomp prlimit64 setrlimit' "$unit" || { echo "$unit: the decoder cannot confine itself"; exit 1; }
 done
 
+# The user and the group that the units name are made.
+mkdir -p "$work/root/etc"
+systemd-sysusers --root="$work/root" packaging/isoshift.sysusers
+for unit in packaging/isoshift-*.service; do
+  grep -q "^$(sed -n 's/^User=//p' "$unit"):" "$work/root/etc/passwd" || { echo "$unit: nobody makes its user"; exit 1; }
+  grep -q "^$(sed -n 's/^Group=//p' "$unit"):" "$work/root/etc/group" || { echo "$unit: nobody makes its group"; exit 1; }
+done
+
 packaging/sbom.sh "$2" >"$work/sbom"
 . /etc/os-release
-wanted=$(for section in run build test; do packaging/packages.sh "$VERSION_ID" "$section" | cut -f 1; done)
+wanted=$(for section in run build python test; do packaging/packages.sh "$VERSION_ID" "$section" | cut -f 1; done)
 for package in isoshift $wanted libdcmtk17; do
   count=$(grep -cxF "PackageName: $package" "$work/sbom" || true)
   [ "$package" != libdcmtk17 ] || [ "$VERSION_ID" = 12 ] || continue

@@ -13,6 +13,7 @@
 #include "base/error.h"
 #include "base/version.h"
 #include "io/dicom/decode.h"
+#include "io/objects/object_header.h"
 #include "io/objects/spatial_registration.h"
 
 namespace isoshift {
@@ -262,12 +263,6 @@ void put_pixels_alone(const DicomFile& file, DicomItem to) {
     to.put_pixels(words);
   else
     to.put_bytes(DCM_PixelData, bytes);
-}
-
-void put_code(DicomItem item, const char* value, const char* meaning) {
-  item.put(DCM_CodeValue, value);
-  item.put(DCM_CodingSchemeDesignator, "DCM");
-  item.put(DCM_CodeMeaning, meaning);
 }
 
 }  // namespace

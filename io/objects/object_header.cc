@@ -27,4 +27,10 @@ void put_header(DicomItem& dataset, const ObjectHeader& header) {
   dataset.put(DCM_TimezoneOffsetFromUTC, fmt::format("{:%z}", local));
 }
 
+void put_code(DicomItem item, const char* value, const char* meaning) {
+  item.put(DCM_CodeValue, value);
+  item.put(DCM_CodingSchemeDesignator, "DCM");
+  item.put(DCM_CodeMeaning, meaning);
+}
+
 }  // namespace isoshift

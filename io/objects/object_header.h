@@ -24,4 +24,7 @@ struct ObjectHeader {
 // C.12.1), Instance Number, and Content Date and Time: now, local.
 void put_header(DicomItem& dataset, const ObjectHeader& header);
 
+// A code of DICOM's own terminology (PS3.16) in an item of a code sequence.
+void put_code(DicomItem item, const char* value, const char* meaning);
+
 }  // namespace isoshift

@@ -38,12 +38,6 @@ SourceFrame source_frame(const Study& study, RegistrationSource axes, Notes& not
   return {.uid = *first.frame_of_reference_uid, .isocenter_mm = *first.isocenter_mm, .lists_images = true};
 }
 
-void put_code(DicomItem item, const char* value, const char* meaning) {
-  item.put(DCM_CodeValue, value);
-  item.put(DCM_CodingSchemeDesignator, "DCM");
-  item.put(DCM_CodeMeaning, meaning);
-}
-
 void put_matrix(DicomItem item, const Eigen::Isometry3d& matrix, const char* code, const char* meaning,
                 const char* comment) {
   DicomItem registration = item.append_item(DCM_MatrixRegistrationSequence);

@@ -11,6 +11,7 @@ arrays of shape (rows, columns). Work that takes long releases the global interp
 """
 
 import os
+import pathlib
 import shutil
 
 from ._isoshift import (CtSeries, Error, FixedImage, Objective, Renderer, SetupResult, Study, UsageError, XrayImage,
@@ -24,5 +25,14 @@ __all__ = ["CtSeries", "Error", "FixedImage", "Objective", "Renderer", "SetupRes
 Error.__doc__ = "Something that cannot be done with the given input: names file, attribute, what was found and what to do."
 UsageError.__doc__ = "An argument that makes no sense."
 
-# Compressed pixels are decoded by the program, in a process of their own.
-use_decoder(os.environ.get("ISOSHIFT_PROGRAM") or shutil.which("isoshift") or "")
+
+def _program() -> str:
+    """The program that decodes compressed pixels: of the environment, installed or built beside this module, or in PATH."""
+    if named := os.environ.get("ISOSHIFT_PROGRAM"):
+        return named
+    here = pathlib.Path(__file__).resolve()
+    beside = [folder / place for folder in here.parents[1:6] for place in ("bin/isoshift", "cli/isoshift")]
+    return next((str(path) for path in beside if os.access(path, os.X_OK) and path.is_file()), shutil.which("isoshift") or "")
+
+
+use_decoder(_program())
