@@ -1,8 +1,8 @@
 # isoshift_library(NAME SOURCE...): a static library isoshift_NAME, a box of ARCHITECTURE.md.
 #
-# Headers that most sources include are compiled once for all boxes, and several sources of a box are compiled together
+# Headers that most sources include are compiled once for all boxes, and the sources of a folder are compiled together
 # (CMAKE_UNITY_BUILD in the presets); bench/results/build-time.md has what that saves. So the anonymous
-# namespaces of a box hold no name twice; drr/ and io/report/, where they do, say so. Each test file has a namespace of
+# namespaces of a folder hold no name twice; drr/ and io/report/, where they do, say so. Each test file has a namespace of
 # its own. Sources include what they use all the same: ./dev lint reads each by itself, without either.
 option(ISOSHIFT_PCH "Precompile the headers that most sources include" ON)
 
@@ -17,8 +17,18 @@ if(ISOSHIFT_PCH)
   target_precompile_headers(isoshift_precompiled PRIVATE ${isoshift_common_headers})
 endif()
 
+function(isoshift_compile_folders_together target)
+  set_target_properties(${target} PROPERTIES UNITY_BUILD_MODE GROUP)
+  foreach(source ${ARGN})
+    get_filename_component(folder ${source} DIRECTORY)
+    string(MAKE_C_IDENTIFIER "of_${folder}" group)
+    set_source_files_properties(${source} PROPERTIES UNITY_GROUP ${group})
+  endforeach()
+endfunction()
+
 function(isoshift_library name)
   add_library(isoshift_${name} STATIC ${ARGN})
+  isoshift_compile_folders_together(isoshift_${name} ${ARGN})
   target_link_libraries(isoshift_${name} PUBLIC isoshift_common $<BUILD_INTERFACE:isoshift_flags>)
   if(ISOSHIFT_PCH)
     target_precompile_headers(isoshift_${name} REUSE_FROM isoshift_precompiled)

@@ -190,7 +190,7 @@ std::vector<Slice> read_slices(std::span<const std::filesystem::path> files, con
   std::vector<std::vector<Slice>> of_files(files.size());
   std::mutex mutex;
   std::size_t done = 0;
-  parallel_for(std::size_t{0}, files.size(), [&](std::size_t n) {
+  parallel_for_waiting(files.size(), [&](std::size_t n) {
     of_files[n] = read_slices_of(files[n]);
     const std::lock_guard lock(mutex);
     if (progress) progress(++done, files.size());

@@ -21,6 +21,9 @@
 
 namespace isoshift {
 
+// What holds a motion that one view alone does not see: nats per mm^2 at the lever, 1 at 14 mm.
+inline constexpr double kSpringOfOneView = 0.01;
+
 class BodyObjective {
  public:
   // Compares the pixels that `pixels` compares, by gradient correlation, in tiles with this edge at the isocenter.

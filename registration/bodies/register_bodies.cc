@@ -22,8 +22,6 @@ namespace {
 
 using Eigen::Vector3d;
 
-// Of the target's motion, in nats per mm^2: 1 at 14 mm. It holds what a view alone does not see.
-constexpr double kSpring = 0.01;
 constexpr double kNearTargetMm = 30.0;
 constexpr double kConvergedMm = 0.1;
 constexpr double kVoxelMm = 1.4, kCoarseVoxelMm = 3.0;  // the CT is reduced to voxels up to these edges
@@ -63,7 +61,7 @@ void report_match(const BodyScene& scene, const Carriers& carriers, const Carrie
     // The step from the common optimum to where this view and the springs are best.
     const QuadraticModel& alone = parts.views[view];
     const Eigen::MatrixXd held = alone.curvature + parts.springs.curvature +
-                                 kSpring * Eigen::MatrixXd::Identity(alone.curvature.rows(), alone.curvature.cols());
+                                 kSpringOfOneView * Eigen::MatrixXd::Identity(alone.curvature.rows(), alone.curvature.cols());
     const Eigen::MatrixXd seen =
         product(seen_motions(level[view].view, points) / pixels_per_mm(level[view].view), target_motion);
     const auto count = static_cast<double>(points.size());

@@ -14,9 +14,6 @@
 namespace isoshift {
 namespace {
 
-// Of the logarithm of probability, per mm^2 at the lever: 1 at 14 mm. It holds what a view alone does not see.
-constexpr double kSpring = 0.01;
-
 // By a motion of the patient in the room, about the isocenter (mm and rad).
 struct PoseInView {
   Eigen::Isometry3d room_from_patient;
@@ -90,7 +87,7 @@ class TurnedViews::Implementation {
     for (std::size_t slot = 0; slot < slots.count(); ++slot)
       together.middleRows<6>(static_cast<Eigen::Index>(6 * slot)) = product(inverse(slots.motions(slot, at_base)), ways);
     // What the view does not see is held.
-    Eigen::VectorXd held = Eigen::VectorXd::Constant(6, kSpring);
+    Eigen::VectorXd held = Eigen::VectorXd::Constant(6, kSpringOfOneView);
     held.tail<3>() *= kLeverMm * kLeverMm;
     return {.room_from_patient = room_from_patient,
             .value = by_slots.value,
