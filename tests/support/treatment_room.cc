@@ -149,7 +149,9 @@ std::optional<Runner::End> FakeRunner::end() {
   write_text(folder_ / kResultFile, json_report(report));
   write_text(folder_ / "report.dcm", "report of " + all);
   if (report.verdict == Verdict::kAccepted) write_text(folder_ / kRegistrationFile, "registration of " + all);
-  return End{};
+  const End end{.files = sha256_of_folder(folder_)};
+  after_end(folder_);
+  return end;
 }
 
 std::string FakeSender::send(const std::filesystem::path& file, const std::string& sha256, const DicomPeer& peer,

@@ -75,6 +75,7 @@ std::vector<fs::path> PatientFiles::forget(const fs::path& file) {
   copies_of_.erase(first, end);
   file_of_uid_.erase(uid);
   StudyFiles& files = patients_.at(patient_id).files;
+  for (const fs::path& copy : copies) remove_from(files, copy, uid);
   remove_from(files, file, uid);
   if (files.cts.empty() && files.plans.empty() && files.structures.empty() && files.images.empty() &&
       files.other_xrays.empty())
@@ -89,6 +90,7 @@ void PatientFiles::forget_copy(const fs::path& file) {
   const std::string uid = gone->first;
   copies_of_.erase(gone);
   const fs::path used = file_of_uid_.at(uid);
+  remove_from(patients_.at(known_.at(used).patient_id).files, file, uid);
   const auto [first, end] = copies_of_.equal_range(uid);
   const auto other = std::find_if(first, end, [&](const auto& copy) { return differ(copy.second, used); });
   note_other(patients_.at(known_.at(used).patient_id).files, used, other == end ? fs::path() : other->second);
@@ -114,6 +116,7 @@ PatientFiles::Taken PatientFiles::take(const fs::path& file, Notes& notes) {
       copies_of_.emplace(found->uid, file);
       if (differ(before, file)) {
         note_other(patient.files, before, file);
+        std::ranges::move(one.plans, std::back_inserter(patient.files.plans));  // choose_parts() refuses the two
         taken.differs = true;
         notes.warnings.push_back(fmt::format("{}: left aside: differs from {}, which has the same SOPInstanceUID",
                                              file.string(), before.string()));
