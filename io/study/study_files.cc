@@ -92,6 +92,20 @@ StudyFiles::Image xray(const fs::path& path, const DicomItem& dataset) {
                                         dataset.text(DCM_ReportedValuesOrigin))};
 }
 
+// Whether an RT Image says that it was computed: a plan is exported with its DRRs, fluences and dose images.
+bool is_computed(const DicomItem& dataset) {
+  const auto type = dataset.texts(DCM_ImageType);
+  return type.size() > 2 && (type[2] == "DRR" || type[2] == "FLUENCE" || type[2] == "BLANK");
+}
+
+// Of whom there are X-rays, by PatientID.
+std::set<std::string> patients_with_xrays(const StudyFiles& files) {
+  std::set<std::string> patients;
+  for (const auto* images : {&files.images, &files.other_xrays})
+    for (const StudyFiles::Image& image : *images) patients.insert(patient_id_of(image.patient));
+  return patients;
+}
+
 void add_ct_slice(const fs::path& path, const DicomItem& dataset, StudyFiles& files) {
   const auto type = dataset.texts(DCM_ImageType);
   if (type.size() > 2 && type[2] == "LOCALIZER") {
@@ -302,6 +316,8 @@ void choose_images(const std::vector<StudyFiles::Image>& all, const StudyFiles::
 // The parts among scanned files, of which a person may have named some.
 StudyParts chosen(StudyFiles files, std::vector<StudyFiles::Plan> other_plans, const StudyParts& named,
                   bool takes_other_xrays, Notes& notes) {
+  std::ranges::move(drrs_left_aside(files), std::back_inserter(files.left_aside));
+  files.images = counting_images(files);
   take_other_xrays(files, takes_other_xrays);
   check_is_there(files, named);
   StudyParts parts;
@@ -349,6 +365,7 @@ StudyFiles files_of_session(const SessionChoice& choice, StudyFiles files, bool 
   StudyFiles own = files_for(session, files);
   own.registrations = files.registrations;
   own.left_aside = files.left_aside;
+  std::ranges::move(drrs_left_aside(files), std::back_inserter(own.left_aside));
   for (const auto& images : {files.images, files.other_xrays})
     for (const StudyFiles::Image& image : images)
       if (std::ranges::find(session.images, image.file, &StudyFiles::Image::file) == session.images.end())
@@ -363,6 +380,24 @@ std::string patient_id_of(const std::string& patient) { return patient.substr(0,
 bool may_be_of_one_issuer(const std::string& a, const std::string& b) {
   const auto issuer_of = [](const std::string& patient) { return patient.substr(patient.rfind('\\') + 1); };
   return issuer_of(a) == issuer_of(b) || issuer_of(a).empty() || issuer_of(b).empty();
+}
+
+std::vector<std::string> drrs_left_aside(const StudyFiles& files) {
+  const std::set<std::string> patients = patients_with_xrays(files);
+  std::vector<std::string> lines;
+  for (const StudyFiles::Image& drr : files.drrs)
+    if (patients.contains(patient_id_of(drr.patient)))
+      lines.push_back(fmt::format("{}: {} says that it was computed (a DRR, or a fluence): it is no X-ray",
+                                  drr.file.string(), described(DCM_ImageType)));
+  return lines;
+}
+
+std::vector<StudyFiles::Image> counting_images(const StudyFiles& files) {
+  const std::set<std::string> patients = patients_with_xrays(files);
+  std::vector<StudyFiles::Image> images = files.images;
+  std::ranges::copy_if(files.drrs, std::back_inserter(images),
+                       [&](const StudyFiles::Image& drr) { return !patients.contains(patient_id_of(drr.patient)); });
+  return images;
 }
 
 std::vector<fs::path> files_below(const std::vector<fs::path>& paths, const std::unordered_set<std::string>& but,
@@ -434,7 +469,7 @@ StudyFiles scan_file(const fs::path& path) {
       sop_class == UID_LegacyConvertedEnhancedCTImageStorage) {
     add_ct_slice(path, dataset, files);
   } else if (sop_class == UID_RTImageStorage) {
-    files.images.push_back(xray(path, dataset));
+    (is_computed(dataset) ? files.drrs : files.images).push_back(xray(path, dataset));
   } else if (is_other_xray(sop_class)) {
     files.other_xrays.push_back(xray(path, dataset));
   } else if (sop_class == UID_RTPlanStorage || sop_class == UID_RTIonPlanStorage) {
@@ -474,6 +509,7 @@ void merge(StudyFiles from, StudyFiles& files) {
   const auto append = [&](auto member) { std::ranges::move(from.*member, std::back_inserter(files.*member)); };
   append(&StudyFiles::plans);
   append(&StudyFiles::images);
+  append(&StudyFiles::drrs);
   append(&StudyFiles::other_xrays);
   append(&StudyFiles::structures);
   append(&StudyFiles::registrations);
@@ -507,6 +543,8 @@ StudyParts find_parts(const StudyParts& named, bool takes_other_xrays, Notes& no
   if (!named.ct.empty()) files.cts = scan_readable(named.ct).cts;
   if (!named.images.empty()) {
     StudyFiles images = scan_readable(named.images);
+    std::ranges::move(images.drrs, std::back_inserter(images.images));  // a person means them
+    files.drrs.clear();
     std::swap(files.images, images.images);
     std::swap(files.other_xrays, images.other_xrays);
   }
