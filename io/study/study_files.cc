@@ -5,8 +5,11 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
+#include <cctype>
 #include <cerrno>
 #include <cstring>
+#include <fstream>
 #include <iterator>
 #include <utility>
 
@@ -124,6 +127,32 @@ bool is_other_xray(const std::string& sop_class) {
   return sop_class == UID_ComputedRadiographyImageStorage || sop_class == UID_DigitalXRayImageStorageForPresentation ||
          sop_class == UID_DigitalXRayImageStorageForProcessing || sop_class == UID_XRayAngiographicImageStorage ||
          sop_class == UID_XRayRadiofluoroscopicImageStorage;
+}
+
+// X-rays as machines write them for themselves. What begins like this, or, where a format has no beginning, is named
+// like this.
+struct OtherFormat {
+  std::string_view beginning, extension, name, advice;
+};
+constexpr std::string_view kExport = "have the console or the record-and-verify system export it as a DICOM RT Image";
+constexpr std::array kOtherFormats = {
+    OtherFormat{"VMS.XI", ".xim", "an image of a Varian linac (XIM)", kExport},
+    OtherFormat{"", ".hnd", "an image of a Varian imager (HND)", kExport},
+    OtherFormat{"", ".hnc", "an image of a Varian imager (HNC)", kExport},
+    OtherFormat{std::string_view("\x00\x70\x44\x00", 4), ".his", "an image of an Elekta imager (HIS)", kExport},
+    OtherFormat{"", ".raw", "pixels without a header, as ExacTrac writes them",
+                "have the system export it as DICOM, and supply the geometry by a machine profile"}};
+
+// "FILE: what it is, and what to do"; empty: another file.
+std::string other_format(const fs::path& path) {
+  std::string beginning(8, '\0'), extension = path.extension().string();
+  std::ifstream file(path, std::ios::binary);
+  file.read(beginning.data(), static_cast<std::streamsize>(beginning.size()));
+  std::ranges::transform(extension, extension.begin(), [](unsigned char c) { return std::tolower(c); });
+  for (const OtherFormat& format : kOtherFormats)
+    if (format.beginning.empty() ? extension == format.extension : beginning.starts_with(format.beginning))
+      return fmt::format("{}: {}, which is not read: {}", path.string(), format.name, format.advice);
+  return "";
 }
 
 // Where one kind of part was looked for, for a message: what was named for it, else the study.
@@ -287,9 +316,10 @@ void check_is_there(const StudyFiles& files, const StudyParts& named) {
                     searched(named.ct, named.study), option("ct", "FOLDER")));
   if (files.images.empty())
     throw Error(fmt::format("no RT Image found ({}).\n       {}", searched(named.images, named.study),
-                            files.other_xrays.empty() ? "Name the X-rays: " + option("image", "FILE")
-                                                      : "For X-rays of other classes their geometry is needed: " +
-                                                            option("machine", "FILE")));
+                            !files.other_xrays.empty()
+                                ? "For X-rays of other classes their geometry is needed: " + option("machine", "FILE")
+                            : files.other_formats.empty() ? "Name the X-rays: " + option("image", "FILE")
+                                                          : files.other_formats.front()));
   if (!named.plan.empty() && files.plans.empty()) throw Error(fmt::format("{}: holds no RT Plan", named.plan.string()));
 }
 
@@ -459,7 +489,9 @@ StudyFiles scan_file(const fs::path& path) {
   if (beginning != Beginning::kDicom && path.extension() == ".dcm")
     throw Error(fmt::format("{}: is not a DICOM file, as its name says: it may be cut off", path.string()));
   if (beginning != Beginning::kDicom) {
-    files.left_aside.push_back(fmt::format("{}: not a DICOM file", path.string()));
+    const std::string other = other_format(path);
+    files.left_aside.push_back(other.empty() ? fmt::format("{}: not a DICOM file", path.string()) : other);
+    if (!other.empty()) files.other_formats.push_back(other);
     return files;
   }
   const DicomFile file = DicomFile::read(path, DicomFile::Extent::kHeader);
@@ -514,6 +546,7 @@ void merge(StudyFiles from, StudyFiles& files) {
   append(&StudyFiles::structures);
   append(&StudyFiles::registrations);
   append(&StudyFiles::left_aside);
+  append(&StudyFiles::other_formats);
   append(&StudyFiles::unreadable);
 }
 
@@ -546,6 +579,7 @@ StudyParts find_parts(const StudyParts& named, bool takes_other_xrays, Notes& no
     std::ranges::move(images.drrs, std::back_inserter(images.images));  // a person means them
     files.drrs.clear();
     std::swap(files.images, images.images);
+    std::swap(files.other_formats, images.other_formats);
     std::swap(files.other_xrays, images.other_xrays);
   }
   if (!named.plan.empty()) std::swap(other_plans, files.plans), files.plans = scan_readable({named.plan}).plans;

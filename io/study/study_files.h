@@ -64,6 +64,7 @@ struct StudyFiles {
   std::vector<Structures> structures;
   std::vector<std::filesystem::path> registrations;  // Spatial Registration objects, also deformable ones
   std::vector<std::string> left_aside;               // "FILE: reason"
+  std::vector<std::string> other_formats;            // those of them that are X-rays in no DICOM format
   std::vector<std::string> unreadable;               // messages on files that look like DICOM, or cannot be opened
 };
 

@@ -217,7 +217,9 @@ std::vector<BatchCase> scan_cases(const fs::path& folder, bool other_xrays, Note
     }
   }
   if (cases.empty())
-    throw Error(fmt::format("{}: holds no case; a case is X-rays with their CT and their plan", folder.string()));
+    throw Error(fmt::format("{}: holds no case; a case is X-rays with their CT and their plan{}{}", folder.string(),
+                            files.other_formats.empty() ? "" : ".\n       ",
+                            files.other_formats.empty() ? "" : files.other_formats.front()));
   return cases;
 }
 

@@ -3,6 +3,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <fstream>
+
 #include "base/error.h"
 #include "io/study/session_files.h"
 #include "tests/support/small_study.h"
@@ -117,6 +119,21 @@ TEST_F(StudyFilesTest, PlanningDrrsAndFluencesAreLeftAsideWhereThereAreXrays) {
   fs::remove_all(study_.image(0).parent_path());
   EXPECT_EQ(find().images.size(), 2U) << "nothing else is there: checks say what they are";
   EXPECT_EQ(sessions_of(scan_study({study_.path()}), false).size(), 1U);
+}
+
+TEST_F(StudyFilesTest, XraysOfFormatsThatAreNotReadAreNamed) {
+  const std::string his("\x00\x70\x44\x00 and more", 13);
+  for (const auto& [name, content, words] :
+       {std::tuple("ap.xim", std::string("VMS.XI\0\0\1", 9), "Varian linac (XIM)"),
+        std::tuple("lat.bin", his, "Elekta imager (HIS)"), std::tuple("1.raw", std::string(64, 'x'), "ExacTrac")}) {
+    std::ofstream(study_.path() / name, std::ios::binary) << content;
+    find();
+    EXPECT_THAT(notes_.left_aside, Contains(AllOf(HasSubstr(name), HasSubstr(words), HasSubstr("export it as"))));
+  }
+  EXPECT_THAT(error_of_finding({.images = {study_.path() / "ap.xim"}}),
+              HasSubstr("ap.xim: an image of a Varian linac"));
+  fs::remove_all(study_.image(0).parent_path());
+  EXPECT_THAT(error_of_finding(), AllOf(HasSubstr("no RT Image found"), HasSubstr("1.raw: pixels without a header")));
 }
 
 TEST_F(StudyFilesTest, TwoWholeStudiesNeedAName) {
