@@ -16,7 +16,7 @@ namespace {
 using Columns = std::array<std::optional<StatedColumn>, 6>;
 
 constexpr double kMmPerCm = 10.0, kDegPerRad = 180.0 / std::numbers::pi;
-constexpr std::size_t kAxes = 3;  // of a length or an angle
+constexpr std::size_t kAxesOfKind = 3;  // of a length or an angle
 
 struct Unit {
   std::string_view name, other;
@@ -68,7 +68,7 @@ struct Reading {
 Reading reading_of(std::span<const StatedAndFound> sessions, std::size_t column, std::size_t axis) {
   Reading reading{.column = column, .axis = axis, .fit = fit_of(sessions, column, axis, 1.0)};
   reading.as_it_is = fit_of(sessions, column, column, 1.0);
-  const bool is_length = column < kAxes;
+  const bool is_length = column < kAxesOfKind;
   const Fit in_this_unit = reading.fit;
   for (const double factor : {is_length ? kMmPerCm : kDegPerRad, is_length ? 1.0 / kMmPerCm : 1.0 / kDegPerRad})
     if (const Fit fit = fit_of(sessions, column, axis, factor);
@@ -91,7 +91,7 @@ Fit sum_of(const std::vector<Reading>& readings) {
 // The likeliest reading of the columns of lengths, or of angles, from `first` on.
 std::vector<Reading> readings_from(std::span<const StatedAndFound> sessions, std::size_t first) {
   std::vector<std::size_t> known;
-  for (std::size_t axis = first; axis < first + kAxes; ++axis)
+  for (std::size_t axis = first; axis < first + kAxesOfKind; ++axis)
     if (fit_of(sessions, axis, axis, 1.0).count > 1) known.push_back(axis);
   const auto with = [&](const std::vector<std::size_t>& axes) {
     std::vector<Reading> readings;
@@ -126,7 +126,7 @@ Columns stated_columns(const CsvTable& table, const SixNames& names, const std::
   for (std::size_t place = 0; place < table.columns.size(); ++place)
     for (std::size_t n = 0; n < names.size(); ++n) {
       const std::string& name = table.columns[place];
-      const Unit& unit = kUnits[n / kAxes];
+      const Unit& unit = kUnits[n / kAxesOfKind];
       const bool is_in_other = name == renamed(names[n], unit.factor);
       if (name != names[n] && !is_in_other) continue;
       if (columns[n])
@@ -138,7 +138,7 @@ Columns stated_columns(const CsvTable& table, const SixNames& names, const std::
 
 void check_columns(const Columns& columns, std::span<const StatedAndFound> sessions, const std::string& where) {
   std::vector<std::string> words;
-  for (const std::size_t first : {std::size_t{0}, kAxes})
+  for (const std::size_t first : {std::size_t{0}, kAxesOfKind})
     for (const Reading& reading : readings_from(sessions, first))
       if (reading.factor != 1.0 || reading.axis != reading.column) words.push_back(in_words(reading, columns));
   if (!words.empty())

@@ -43,7 +43,7 @@ std::string_view source_of(const std::string& field) {
   return found == kDerived.end() ? "the rest of the file" : found->from;
 }
 
-std::string name_of(const std::string& pointer) { return pointer.substr(std::min<std::size_t>(1, pointer.size())); }
+std::string field_name(const std::string& pointer) { return pointer.substr(std::min<std::size_t>(1, pointer.size())); }
 
 [[noreturn]] void refuse(const std::string& what) { throw Error(what + ": the file was changed after it was made"); }
 
@@ -87,7 +87,7 @@ void check_derived(const Json& file, const SetupResult& result) {
   const auto field = difference(file, expected, Json::json_pointer());
   if (!field) return;
   const std::string pointer = field->to_string();
-  refuse(fmt::format("{} is {}, but {} make it {}", name_of(pointer), file.at(*field).dump(), source_of(pointer),
+  refuse(fmt::format("{} is {}, but {} make it {}", field_name(pointer), file.at(*field).dump(), source_of(pointer),
                      expected.at(*field).dump()));
 }
 

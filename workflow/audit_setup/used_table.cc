@@ -15,7 +15,7 @@
 namespace isoshift {
 namespace {
 
-constexpr const char* kSession = "session";
+constexpr const char* kSessionColumn = "session";
 
 std::optional<double> number_of(const std::string& cell, double unit, const std::string& where) {
   if (cell.find_first_not_of(" \t") == std::string::npos) return std::nullopt;
@@ -31,14 +31,14 @@ std::optional<double> number_of(const std::string& cell, double unit, const std:
 
 }  // namespace
 
-std::string used_shifts_header() { return fmt::format("{},{}", kSession, fmt::join(kCouchColumns, ",")); }
+std::string used_shifts_header() { return fmt::format("{},{}", kSessionColumn, fmt::join(kCouchColumns, ",")); }
 
 std::string read_used_table(const std::filesystem::path& table, std::vector<AuditedSession>& sessions) {
   const std::string where = table.string();
   const std::string text = text_of_file(table);
   const CsvTable rows = csv_table(text, where);
   const auto columns = stated_columns(rows, kCouchColumns, where);
-  const auto session_column = std::ranges::find(rows.columns, kSession);
+  const auto session_column = std::ranges::find(rows.columns, kSessionColumn);
   if (session_column == rows.columns.end() || rows.columns.size() != columns.size() + 1 ||
       std::ranges::any_of(columns, [](const auto& column) { return !column; }))
     throw Error(fmt::format("{}, line 1: the columns are \"{}\", expected {} (or in cm and rad: lateral_cm, yaw_rad)",

@@ -70,6 +70,19 @@ std::string what_changed(const SessionInputs& before, const SessionInputs& now) 
   return fmt::format("{}", fmt::join(changed, " and "));
 }
 
+std::string what_changed(const SessionInputs& before, const StudyParts& parts, const FileContents& contents) {
+  SessionInputs now = before;
+  const auto files = files_of(parts);
+  for (std::size_t n = 0; n < files.size(); ++n) {
+    try {
+      now.parts[n] = input_of(files[n], contents, before.parts[n]);
+    } catch (const Error&) {
+      continue;  // a file is gone
+    }
+  }
+  return what_changed(before, now);
+}
+
 nlohmann::ordered_json json_of(const SessionInputs& inputs) {
   nlohmann::ordered_json json = nlohmann::ordered_json::object();
   for (std::size_t n = 0; n < inputs.parts.size(); ++n)

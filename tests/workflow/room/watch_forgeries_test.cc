@@ -155,7 +155,7 @@ TEST_P(WatchForgeries, ALineInTheLogIsNotEnoughWhereThereIsAKey) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Keys, WatchForgeries, testing::Bool(),
-                         [](const auto& info) { return info.param ? "WithKey" : "WithoutKey"; });
+                         [](const auto& one) { return one.param ? "WithKey" : "WithoutKey"; });
 
 }  // namespace
 }  // namespace isoshift::watch_forgeries_test
