@@ -39,18 +39,21 @@ class Orthanc:
             if self.server.poll() is not None:
                 raise SystemExit(f"Orthanc ended with {self.server.returncode}: {self.log.read_text()}")
             try:
-return fetch(self.url + "/system") except urllib.error.URLError
-    : time.sleep(0.1) raise SystemExit("Orthanc did not answer within 30 s")
+                return fetch(self.url + "/system")
+            except urllib.error.URLError:
+                time.sleep(0.1)
+        raise SystemExit("Orthanc did not answer within 30 s")
 
-          def
-          stop(self)
-    : if self.server : self.server.terminate() self.server.wait() self.server = None
+    def stop(self):
+        if self.server:
+            self.server.terminate()
+            self.server.wait()
+            self.server = None
 
-                                                                                    def get(self, path)
-    : return json.loads(fetch(self.url + path))
+    def get(self, path):
+        return json.loads(fetch(self.url + path))
 
-          def send(self, files)
-    : sent = subprocess
-                 .run([ "storescu", "-aec", self.title, "127.0.0.1", str(self.dicom), *map(str, files) ],
-                      capture_output = True, text = True) if sent.returncode != 0
-    : raise SystemExit(f "storescu: {sent.stdout}{sent.stderr}")
+    def send(self, files):
+        sent = subprocess.run(["storescu", "-aec", self.title, "127.0.0.1", str(self.dicom), *map(str, files)], capture_output=True, text=True)
+        if sent.returncode != 0:
+            raise SystemExit(f"storescu: {sent.stdout}{sent.stderr}")

@@ -166,7 +166,7 @@ TEST_F(ResultFolderTest, AResultThatContradictsItselfIsRefused) {
   SetupResult report = bent_report(Verdict::kAccepted);
   report.uncertainty = uncertainty_of_independent_axes({0.1, 0.2, 0.3}, {0.001, 0.002, 0.003});
   report.site = small_couch();
-  report.stages = {{.name = "fine", .evaluations = 3}};
+  report.stages = {{.name = "fine", .parameters = {{"pixel_mm", 1.0}}, .evaluations = 3}};
   SetupResult::View& view = report.views.front();
   view.gantry_deg = 0.0;
   view.source_room_mm = {0, 0, 1000};

@@ -118,7 +118,7 @@ TEST_F(StudyFilesTest, PlanningDrrsAndFluencesAreLeftAsideWhereThereAreXrays) {
   EXPECT_EQ(sessions[0].images.size(), 2U);
   fs::remove_all(study_.image(0).parent_path());
   EXPECT_EQ(find().images.size(), 2U) << "nothing else is there: checks say what they are";
-  EXPECT_EQ(sessions_of(scan_study({study_.path()}), false).size(), 1U);
+  EXPECT_FALSE(sessions_of(scan_study({study_.path()}), false).empty());
 }
 
 TEST_F(StudyFilesTest, XraysOfFormatsThatAreNotReadAreNamed) {

@@ -200,18 +200,18 @@ TEST_F(ResultsTreeTest, WhatMayNotBeReleasedIsRefused) {
 // Where no watch runs that would compare them.
 TEST_F(ResultsTreeTest, WhatWasRegisteredFromFilesThatHaveChangedIsNeitherReleasedNorSent) {
   const fs::path plan = folder_ / "plan.dcm", xray = folder_ / "xray.dcm";
-  write_text(plan, "the plan");
-  write_text(xray, "an X-ray");
+  replace_text(plan, "the plan");
+  replace_text(xray, "an X-ray");
   const StudyParts parts{.images = {xray}, .plan = plan};
   tree_.keep_order(a_, {.parts = parts});
   tree_.keep_inputs(a_, inputs_of(parts, FileContents()));
-  write_text(plan, "another plan of this name");
+  replace_text(plan, "another plan of this name");
   EXPECT_THAT(error_of_release(a_), HasSubstr("session " + a_ + ": RT Plan changed after the registration"));
-  write_text(plan, "the plan");
+  replace_text(plan, "the plan");
   tree_.release(a_, kDoe, {"record"});
   const Delivery delivery = tree_.pending().deliveries.at(0);
   EXPECT_EQ(error_of_sending(delivery), "");
-  write_text(plan, "another plan of this name");
+  replace_text(plan, "another plan of this name");
   EXPECT_THAT(error_of_sending(delivery), HasSubstr("RT Plan changed after the registration"));
   fs::remove(plan);
   EXPECT_EQ(error_of_sending(delivery), "") << "files that were taken away tell nothing";

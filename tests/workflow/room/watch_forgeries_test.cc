@@ -135,8 +135,10 @@ TEST_P(WatchForgeries, WhatWasHandedOverIsTakenOverOnce) {
 TEST_P(WatchForgeries, AResultThatWasEditedBeforeItsRegistrationIsRecordedIsNotPublished) {
   room_.runner.after_end = edit_verdict;
   bring("Q");
-  room_.pass(60s);
-  expect_nothing_sent();
+  room_.pass(600s, 10s);
+  EXPECT_THAT(tree().sessions(), ElementsAre(session("P")));
+  EXPECT_NE(error_of_release("Q"), "");
+  EXPECT_THAT(room_.sender.attempts(), IsEmpty());
   EXPECT_THAT(room_.observer.lines, Contains(HasSubstr("result.json: is not what was registered")));
 }
 

@@ -96,6 +96,7 @@ TEST_F(WatchReleases, AVerdictThatWasExchangedForAWhileReleasesNothing) {
   std::getline(std::ifstream(result), text, '\0');
   std::string exchanged = text;
   exchanged.replace(exchanged.find("\"review\""), 8, "\"accepted\"");
+  exchanged.replace(exchanged.find("\"the views disagree\""), 20, "");  // an accepted result has no reason
   replace_text(result, exchanged);
   room_.start();
   room_.pass(60s);
