@@ -87,6 +87,13 @@ CsvTable csv_table(std::string_view text, const std::string& where, char separat
         problem == CSV_EPARSE ? "a quotation mark is missing, or stands within a cell" : csv_strerror(problem)));
   std::vector<CsvTable::Row> rows = lines.take_rows();
   CsvTable table{.columns = std::move(rows.front().cells), .rows = {}};
+  if (separator == ',' && table.columns.size() == 1)
+    for (const auto& [other, name] : {std::pair(';', "semicolons"), std::pair('\t', "tabulators")})
+      if (table.columns.front().find(other) != std::string::npos)
+        throw Error(
+            fmt::format("{}, line 1: {} separate the cells, expected commas, and numbers with a decimal point. A "
+                        "spreadsheet set to a language with decimal commas writes tables like this",
+                        where, name));
   for (auto column = table.columns.begin(); column != table.columns.end(); ++column)
     if (!column->empty() && std::find(table.columns.begin(), column, *column) != column)
       throw Error(fmt::format("{}: has the column {} twice", where, *column));

@@ -56,4 +56,18 @@ std::string sha256_of_files(const std::vector<std::filesystem::path>& paths) {
   return sha256_of(all);
 }
 
+std::map<std::string, std::string> sha256_of_folder(const std::filesystem::path& folder) {
+  namespace fs = std::filesystem;
+  const fs::file_status status = fs::symlink_status(folder);
+  if (!fs::exists(status)) throw Error(fmt::format("{}: is missing", folder.string()));
+  if (!fs::is_directory(status)) throw Error(fmt::format("{}: is not a plain folder", folder.string()));
+  std::map<std::string, std::string> all;
+  for (const auto& entry : fs::directory_iterator(folder)) {
+    if (entry.symlink_status().type() != fs::file_type::regular)
+      throw Error(fmt::format("{}: is not a plain file", entry.path().string()));
+    all[entry.path().filename().string()] = sha256_of_file(entry.path());
+  }
+  return all;
+}
+
 }  // namespace isoshift

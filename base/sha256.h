@@ -2,6 +2,7 @@
 // SHA-256, hexadecimal: results name the files they were made from by it.
 
 #include <filesystem>
+#include <map>
 #include <memory>
 #include <string>
 #include <string_view>
@@ -29,5 +30,9 @@ std::string sha256_of_file(const std::filesystem::path& path);
 
 // Of the contents of all files in their order. Throws Error for a file that cannot be read.
 std::string sha256_of_files(const std::vector<std::filesystem::path>& paths);
+
+// Of every file of a folder, by name. Throws Error if the folder holds anything but plain files: a link could lead to
+// another file tomorrow, and a folder would hide files.
+std::map<std::string, std::string> sha256_of_folder(const std::filesystem::path& folder);
 
 }  // namespace isoshift

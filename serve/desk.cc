@@ -155,7 +155,7 @@ HttpResponse Desk::hand_over(Place& place, const HttpRequest& request, const Sig
   if (!body.is_object() || body.value("folder", nlohmann::json()) != now.result.string())
     return refusal(
         409, fmt::format("{} has made another result of this session since. Look at that, or register again.", now.by));
-  const std::string name = room_.hand_over(place.basis(), now.result, who.user);
+  const std::string name = room_.hand_over(place.basis(), {.folder = now.result, .files = now.files}, who.user);
   place.registration().forget();
   return json_answer({{"session", name}});
 }

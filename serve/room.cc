@@ -309,7 +309,7 @@ std::filesystem::path Room::by_hand(const std::string& session) const {
   return watch_.results / "by_hand" / name_of_xrays(session);
 }
 
-std::string Room::hand_over(const ManualBasis& basis, const std::filesystem::path& result, const std::string& user) {
+std::string Room::hand_over(const ManualBasis& basis, const MadeResult& result, const std::string& user) {
   const std::lock_guard lock(mutex_);
   return tree_.hand_over(basis, result, user);
 }

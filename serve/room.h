@@ -78,7 +78,7 @@ class Room {
   std::filesystem::path by_hand(const std::string& session) const;
   // Hands a finished result to the engine, and returns the name of the session that the engine will make of it. Throws
   // Error where ResultsTree::hand_over() does.
-  std::string hand_over(const ManualBasis& basis, const std::filesystem::path& result, const std::string& user);
+  std::string hand_over(const ManualBasis& basis, const MadeResult& result, const std::string& user);
 
   // A line in the audit log: that a user has signed in or looked at a session. If it cannot be written now, it is kept:
   // on a full disk people must see reports all the same.

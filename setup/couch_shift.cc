@@ -19,6 +19,10 @@ CouchShift couch_shift_for(const Eigen::Isometry3d& setup_error, const TableAngl
   return shift;
 }
 
+Eigen::Vector3d translation_after_rotation_mm(const Eigen::Isometry3d& setup_error, const TableAngles& table) {
+  return rotation_z(-table.yaw_rad()) * setup_error.inverse().translation();
+}
+
 CouchShift applicable_shift(const Eigen::Isometry3d& setup_error, const TableAngles& table, CouchDof dof,
                             const Eigen::Vector3d& point_mm) {
   CouchShift part = couch_shift_for(setup_error, table);

@@ -27,6 +27,10 @@ struct CouchShift {
 CouchShift couch_shift_for(const Eigen::Isometry3d& setup_error, const TableAngles& table,
                            const Eigen::Vector3d& about_mm = Eigen::Vector3d::Zero());
 
+// The translation of a couch that makes the same rotation first, about the isocenter, and translates then: along the
+// same axes.
+Eigen::Vector3d translation_after_rotation_mm(const Eigen::Isometry3d& setup_error, const TableAngles& table);
+
 // Which of its six motions a couch can make: all; translations and yaw; translations.
 enum class CouchDof { kThree = 3, kFour = 4, kSix = 6 };
 

@@ -181,6 +181,14 @@ Json describe(const CheckedRegistration& checked, const RegistrationMeaning& mea
         "{:+.2f}, roll {:+.2f} deg\n",
         shift->translation_mm.x(), shift->translation_mm.y(), shift->translation_mm.z(),
         deg_from_rad(shift->change.z_rad), deg_from_rad(shift->change.x_rad), deg_from_rad(shift->change.y_rad));
+    const Eigen::Vector3d turned_first_mm = translation_after_rotation_mm(*meaning.setup_error, setup->table());
+    text += fmt::format(
+        "         which translates first. A console whose couch turns about the isocenter first shows lateral {:+.2f}, "
+        "longitudinal {:+.2f}, vertical {:+.2f} mm\n",
+        turned_first_mm.x(), turned_first_mm.y(), turned_first_mm.z());
+    json["couch_shift_turned_first"] = {{"lateral_mm", turned_first_mm.x()},
+                                        {"longitudinal_mm", turned_first_mm.y()},
+                                        {"vertical_mm", turned_first_mm.z()}};
     json["couch_at_imaging"] = json_of_couch(*setup);
     if (about_mm) json["couch_shift_about"] = describe_about(*about_mm, *meaning.setup_error, *setup, text);
   }

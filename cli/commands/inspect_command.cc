@@ -329,7 +329,7 @@ void run_inspect(const std::vector<std::filesystem::path>& paths, const std::opt
       return {describe_plan(plan)};
     });
   for (const StudyFiles::Ct& ct : files.cts) inspection.tell(describe_ct(ct, console));
-  for (const auto& images : {files.images, files.other_xrays})
+  for (const auto& images : {files.images, files.drrs, files.other_xrays})
     for (const StudyFiles::Image& image : images)
       inspection.tell("X-ray", image.file, [&] {
         const auto planned = planned_positions.find(image.plan_uid);
@@ -345,8 +345,8 @@ void run_inspect(const std::vector<std::filesystem::path>& paths, const std::opt
   inspection.tell_others(files, machine.has_value());
   if (const std::size_t unreadable = inspection.unreadable() + files.unreadable.size(); unreadable > 0)
     throw Error(fmt::format("{} of the files cannot be read; see above", unreadable));
-  if (files.cts.empty() && files.images.empty() && files.other_xrays.empty() && files.plans.empty() &&
-      files.structures.empty() && files.registrations.empty())
+  if (files.cts.empty() && files.images.empty() && files.drrs.empty() && files.other_xrays.empty() &&
+      files.plans.empty() && files.structures.empty() && files.registrations.empty())
     throw Error(fmt::format("{}: holds nothing that isoshift can read", paths.front().string()));
 }
 

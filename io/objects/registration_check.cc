@@ -87,21 +87,36 @@ class Checker {
                         described(DCM_ContentLabel), label));
   }
 
+  // PS3.3 C.20.2 asks for no order.
+  void check_order(const std::vector<bool>& is_registered_frame) {
+    constexpr const char* kWhy =
+        "Readers that take the second item for the result, or pair items with series by their order, take the wrong "
+        "one";
+    const auto found = std::ranges::find(is_registered_frame, true);
+    if (found == is_registered_frame.end())
+      error(fmt::format("no item is the registered frame with an exact identity. {}", kWhy));
+    else if (found != is_registered_frame.begin())
+      note(
+          fmt::format("item {}, and not the first, is the registered frame with an exact identity, as the standard "
+                      "allows. {}",
+                      found - is_registered_frame.begin() + 1, kWhy));
+  }
+
   void check_items() {
     const std::vector<DicomItem> items = dataset_.items(DCM_RegistrationSequence);
     if (items.empty()) error(fmt::format("dataset: {} has no item", described(DCM_RegistrationSequence)));
     int others = 0;
-    std::set<std::string> unmoved;  // frames
+    bool are_all_read = true;
+    std::set<std::string> unmoved;                               // frames
+    std::vector<bool> is_registered_frame(items.size(), false);  // with an exact identity
     for (std::size_t n = 0; n < items.size(); ++n) {
       const std::string name = fmt::format("item {}", n + 1);
       const std::string frame = frame_of(items[n], name);
       const std::optional<Eigen::Affine3d> matrix = matrix_of(items[n], name);
+      are_all_read = are_all_read && matrix;
       if (!matrix) continue;
       const bool is_identity = matrix->matrix() == Eigen::Matrix4d::Identity();
-      if (n == 0 && !(is_identity && frame == result_.registered_frame_uid))
-        error(
-            "item 1: is not the registered frame with an exact identity. Readers that take the second item for the "
-            "result, or pair items with series by their order, take the wrong one");
+      is_registered_frame[n] = is_identity && frame == result_.registered_frame_uid;
       if (!is_identity && frame == result_.registered_frame_uid)
         ambiguous(fmt::format("{}: moves the registered frame against itself", name));
       check_places(items[n], name, frame, matrix->matrix());
@@ -114,6 +129,7 @@ class Checker {
       result_.source_frame_uid = frame;
       result_.source_is_that_of_images = !items[n].items(DCM_ReferencedImageSequence).empty();
     }
+    if (are_all_read && !items.empty()) check_order(is_registered_frame);
     if (others == 0 && unmoved.size() > 1) result_.registered_from_source.reset();  // which one is meant is not known
     if (others > 1)
       ambiguous(fmt::format("{} items are not the identity. SlicerRT multiplies all matrices of a file", others));

@@ -319,15 +319,6 @@ Json references_json(const SetupResult& report) {
 
 }  // namespace
 
-Json shift_json(const SetupResult& report) {
-  const ShownShift shown = shown_shift(report);
-  return {{"setup_error", setup_error_json(report, shown)},
-          {"couch_shift", couch_shift_json(shown)},
-          {"couch_target_deg", couch_target_json(shown)},
-          {"couch_applied", couch_applied_json(report, shown)},
-          {"left_over", left_over_json(shown)}};
-}
-
 // NOLINTNEXTLINE(readability-function-size): long because result.json is: one line per key, in the order of the file
 std::string json_report(const SetupResult& report) {
   const ShownShift shown = shown_shift(report);

@@ -1,14 +1,11 @@
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <array>
-#include <cmath>
 #include <limits>
 #include <nlohmann/json.hpp>
 
 #include "base/error.h"
 #include "base/json_file.h"
-#include "geometry/patient_setup.h"
 #include "geometry/rotation.h"
 #include "io/report/formats.h"
 #include "io/report/result_json.h"
@@ -344,28 +341,6 @@ SetupResult report_from(const Json& json) {
   return report;
 }
 
-// Whether two values are the same but for the last digits, where both say something.
-bool agrees(const Json& a, const Json& b) {
-  constexpr double kLastDigits = 1e-6;
-  if (a.is_number() && b.is_number()) return std::abs(a.get<double>() - b.get<double>()) <= kLastDigits;
-  if (a.is_array() && b.is_array()) return std::ranges::equal(a, b, agrees);
-  if (!a.is_object() || !b.is_object()) return a == b;
-  for (const auto& [key, value] : a.items())
-    if (b.contains(key) && !agrees(value, b.at(key))) return false;
-  return true;
-}
-
-// The shift stands there in several forms. Who changes the file by hand, changes one of them.
-void check_shift(const Json& json, const SetupResult& report) {
-  if (!as_rigid(Eigen::Affine3d(report.setup_error.matrix())))
-    throw Error("setup_error: rotation_matrix is no rotation");
-  const Json expected = shift_json(report);
-  for (const auto& [part, value] : expected.items())
-    if (json.contains(part) && !agrees(json.at(part), value))
-      throw Error(fmt::format("{} is {}, expected {}: the file was changed after it was made", part,
-                              json.at(part).dump(), value.dump()));
-}
-
 }  // namespace
 
 SetupResult report_from_json(const std::string& json, const std::string& where) {
@@ -373,7 +348,7 @@ SetupResult report_from_json(const std::string& json, const std::string& where) 
     const Json parsed = Json::parse(json);
     if (parsed.at("schema") != 1) throw Error(fmt::format("schema is {}, expected 1", parsed.at("schema").dump()));
     SetupResult report = report_from(parsed);
-    check_shift(parsed, report);
+    check_is_consistent(parsed, report);
     return report;
   } catch (const Error& error) {
     throw Error(fmt::format("{}: {}", where, error.what()));

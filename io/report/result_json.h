@@ -30,7 +30,7 @@ inline constexpr std::array<std::pair<const char*, std::string Identity::*>, 12>
 inline constexpr std::string_view kRad = "_rad";
 inline constexpr std::string_view kDeg = "_deg";
 
-// The parts that say the shift, or follow from it.
-nlohmann::ordered_json shift_json(const SetupResult& report);
+// Throws Error, naming both, if fields of a result.json contradict each other. `result`: what was read from the file.
+void check_is_consistent(const nlohmann::ordered_json& file, const SetupResult& result);
 
 }  // namespace isoshift

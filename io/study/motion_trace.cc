@@ -19,6 +19,16 @@ namespace {
 
 constexpr double kFarthestMm = 10000.0;
 
+// What another program's file seems to be; empty: nothing that is known here.
+std::string curve_of_other_program(std::string_view text) {
+  const auto has = [&](std::string_view words) { return text.substr(0, 2000).find(words) != std::string_view::npos; };
+  if (has("[Header]") && has("Data_layout="))
+    return "It looks like a breathing curve of Varian RPM (.vxp): one amplitude over time is no position";
+  if (has("Amplitude"))
+    return "It looks like the breathing curve of a gating system: one amplitude over time is no position";
+  return "";
+}
+
 // Which columns hold the time and the position.
 struct Columns {
   std::size_t time = 0;
@@ -26,7 +36,7 @@ struct Columns {
   std::array<std::size_t, 3> position{};
 };
 
-Columns columns_of(const std::vector<std::string>& titles, const std::string& where) {
+Columns columns_of(const std::vector<std::string>& titles, const std::string& where, const std::string& hint) {
   std::vector<std::string> names = titles;
   for (std::string& name : names) std::erase(name, ' ');
   const auto one_of = [&](std::initializer_list<std::string_view> any) {
@@ -45,11 +55,32 @@ Columns columns_of(const std::vector<std::string>& titles, const std::string& wh
   if (!time || !position[0] || !position[1] || !position[2])
     throw Error(
         fmt::format("{}: has the columns {}; expected t_s (or Timestamp, in ms) and x, y, z (or x_mm, or "
-                    "measured_x_mm, ...)",
-                    where, fmt::join(names, ", ")));
+                    "measured_x_mm, ...), in the first line of a table (CSV){}{}",
+                    where, fmt::join(names, ", "), hint.empty() ? "" : ".\n       ", hint));
   return {.time = *time,
           .seconds_per_unit = names[*time] == "Timestamp" ? 1e-3 : 1.0,
           .position = {*position[0], *position[1], *position[2]}};
+}
+
+// A recorder that has lost its target may repeat the last position; a target that is there moves by a little.
+void warn_of_standstill(const std::vector<MotionSample>& trace, const std::string& where, Notes& notes) {
+  constexpr double kLongS = 3.0;
+  const MotionSample* longest = nullptr;
+  double longest_s = 0.0;
+  std::size_t first = 0;
+  for (std::size_t n = 0; n < trace.size(); ++n) {
+    if (trace[n].position_mm != trace[first].position_mm) first = n;
+    if (const double length_s = trace[n].time_s - trace[first].time_s; length_s > longest_s) {
+      longest_s = length_s;
+      longest = &trace[first];
+    }
+  }
+  const bool moves = first > 0;
+  if (moves && longest_s >= kLongS)
+    notes.warnings.push_back(
+        fmt::format("{}: the position stands still to the last digit for {:.1f} s, from {:.1f} s on: was the target "
+                    "lost there? Leave such rows empty, or out",
+                    where, longest_s, longest->time_s));
 }
 
 }  // namespace
@@ -58,8 +89,10 @@ std::vector<MotionSample> read_motion_trace(const std::filesystem::path& path, N
   const std::string text = text_of_file(path), where = path.string();
   if (text.empty()) throw Error(fmt::format("{}: is empty", where));
   const char separator = text.substr(0, text.find_first_of("\r\n")).find(';') != std::string::npos ? ';' : ',';
+  const std::string first_line = text.substr(0, text.find_first_of("\r\n")), hint = curve_of_other_program(text);
+  if (!hint.empty()) columns_of(csv_table(first_line, where, separator).columns, where, hint);
   const CsvTable table = csv_table(text, where, separator);
-  const Columns columns = columns_of(table.columns, where);
+  const Columns columns = columns_of(table.columns, where, hint);
   std::vector<MotionSample> trace;
   for (const CsvTable::Row& row : table.rows) {
     const auto value_of = [&](std::size_t column) -> std::optional<double> {
@@ -102,6 +135,7 @@ std::vector<MotionSample> read_motion_trace(const std::filesystem::path& path, N
   if (wrong > 0)
     notes.warnings.push_back(fmt::format("{}: {} of {} rows have a time before that of the row above, and were skipped",
                                          where, wrong, trace.size()));
+  warn_of_standstill(in_order, where, notes);
   return in_order;
 }
 

@@ -340,7 +340,7 @@ std::vector<SessionFiles> sessions_of(const StudyFiles& files, bool other_xrays,
     std::ranges::copy_if(from, std::back_inserter(images),
                          [&](const auto& image) { return seen.insert(image.sop_instance_uid).second; });
   };
-  take_new(files.images);
+  take_new(counting_images(files));
   if (other_xrays) take_new(files.other_xrays);
   // Those without a time come first, by folder.
   const auto place_of = [](const StudyFiles::Image& image) {

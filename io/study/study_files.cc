@@ -5,8 +5,11 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
+#include <cctype>
 #include <cerrno>
 #include <cstring>
+#include <fstream>
 #include <iterator>
 #include <utility>
 
@@ -92,6 +95,20 @@ StudyFiles::Image xray(const fs::path& path, const DicomItem& dataset) {
                                         dataset.text(DCM_ReportedValuesOrigin))};
 }
 
+// Whether an RT Image says that it was computed: a plan is exported with its DRRs, fluences and dose images.
+bool is_computed(const DicomItem& dataset) {
+  const auto type = dataset.texts(DCM_ImageType);
+  return type.size() > 2 && (type[2] == "DRR" || type[2] == "FLUENCE" || type[2] == "BLANK");
+}
+
+// Of whom there are X-rays, by PatientID.
+std::set<std::string> patients_with_xrays(const StudyFiles& files) {
+  std::set<std::string> patients;
+  for (const auto* images : {&files.images, &files.other_xrays})
+    for (const StudyFiles::Image& image : *images) patients.insert(patient_id_of(image.patient));
+  return patients;
+}
+
 void add_ct_slice(const fs::path& path, const DicomItem& dataset, StudyFiles& files) {
   const auto type = dataset.texts(DCM_ImageType);
   if (type.size() > 2 && type[2] == "LOCALIZER") {
@@ -110,6 +127,32 @@ bool is_other_xray(const std::string& sop_class) {
   return sop_class == UID_ComputedRadiographyImageStorage || sop_class == UID_DigitalXRayImageStorageForPresentation ||
          sop_class == UID_DigitalXRayImageStorageForProcessing || sop_class == UID_XRayAngiographicImageStorage ||
          sop_class == UID_XRayRadiofluoroscopicImageStorage;
+}
+
+// X-rays as machines write them for themselves. What begins like this, or, where a format has no beginning, is named
+// like this.
+struct OtherFormat {
+  std::string_view beginning, extension, name, advice;
+};
+constexpr std::string_view kExport = "have the console or the record-and-verify system export it as a DICOM RT Image";
+constexpr std::array kOtherFormats = {
+    OtherFormat{"VMS.XI", ".xim", "an image of a Varian linac (XIM)", kExport},
+    OtherFormat{"", ".hnd", "an image of a Varian imager (HND)", kExport},
+    OtherFormat{"", ".hnc", "an image of a Varian imager (HNC)", kExport},
+    OtherFormat{std::string_view("\x00\x70\x44\x00", 4), ".his", "an image of an Elekta imager (HIS)", kExport},
+    OtherFormat{"", ".raw", "pixels without a header, as ExacTrac writes them",
+                "have the system export it as DICOM, and supply the geometry by a machine profile"}};
+
+// "FILE: what it is, and what to do"; empty: another file.
+std::string other_format(const fs::path& path) {
+  std::string beginning(8, '\0'), extension = path.extension().string();
+  std::ifstream file(path, std::ios::binary);
+  file.read(beginning.data(), static_cast<std::streamsize>(beginning.size()));
+  std::ranges::transform(extension, extension.begin(), [](unsigned char c) { return std::tolower(c); });
+  for (const OtherFormat& format : kOtherFormats)
+    if (format.beginning.empty() ? extension == format.extension : beginning.starts_with(format.beginning))
+      return fmt::format("{}: {}, which is not read: {}", path.string(), format.name, format.advice);
+  return "";
 }
 
 // Where one kind of part was looked for, for a message: what was named for it, else the study.
@@ -273,9 +316,10 @@ void check_is_there(const StudyFiles& files, const StudyParts& named) {
                     searched(named.ct, named.study), option("ct", "FOLDER")));
   if (files.images.empty())
     throw Error(fmt::format("no RT Image found ({}).\n       {}", searched(named.images, named.study),
-                            files.other_xrays.empty() ? "Name the X-rays: " + option("image", "FILE")
-                                                      : "For X-rays of other classes their geometry is needed: " +
-                                                            option("machine", "FILE")));
+                            !files.other_xrays.empty()
+                                ? "For X-rays of other classes their geometry is needed: " + option("machine", "FILE")
+                            : files.other_formats.empty() ? "Name the X-rays: " + option("image", "FILE")
+                                                          : files.other_formats.front()));
   if (!named.plan.empty() && files.plans.empty()) throw Error(fmt::format("{}: holds no RT Plan", named.plan.string()));
 }
 
@@ -302,6 +346,8 @@ void choose_images(const std::vector<StudyFiles::Image>& all, const StudyFiles::
 // The parts among scanned files, of which a person may have named some.
 StudyParts chosen(StudyFiles files, std::vector<StudyFiles::Plan> other_plans, const StudyParts& named,
                   bool takes_other_xrays, Notes& notes) {
+  std::ranges::move(drrs_left_aside(files), std::back_inserter(files.left_aside));
+  files.images = counting_images(files);
   take_other_xrays(files, takes_other_xrays);
   check_is_there(files, named);
   StudyParts parts;
@@ -349,6 +395,7 @@ StudyFiles files_of_session(const SessionChoice& choice, StudyFiles files, bool 
   StudyFiles own = files_for(session, files);
   own.registrations = files.registrations;
   own.left_aside = files.left_aside;
+  std::ranges::move(drrs_left_aside(files), std::back_inserter(own.left_aside));
   for (const auto& images : {files.images, files.other_xrays})
     for (const StudyFiles::Image& image : images)
       if (std::ranges::find(session.images, image.file, &StudyFiles::Image::file) == session.images.end())
@@ -363,6 +410,24 @@ std::string patient_id_of(const std::string& patient) { return patient.substr(0,
 bool may_be_of_one_issuer(const std::string& a, const std::string& b) {
   const auto issuer_of = [](const std::string& patient) { return patient.substr(patient.rfind('\\') + 1); };
   return issuer_of(a) == issuer_of(b) || issuer_of(a).empty() || issuer_of(b).empty();
+}
+
+std::vector<std::string> drrs_left_aside(const StudyFiles& files) {
+  const std::set<std::string> patients = patients_with_xrays(files);
+  std::vector<std::string> lines;
+  for (const StudyFiles::Image& drr : files.drrs)
+    if (patients.contains(patient_id_of(drr.patient)))
+      lines.push_back(fmt::format("{}: {} says that it was computed (a DRR, or a fluence): it is no X-ray",
+                                  drr.file.string(), described(DCM_ImageType)));
+  return lines;
+}
+
+std::vector<StudyFiles::Image> counting_images(const StudyFiles& files) {
+  const std::set<std::string> patients = patients_with_xrays(files);
+  std::vector<StudyFiles::Image> images = files.images;
+  std::ranges::copy_if(files.drrs, std::back_inserter(images),
+                       [&](const StudyFiles::Image& drr) { return !patients.contains(patient_id_of(drr.patient)); });
+  return images;
 }
 
 std::vector<fs::path> files_below(const std::vector<fs::path>& paths, const std::unordered_set<std::string>& but,
@@ -424,7 +489,9 @@ StudyFiles scan_file(const fs::path& path) {
   if (beginning != Beginning::kDicom && path.extension() == ".dcm")
     throw Error(fmt::format("{}: is not a DICOM file, as its name says: it may be cut off", path.string()));
   if (beginning != Beginning::kDicom) {
-    files.left_aside.push_back(fmt::format("{}: not a DICOM file", path.string()));
+    const std::string other = other_format(path);
+    files.left_aside.push_back(other.empty() ? fmt::format("{}: not a DICOM file", path.string()) : other);
+    if (!other.empty()) files.other_formats.push_back(other);
     return files;
   }
   const DicomFile file = DicomFile::read(path, DicomFile::Extent::kHeader);
@@ -434,7 +501,7 @@ StudyFiles scan_file(const fs::path& path) {
       sop_class == UID_LegacyConvertedEnhancedCTImageStorage) {
     add_ct_slice(path, dataset, files);
   } else if (sop_class == UID_RTImageStorage) {
-    files.images.push_back(xray(path, dataset));
+    (is_computed(dataset) ? files.drrs : files.images).push_back(xray(path, dataset));
   } else if (is_other_xray(sop_class)) {
     files.other_xrays.push_back(xray(path, dataset));
   } else if (sop_class == UID_RTPlanStorage || sop_class == UID_RTIonPlanStorage) {
@@ -474,10 +541,12 @@ void merge(StudyFiles from, StudyFiles& files) {
   const auto append = [&](auto member) { std::ranges::move(from.*member, std::back_inserter(files.*member)); };
   append(&StudyFiles::plans);
   append(&StudyFiles::images);
+  append(&StudyFiles::drrs);
   append(&StudyFiles::other_xrays);
   append(&StudyFiles::structures);
   append(&StudyFiles::registrations);
   append(&StudyFiles::left_aside);
+  append(&StudyFiles::other_formats);
   append(&StudyFiles::unreadable);
 }
 
@@ -507,7 +576,10 @@ StudyParts find_parts(const StudyParts& named, bool takes_other_xrays, Notes& no
   if (!named.ct.empty()) files.cts = scan_readable(named.ct).cts;
   if (!named.images.empty()) {
     StudyFiles images = scan_readable(named.images);
+    std::ranges::move(images.drrs, std::back_inserter(images.images));  // a person means them
+    files.drrs.clear();
     std::swap(files.images, images.images);
+    std::swap(files.other_formats, images.other_formats);
     std::swap(files.other_xrays, images.other_xrays);
   }
   if (!named.plan.empty()) std::swap(other_plans, files.plans), files.plans = scan_readable({named.plan}).plans;

@@ -59,10 +59,12 @@ struct StudyFiles {
   std::vector<Ct> cts;
   std::vector<Plan> plans;
   std::vector<Image> images;       // RT Images
+  std::vector<Image> drrs;         // RT Images that say that they were computed; X-rays where there are no others
   std::vector<Image> other_xrays;  // DX, CR, XA: their files do not contain the geometry
   std::vector<Structures> structures;
   std::vector<std::filesystem::path> registrations;  // Spatial Registration objects, also deformable ones
   std::vector<std::string> left_aside;               // "FILE: reason"
+  std::vector<std::string> other_formats;            // those of them that are X-rays in no DICOM format
   std::vector<std::string> unreadable;               // messages on files that look like DICOM, or cannot be opened
 };
 
@@ -84,6 +86,11 @@ StudyFiles scan_study(const std::vector<std::filesystem::path>& paths);
 
 // Reads the header of one file. Throws Error if the file cannot be read.
 StudyFiles scan_file(const std::filesystem::path& path);
+
+// The DRRs of patients who have X-rays, as they are left aside: "FILE: reason".
+std::vector<std::string> drrs_left_aside(const StudyFiles& files);
+// The RT Images that count: DRRs only of patients who have no X-ray.
+std::vector<StudyFiles::Image> counting_images(const StudyFiles& files);
 
 // Adds the files of `from` to `files`.
 void merge(StudyFiles from, StudyFiles& files);
@@ -120,9 +127,10 @@ struct StudyParts {
 // drawn;
 // - the images of that plan, and of the session that `named` chooses;
 // - the structure set to which the plan refers, or else the only structure set that was drawn on that CT.
-// All other files are left aside in the notes, with the reason. `takes_other_xrays`: a machine profile supplies the
-// geometry of X-rays that are not RT Images. Throws Error if there is no CT or no image, or if the files do not tell
-// which of several candidates is meant. Several structure sets are an error only where a structure set is needed.
+// All other files are left aside in the notes, with the reason; so are DRRs, unless there is no other X-ray.
+// `takes_other_xrays`: a machine profile supplies the geometry of X-rays that are not RT Images. Throws Error if there
+// is no CT or no image, or if the files do not tell which of several candidates is meant. Several structure sets are an
+// error only where a structure set is needed.
 StudyParts find_parts(const StudyParts& named, bool takes_other_xrays, Notes& notes);
 
 // The same, with all scanned files as candidates.

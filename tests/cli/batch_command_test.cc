@@ -118,6 +118,22 @@ TEST_F(BatchCommandTest, ATruncatedFileBesideMakesNoCase) {
   EXPECT_EQ(summary()["cases"].size(), 3U);
 }
 
+TEST_F(BatchCommandTest, PlanningDrrsBesideXraysMakeNoCase) {
+  Notes before, notes;
+  const std::vector<BatchCase> expected = scan_cases(exported(), false, before);
+  const fs::path drr = exported() / "1" / "drr.dcm";
+  fs::copy_file(expected.front().parts.images.front(), drr);
+  edit(drr, [](DicomItem d) {
+    d.put(DCM_SOPInstanceUID, "1.2.3");
+    d.put(DCM_ImageType, "DERIVED\\SECONDARY\\DRR");
+  });
+  const std::vector<BatchCase> cases = scan_cases(exported(), false, notes);
+  ASSERT_EQ(cases.size(), expected.size());
+  for (std::size_t n = 0; n < cases.size(); ++n) EXPECT_EQ(cases[n].parts, expected[n].parts);
+  EXPECT_THAT(notes.left_aside, testing::ElementsAre(HasSubstr("drr.dcm: ")));
+  EXPECT_EQ(notes.warnings, before.warnings);
+}
+
 TEST_F(BatchCommandTest, OneBadCaseStopsNoOther) {
   edit(exported() / "1" / "RTIMAGE" / "F02" / "KV_G000.dcm", [](DicomItem d) { d.erase(DCM_GantryAngle); });
   const CommandOutcome outcome = batch();

@@ -176,6 +176,20 @@ TEST_F(CheckCommandTest, CouchPitchAndRollAtImagingEnterTheShift) {
                1e-6);
 }
 
+// As consoles show it whose couch turns first: step 3 of docs/console-shifts.md.
+TEST_F(CheckCommandTest, TheShiftOfACouchThatTurnsFirstIsSaidToo) {
+  const Eigen::Isometry3d moved = Eigen::Translation3d(3.0, -4.0, 5.0) *
+                                  Eigen::AngleAxisd(rad_from_deg(3.0), Eigen::Vector3d(1, 2, 2).normalized());
+  const Eigen::Vector3d isocenter(-12.5, 38.0, -410.0);
+  const Eigen::Isometry3d matrix = Eigen::Translation3d(isocenter) * moved;
+  const CommandOutcome outcome = run_command({"check", ours_from("1.2.3.4", matrix.matrix(), "turned.dcm", "isoshift"),
+                                              "--isocenter", "-12.5,38,-410", "--patient-position", "HFS", "--json"});
+  const auto first = checked(outcome)["couch_shift_turned_first"];  // HFS: lateral x, longitudinal z, vertical -y
+  EXPECT_NEAR(first["lateral_mm"].get<double>(), 3.0, 1e-3);
+  EXPECT_NEAR(first["longitudinal_mm"].get<double>(), 5.0, 1e-3);
+  EXPECT_NEAR(first["vertical_mm"].get<double>(), 4.0, 1e-3);
+}
+
 // docs/console-shifts.md, whose tables are made without any code of isoshift: the shift about each of its points, and
 // by it anatomy that lay there comes back to where it was planned.
 TEST_F(CheckCommandTest, TheShiftAboutAnyPointIsThatOfTheDocument) {

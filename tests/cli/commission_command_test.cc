@@ -105,6 +105,20 @@ TEST_F(CommissionCommandTest, AWrongSignFails) {
   EXPECT_EQ(json["axes"]["x_mm"]["polarity"], "passed");
 }
 
+TEST_F(CommissionCommandTest, ATableInAnotherUnitIsNotTestedUntilItSaysSo) {
+  add_all_moves();
+  for (const char* known : {"--positions", "--moves"}) {
+    poses_ = "session,x_mm,y_mm,z_mm\nzero,0,0,0\ntranslated,0.3,-0.4,0.5\nturned,0,0,0\n";
+    const CommandOutcome refused = run({known, path("poses.csv")});
+    EXPECT_EQ(refused.exit_status, 1);
+    EXPECT_EQ(refused.out, "");
+    EXPECT_THAT(refused.err, HasSubstr("10 times x_mm (off by 0"));
+    EXPECT_THAT(refused.err, HasSubstr("if that is right, name the column x_cm"));
+    poses_ = "session,x_cm,y_cm,z_cm\nzero,0,0,0\ntranslated,0.3,-0.4,0.5\nturned,0,0,0\n";
+    EXPECT_EQ(run({known, path("poses.csv")}).exit_status, 3) << "not all of it is tested";
+  }
+}
+
 TEST_F(CommissionCommandTest, RejectedAndFailedSessionsAreNamedAndFail) {
   add_all_moves();
   add("bad", {1, 1, 1}, {0, 0, 0}, Verdict::kRejected);

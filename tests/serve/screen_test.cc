@@ -54,7 +54,7 @@ class ScreenTest : public testing::Test {
     std::string name = session_name(std::set(xrays.begin(), xrays.end()));
     std::filesystem::create_directories(tree_.registering(name));
     write_result(result, tree_.registering(name));
-    tree_.publish(name);
+    tree_.publish(name, sha256_of_folder(tree_.registering(name)));
     return name;
   }
   Json session() { return Json::parse(get("/api/sessions/" + a_).body); }

@@ -36,6 +36,7 @@ SetupResult oblique_report(Verdict verdict) {
   report.commit = "abc";
   report.verdict = verdict;
   report.reasons.clear();
+  if (verdict != Verdict::kAccepted) report.reasons = {"the views disagree"};
   report.identity = {.character_set = "ISO_IR 192",
                      .patient_id = "ID-1",
                      .patient_name = "Example",

@@ -5,6 +5,7 @@
 #include <set>
 
 #include "base/output_folder.h"
+#include "base/sha256.h"
 #include "io/report/result_folder.h"
 #include "io/study/session_files.h"
 
@@ -25,7 +26,7 @@ std::string write_registering(const ResultsTree& tree, const std::vector<std::st
 
 std::string register_session(ResultsTree& tree, const std::vector<std::string>& xrays, const std::string& verdict) {
   std::string name = write_registering(tree, xrays, verdict);
-  tree.publish(name);
+  tree.publish(name, sha256_of_folder(tree.registering(name)));
   return name;
 }
 

@@ -9,6 +9,7 @@
 #include <string>
 
 #include "base/error.h"
+#include "base/sha256.h"
 #include "tests/support/registered_session.h"
 #include "tests/support/temporary_folder.h"
 #include "workflow/room/results_tree.h"
@@ -34,7 +35,7 @@ class ResultsTreeTest : public testing::Test {
   }
   std::string error_of_publishing(const std::string& session) {
     try {
-      tree_.publish(session);
+      tree_.publish(session, sha256_of_folder(tree_.registering(session)));
     } catch (const Error& error) {
       return error.what();
     }

@@ -134,6 +134,8 @@ std::optional<Runner::End> FakeRunner::end() {
   SetupResult report;
   report.verdict = verdict(run.xrays);
   report.reasons = run.doubts;
+  if (report.verdict == Verdict::kAccepted && !run.doubts.empty()) report.verdict = Verdict::kReview;
+  if (report.verdict != Verdict::kAccepted && run.doubts.empty()) report.reasons = {"the views disagree"};
   report.site.emplace().sha256 = site_sha256;
   std::string all;
   for (const std::string& uid : run.xrays) {
@@ -149,7 +151,9 @@ std::optional<Runner::End> FakeRunner::end() {
   write_text(folder_ / kResultFile, json_report(report));
   write_text(folder_ / "report.dcm", "report of " + all);
   if (report.verdict == Verdict::kAccepted) write_text(folder_ / kRegistrationFile, "registration of " + all);
-  return End{};
+  const End end{.files = sha256_of_folder(folder_)};
+  after_end(folder_);
+  return end;
 }
 
 std::string FakeSender::send(const std::filesystem::path& file, const std::string& sha256, const DicomPeer& peer,

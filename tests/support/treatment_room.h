@@ -96,6 +96,8 @@ class FakeRunner : public Runner {
   };
   std::function<Verdict(const std::set<std::string>& xrays)> verdict = [](const auto&) { return Verdict::kAccepted; };
   std::optional<Failure> failure;  // of every registration that ends
+  // What somebody does to the folder of a registration that has ended.
+  std::function<void(const std::filesystem::path& folder)> after_end = [](const auto&) {};
   std::string site_sha256;         // of the site file that the results name
   std::chrono::seconds length{0};  // of a registration
 

@@ -46,6 +46,7 @@ std::vector<BatchCase> cases_of(const BatchOptions& options, Observer& observer)
     return read_manifest(scanned);
   Notes notes;
   std::vector<BatchCase> cases = scan_cases(options.cases, !options.each.study.machine.empty(), notes);
+  for (const std::string& file : notes.left_aside) observer.say("left aside: " + file);
   for (const std::string& warning : notes.warnings) observer.say("warning: " + warning);
   return cases;
 }

@@ -191,6 +191,7 @@ std::vector<BatchCase> scan_cases(const fs::path& folder, bool other_xrays, Note
   StudyFiles files = scan_study({top});
   compare_copies(files);
   for (const std::string& reason : files.unreadable) notes.warnings.push_back(reason);
+  std::ranges::move(drrs_left_aside(files), std::back_inserter(notes.left_aside));
   std::vector<BatchCase> cases;
   for (const SessionFiles& session : sessions_of(files, other_xrays)) {
     for (const std::string& remark : session.remarks)
@@ -216,7 +217,9 @@ std::vector<BatchCase> scan_cases(const fs::path& folder, bool other_xrays, Note
     }
   }
   if (cases.empty())
-    throw Error(fmt::format("{}: holds no case; a case is X-rays with their CT and their plan", folder.string()));
+    throw Error(fmt::format("{}: holds no case; a case is X-rays with their CT and their plan{}{}", folder.string(),
+                            files.other_formats.empty() ? "" : ".\n       ",
+                            files.other_formats.empty() ? "" : files.other_formats.front()));
   return cases;
 }
 

@@ -40,11 +40,12 @@ std::vector<Localized> contrasts_of(const Group& sessions) {
     Compared contrast = compared(*sessions[now]);
     contrast.error.setZero();
     CarriedErrors errors;
-    errors.add(*sessions[now], Matrix6d::Identity());
+    errors.add(*sessions[now], at_known_point(*sessions[now]));
     for (std::size_t n = 0; n < now; ++n) {
       const Compared move = compared(*sessions[n], *sessions[now]);
       contrast.error += move.error / before;
-      errors.add(*sessions[n], -carried_by(move.found) / before);
+      const Eigen::Isometry3d motion = sessions[now]->found * sessions[n]->found.inverse();
+      errors.add(*sessions[n], -at_known_point(*sessions[now]) * carried_by(motion) / before);
       for (std::size_t axis = 0; axis < 6; ++axis)
         contrast.are_determined[axis] = contrast.are_determined[axis] && move.are_determined[axis];
     }
@@ -61,7 +62,7 @@ Localized mean_of(const Group& sessions) {
   CarriedErrors errors;
   for (const Placed* session : sessions) {
     mean.error += compared(*session).error / count;
-    errors.add(*session, Matrix6d::Identity() / count);
+    errors.add(*session, at_known_point(*session) / count);
   }
   mean.covariance = errors.covariance();
   return localized(sessions.front()->name, mean);

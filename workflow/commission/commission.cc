@@ -67,6 +67,20 @@ Coverage coverage_of(const std::vector<NamedResult>& sessions) {
   return coverage;
 }
 
+// Whether the columns of the table hold what they say.
+void check_table(const KnownPoses& poses, const Localization& localization, const std::filesystem::path& table) {
+  std::vector<StatedAndFound> sessions;
+  for (const Localized& one : localization.all) {
+    StatedAndFound& compared = sessions.emplace_back();
+    for (std::size_t axis = 0; axis < one.found.size(); ++axis) {
+      if (!one.error[axis]) continue;
+      compared.stated[axis] = one.known[axis];
+      compared.found[axis] = one.found[axis];
+    }
+  }
+  check_columns(poses.columns, sessions, table.string());
+}
+
 }  // namespace
 
 std::set<std::string> Coverage::untested_positions() const {
@@ -126,6 +140,7 @@ Commission commission_of(const CommissionRequest& request) {
   for (const auto& [name, why] : commission.left_out) known_poses.by_session.erase(name);
   commission.coverage = coverage_of(commission.sessions);
   commission.localization = localization_of(commission.sessions, request.known, known_poses, commission.limits);
+  if (request.known != Known::kReadOuts) check_table(known_poses, commission.localization, request.known_poses);
   return commission;
 }
 

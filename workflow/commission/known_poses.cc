@@ -11,6 +11,7 @@
 #include "base/error.h"
 #include "base/sha256.h"
 #include "base/text_file.h"
+#include "geometry/motion_axes.h"
 #include "geometry/rotation.h"
 #include "io/dicom/table_read_outs.h"
 #include "setup/setup_errors.h"
@@ -21,13 +22,13 @@ namespace {
 constexpr const char* kSession = "session";
 constexpr double kMaxMm = 1000.0, kMaxDeg = 180.0;
 
-double number_from(const std::string& text, const char* column, const std::string& where) {
+double number_from(const std::string& text, const StatedColumn& column, double most, const std::string& where) {
   const auto value = number_in_cell(text);
-  const double most = std::string_view(column).ends_with("_deg") ? kMaxDeg : kMaxMm;
+  most /= column.unit;
   if (!value || std::abs(*value) > most)
-    throw Error(
-        fmt::format("{}, column {}: \"{}\", expected a number from {:g} to {:g}", where, column, text, -most, most));
-  return *value;
+    throw Error(fmt::format("{}, column {}: \"{}\", expected a number from {:g} to {:g}", where, column.name, text,
+                            -most, most));
+  return column.unit * *value;
 }
 
 Eigen::Isometry3d pose_of(const ErrorComponents& components) {
@@ -56,32 +57,35 @@ KnownPoses read_known_poses(const std::filesystem::path& csv) {
   const std::string text = text_of_file(csv);
   const CsvTable table = csv_table(text, csv.string());
   const std::string all_columns = fmt::format("{}, {}", kSession, fmt::join(kErrorComponents, ", "));
-  const auto is_known = [](const std::string& name) {
-    return name == kSession || std::ranges::find(kErrorComponents, name) != kErrorComponents.end();
-  };
+  KnownPoses poses{.by_session = {}, .sha256 = sha256_of(text)};
+  poses.columns = stated_columns(table, kErrorComponents, csv.string());
+  const auto session_column = std::ranges::find(table.columns, kSession);
   for (const std::string& name : table.columns)
-    if (!is_known(name))
-      throw Error(fmt::format("{}: column \"{}\", expected one of {}", csv.string(), name, all_columns));
-  const auto column_of = [&](std::string_view name) { return std::ranges::find(table.columns, name); };
-  const auto has = [&](std::string_view name) { return column_of(name) != table.columns.end(); };
-  for (const char* name : {kSession, "x_mm", "y_mm", "z_mm"})
-    if (!has(name))
+    if (name != kSession &&
+        std::ranges::none_of(poses.columns, [&](const auto& one) { return one && one->name == name; }))
+      throw Error(fmt::format("{}: column \"{}\", expected one of {} (or in cm and rad: x_cm, rx_rad)", csv.string(),
+                              name, all_columns));
+  const auto need = [&](bool is_there, const char* name) {
+    if (!is_there)
       throw Error(fmt::format("{}: has no column {}; its first line must name the columns {}", csv.string(), name,
                               all_columns));
-  KnownPoses poses{.by_session = {}, .have_angles = has("rx_deg"), .sha256 = sha256_of(text)};
-  for (const char* name : {"rx_deg", "ry_deg", "rz_deg"})
-    if (has(name) != poses.have_angles)
+  };
+  need(session_column != table.columns.end(), kSession);
+  for (const std::size_t axis : {0, 1, 2}) need(poses.columns[axis].has_value(), kErrorComponents[axis]);
+  poses.have_angles = poses.columns[3].has_value();
+  for (const std::size_t axis : {3, 4, 5})
+    if (poses.columns[axis].has_value() != poses.have_angles)
       throw Error(
           fmt::format("{}: has only some of the columns rx_deg, ry_deg, rz_deg, expected all or none", csv.string()));
   for (const CsvTable::Row& row : table.rows) {
     const std::string where = fmt::format("{}, line {}", csv.string(), row.line);
-    const auto cell = [&](auto column) { return row.cells[static_cast<std::size_t>(column - table.columns.begin())]; };
+    const std::string& session = row.cells[static_cast<std::size_t>(session_column - table.columns.begin())];
     ErrorComponents components{};
     for (std::size_t n = 0; n < components.size(); ++n)
-      if (has(kErrorComponents[n]))
-        components[n] = number_from(cell(column_of(kErrorComponents[n])), kErrorComponents[n], where);
-    if (!poses.by_session.emplace(cell(column_of(kSession)), pose_of(components)).second)
-      throw Error(fmt::format("{}: session \"{}\" is there twice", where, cell(column_of(kSession))));
+      if (const auto& column = poses.columns[n])
+        components[n] = number_from(row.cells[column->place], *column, is_rotation(n) ? kMaxDeg : kMaxMm, where);
+    if (!poses.by_session.emplace(session, pose_of(components)).second)
+      throw Error(fmt::format("{}: session \"{}\" is there twice", where, session));
   }
   if (poses.by_session.empty()) throw Error(fmt::format("{}: names no session", csv.string()));
   return poses;

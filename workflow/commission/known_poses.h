@@ -7,6 +7,7 @@
 #include <string>
 
 #include "setup/setup_result.h"
+#include "workflow/stated_columns.h"
 
 namespace isoshift {
 
@@ -23,10 +24,12 @@ struct KnownPoses {
   std::map<std::string, Eigen::Isometry3d> by_session;
   bool have_angles = true;  // otherwise rotations are unknown, and nothing is turned in the poses
   std::string sha256;       // of the table
+  std::array<std::optional<StatedColumn>, 6> columns = {};
 };
 
 // CSV with the columns session, x_mm, y_mm, z_mm, rx_deg, ry_deg, rz_deg, in any order: R x + t, R = Rz Rx Ry. The
-// columns of angles may be missing, all three of them. Throws Error naming line and column.
+// columns of angles may be missing, all three of them. Columns may be in cm and rad. Throws Error naming line and
+// column.
 KnownPoses read_known_poses(const std::filesystem::path& csv);
 
 // How the table had moved an object that lies on it from session `before` to `now`: motion of the room. Throws Error

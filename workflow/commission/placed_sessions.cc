@@ -50,9 +50,13 @@ std::string condition_of(const SetupResult& session) {
   return fmt::format("{}, {}", session.patient_position, fmt::join(beams, " and "));
 }
 
-Vector6d error_of(const Eigen::Isometry3d& found, const Eigen::Isometry3d& known) {
+// An unknown rotation must not turn what is known.
+Vector6d error_of(const Eigen::Isometry3d& found, const Eigen::Isometry3d& known, bool are_angles_known) {
   const Eigen::Isometry3d error = found * known.inverse();
-  return (Vector6d() << error.translation(), rotation_vector(error.linear())).finished();
+  Vector6d components;
+  components << error.translation(), rotation_vector(error.linear());
+  if (!are_angles_known) components.head<3>() = found.translation() - known.translation();
+  return components;
 }
 
 }  // namespace
@@ -121,30 +125,39 @@ std::optional<Matrix6d> CarriedErrors::covariance() const {
   return covariance;
 }
 
+Matrix6d at_known_point(const Placed& session) {
+  Matrix6d carried = Matrix6d::Identity();
+  if (!session.are_angles_known) carried.topRightCorner<3, 3>() = -cross_matrix(session.known.translation());
+  return carried;
+}
+
 Compared compared(const Placed& session) {
   CarriedErrors errors;
-  errors.add(session, Matrix6d::Identity());
+  errors.add(session, at_known_point(session));
   return {.found = session.found,
           .known = session.known,
           .are_angles_known = session.are_angles_known,
           .are_determined = session.are_determined,
-          .error = error_of(session.found, session.known),
+          .error = error_of(session.found, session.known, session.are_angles_known),
           .covariance = errors.covariance()};
 }
 
 Compared compared(const Placed& before, const Placed& now) {
   constexpr double kNothing = 0.01;  // of an undetermined axis that a turn brings into another
-  Compared move{.found = now.found * before.found.inverse(),
+  const Eigen::Isometry3d motion = now.found * before.found.inverse();
+  Eigen::Translation3d to_point(Eigen::Vector3d::Zero());
+  if (!now.are_angles_known) to_point.vector() = before.known.translation();
+  Compared move{.found = to_point.inverse() * motion * to_point,
                 .known = now.known * before.known.inverse(),
                 .are_angles_known = now.are_angles_known,
                 .are_determined = now.are_determined,
                 .error = {},
                 .covariance = {}};
-  move.error = error_of(move.found, move.known);
-  const Matrix6d carried = carried_by(move.found);
+  move.error = error_of(move.found, move.known, move.are_angles_known);
+  const Matrix6d carried = carried_by(motion);
   CarriedErrors errors;
-  errors.add(now, Matrix6d::Identity());
-  errors.add(before, -carried);
+  errors.add(now, at_known_point(now));
+  errors.add(before, -at_known_point(now) * carried);
   move.covariance = errors.covariance();
   for (std::size_t axis = 0; axis < 6; ++axis)
     for (std::size_t from = is_rotation(axis) ? 3 : 0; from < (is_rotation(axis) ? 6 : 3); ++from)

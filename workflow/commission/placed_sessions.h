@@ -55,12 +55,19 @@ class CarriedErrors {
   std::vector<Imagers> imagers_;
 };
 
-// A position or a move as it was found, and as it is known.
+// A session's errors where they count: at the isocenter, but without angles where the point lies that was planned
+// there, of which alone it is known where it lies.
+Matrix6d at_known_point(const Placed& session);
+
+// A position or a move as it was found, and as it is known. Without angles, the translations of a move are those of the
+// point that was planned at the isocenter.
 struct Compared {
   Eigen::Isometry3d found, known;
   bool are_angles_known = true;
   std::array<bool, 6> are_determined{};
-  Vector6d error;  // what `found` puts beside `known`: translation at the isocenter in mm, rotation vector in rad
+  // What `found` puts beside `known`: translation at the isocenter in mm, rotation vector in rad. Without angles: found
+  // less known.
+  Vector6d error;
   std::optional<Matrix6d> covariance;  // of the error
 };
 

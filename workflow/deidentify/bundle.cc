@@ -56,7 +56,9 @@ StudyFiles named_files(const SetupResult& result, const StudyFiles& study) {
     if (ct.series_instance_uid == result.ct_series_uid) files.cts.push_back(ct);
   expect_found(!files.cts.empty(), "CT", result.ct_series_uid);
   check_is_the_ct(files.cts.front().files, result.ct_sha256);
-  files.images = images_of(result, study.images);
+  std::vector<StudyFiles::Image> rt_images = study.images;
+  std::ranges::copy(study.drrs, std::back_inserter(rt_images));
+  files.images = images_of(result, rt_images);
   files.other_xrays = images_of(result, study.other_xrays);
   for (const SetupResult::View& view : result.views) {
     const auto has = [&](const std::vector<StudyFiles::Image>& images) {

@@ -17,7 +17,8 @@ std::vector<std::pair<const char*, Files>> by_folder(const StudyFiles& files) {
                                                         {"RTPLAN", {}}, {"RTSTRUCT", {}}, {"REG", files.registrations}};
   for (const StudyFiles::Ct& ct : files.cts)
     folders[0].second.insert(folders[0].second.end(), ct.files.begin(), ct.files.end());
-  for (const StudyFiles::Image& image : files.images) folders[1].second.push_back(image.file);
+  for (const auto& images : {files.images, files.drrs})
+    for (const StudyFiles::Image& image : images) folders[1].second.push_back(image.file);
   for (const StudyFiles::Image& image : files.other_xrays) folders[2].second.push_back(image.file);
   for (const StudyFiles::Plan& plan : files.plans) folders[3].second.push_back(plan.file);
   for (const StudyFiles::Structures& structures : files.structures) folders[4].second.push_back(structures.file);

@@ -79,7 +79,7 @@ void ManualRegistration::look() {
   if (!end) return;
   end_process();
   if (end->failure.empty())
-    state_ = {.what = State::What::kEnded, .by = state_.by, .result = output_};
+    state_ = {.what = State::What::kEnded, .by = state_.by, .result = output_, .files = end->files};
   else
     state_ = {.what = State::What::kFailed, .by = state_.by, .failure = end->failure};
 }

@@ -4,6 +4,7 @@
 
 #include <Eigen/Geometry>
 #include <filesystem>
+#include <map>
 #include <memory>
 #include <mutex>
 #include <string>
@@ -29,10 +30,11 @@ class ManualRegistration {
 
   struct State {
     enum class What { kIdle, kRuns, kEnded, kFailed } what = What::kIdle;
-    std::string by;                // who has begun it
-    Progressed progress;           // of what runs
-    std::filesystem::path result;  // folder of what has ended
-    std::string failure;           // why the last one has no result
+    std::string by;                                 // who has begun it
+    Progressed progress;                            // of what runs
+    std::filesystem::path result;                   // folder of what has ended
+    std::map<std::string, std::string> files = {};  // SHA-256 by name, of all files that the child wrote there
+    std::string failure = {};                       // why the last one has no result
   };
   State state();
 

@@ -51,7 +51,9 @@ struct ToJson {
   nlohmann::json operator()(const Progressed& progressed) const {
     return {{"progressed", {{"step", raw(progressed.step)}, {"share", progressed.share}}}};
   }
-  nlohmann::json operator()(const Ended& ended) const { return {{"ended", {{"verdict", to_string(ended.verdict)}}}}; }
+  nlohmann::json operator()(const Ended& ended) const {
+    return {{"ended", {{"verdict", to_string(ended.verdict)}, {"files", ended.files}}}};
+  }
   nlohmann::json operator()(const Failed& failed) const {
     return {{"failed", {{"why", raw(failed.why)}, {"is_of_disk", failed.is_of_disk}}}};
   }
@@ -119,7 +121,11 @@ RegistrationMessage registration_message_from(const std::string& line, const std
   RegistrationMessage result = Ready();
   if (progressed)
     result = Progressed{.step = text_in(section, "step"), .share = section.required<double>("share", "a share")};
-  if (ended) result = Ended{verdict_in(section)};
+  if (ended) {
+    const Verdict verdict = verdict_in(section);
+    result = Ended{.verdict = verdict,
+                   .files = section.required<std::map<std::string, std::string>>("files", "the SHA-256 of every file")};
+  }
   if (failed)
     result = Failed{.why = text_in(section, "why"), .is_of_disk = section.required<bool>("is_of_disk", kYesOrNo)};
   section.end();

@@ -2,6 +2,7 @@
 // Messages from a program to the child processes in which it registers, and their answers.
 
 #include <filesystem>
+#include <map>
 #include <string>
 #include <variant>
 #include <vector>
@@ -39,7 +40,8 @@ struct Progressed {
   bool operator==(const Progressed&) const = default;
 };
 struct Ended {
-  Verdict verdict = Verdict::kRejected;  // of the result, which is in the output folder
+  Verdict verdict = Verdict::kRejected;      // of the result, which is in the output folder
+  std::map<std::string, std::string> files;  // SHA-256 by name, of all files that the child wrote there
 
   bool operator==(const Ended&) const = default;
 };

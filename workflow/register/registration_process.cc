@@ -6,13 +6,11 @@
 #include <variant>
 
 #include "base/error.h"
-#include "io/report/result_folder.h"
 
 namespace isoshift {
 
 RegistrationProcess::RegistrationProcess(const RegistrationOrder& order, std::chrono::milliseconds limit)
-    : output_(order.output),
-      limit_(limit),
+    : limit_(limit),
       process_({"isoshift", "__child", "register"},
                {.program = this_program(), .limit = limit, .errors = ProcessOptions::Errors::kKept}) {
   // A child that died is found by end().
@@ -25,6 +23,7 @@ void RegistrationProcess::hear(const std::string& line) {
   try {
     const RegistrationMessage message = registration_message_from(line, "the message of the registration");
     if (const auto* progressed = std::get_if<Progressed>(&message)) progress_ = *progressed;
+    if (const auto* result = std::get_if<Ended>(&message)) ended_ = *result;
     if (const auto* failed = std::get_if<Failed>(&message)) failure_ = "error: " + failed->why;
   } catch (const Error& damaged) {
     failure_ = damaged.what();
@@ -39,7 +38,7 @@ std::optional<RegistrationProcess::End> RegistrationProcess::end() {
   }
   std::istringstream lines(ended->output);
   for (std::string line; std::getline(lines, line);) hear(line);
-  if (std::filesystem::exists(output_ / kResultFile)) return End{};
+  if (ended_ && failure_.empty()) return End{.failure = "", .files = ended_->files};
   return End{.failure = failure_of(*ended), .is_late = ended->is_late};
 }
 

@@ -3,6 +3,7 @@
 
 #include <chrono>
 #include <filesystem>
+#include <map>
 #include <optional>
 #include <string>
 
@@ -22,6 +23,7 @@ class RegistrationProcess {
   struct End {
     std::string failure;  // why there is no result; empty: it is in the order's output folder
     bool is_late = false;
+    std::map<std::string, std::string> files = {};  // SHA-256 by name, of all files that the child wrote there
   };
   // How it ended; nothing while it runs. Never waits.
   std::optional<End> end();
@@ -30,10 +32,10 @@ class RegistrationProcess {
   std::string failure_of(const ProcessEnd& end) const;
   void hear(const std::string& line);
 
-  std::filesystem::path output_;
   std::chrono::milliseconds limit_;
   Process process_;
   Progressed progress_;
+  std::optional<Ended> ended_;
   std::string failure_;  // that the child told
 };
 

@@ -10,6 +10,7 @@
 #include <thread>
 
 #include "base/error.h"
+#include "base/sha256.h"
 #include "workflow/register/registration_messages.h"
 
 namespace isoshift {
@@ -54,7 +55,8 @@ RegistrationMessage answer_to(const std::string& line, const OptionsFrom& option
                                       std::max(1U, cores / static_cast<unsigned>(order.at_a_time)));
     Observer nobody;  // all is in the result
     ProgressTeller teller(parent);
-    return Ended{register_study(options, shared, order.tells_progress ? teller : nobody).verdict};
+    const Verdict verdict = register_study(options, shared, order.tells_progress ? teller : nobody).verdict;
+    return Ended{.verdict = verdict, .files = sha256_of_folder(order.output)};
   } catch (const WriteError& error) {
     return Failed{.why = error.what(), .is_of_disk = true};
   } catch (const std::bad_alloc&) {

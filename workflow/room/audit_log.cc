@@ -132,6 +132,7 @@ void AuditLog::Proofs::add(const Json& line) {
   if (!line.is_object()) return;
   const std::string event = text_in(line, "event"), session = text_in(line, "session");
   if (event == "registered") registrations[session] = text_in(line, "record");
+  if (event == "registered" && line.contains("handed_over")) taken_over[text_in(line, "handed_over")] = session;
   if (event == "sent") sendings.insert({session, text_in(line, "peer"), text_in(line, "object")});
   if (event == "objection") objections[session] = text_in(line, "objection");
   if (std::ranges::find(kStatements, event) != kStatements.end()) statements[{event, session}] = text_in(line, "file");
@@ -211,6 +212,11 @@ std::string AuditLog::newest_objection(const std::string& session) const {
 std::string AuditLog::newest_statement(const std::string& event, const std::string& session) const {
   const auto found = proofs().statements.find({event, session});
   return found == proofs().statements.end() ? "" : found->second;
+}
+
+std::string AuditLog::made_of_hand_over(const std::string& statement) const {
+  const auto found = proofs().taken_over.find(statement);
+  return found == proofs().taken_over.end() ? "" : found->second;
 }
 
 std::set<std::string> AuditLog::sessions_with(const std::string& event) const {

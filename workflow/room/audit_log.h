@@ -23,7 +23,7 @@
 namespace isoshift {
 
 // Events in which people say something about a session, each in a file (statement_files.h).
-inline constexpr std::array kStatements = {"decided", "chosen"};
+inline constexpr std::array kStatements = {"decided", "chosen", "handed over"};
 
 // In the file of a release or statement: the head of the audit log that it saw.
 inline constexpr const char* kAuditHeadKey = "audit_head";
@@ -64,6 +64,9 @@ class AuditLog {
   // empty if there is none.
   std::string newest_statement(const std::string& event, const std::string& session) const;
   std::set<std::string> sessions_with(const std::string& event) const;
+  // The session that was made of a result by hand; empty if none was. `statement`: the SHA-256 of the file that says
+  // who has handed it over.
+  std::string made_of_hand_over(const std::string& statement) const;
   // The session with which an object was released; nothing if the object was not released.
   std::optional<std::string> session_releasing(const std::string& object_sha256) const;
 
@@ -77,6 +80,7 @@ class AuditLog {
     std::map<std::string, std::string> registrations;                       // SHA-256 of the newest record, by session
     std::map<std::string, std::string> objections;                          // SHA-256 of the newest one, by session
     std::map<std::pair<std::string, std::string>, std::string> statements;  // SHA-256 of the file, by event and session
+    std::map<std::string, std::string> taken_over;       // session, by SHA-256 of the file that hands it over
     std::map<std::string, std::string> releases;         // SHA-256 of the newest release file, by session
     std::map<std::string, std::size_t> release_numbers;  // by session
     std::size_t releases_so_far = 0;

@@ -33,12 +33,18 @@ void InputChanges::look(const std::map<std::string, Patient>& patients,
                         const std::function<bool(const std::string& patient_id, Clock::Time last)>& is_quiet,
                         const Found& found) {
   for (const auto& [patient_id, patient] : patients) {
-    if (compared_[patient_id] == patient.last || !is_quiet(patient_id, patient.last)) continue;
+    if (is_compared(patient_id, patients) || !is_quiet(patient_id, patient.last)) continue;
     for (const std::string& session : grouping_.registered_in(patient.files))
       look_at(session, patient_id, patient, found);
     look_for_plans_of(patient_id, patients, found);
     compared_[patient_id] = patient.last;
   }
+}
+
+bool InputChanges::is_compared(const std::string& patient_id, const std::map<std::string, Patient>& patients) const {
+  const auto patient = patients.find(patient_id);
+  const auto compared = compared_.find(patient_id);
+  return patient == patients.end() || (compared != compared_.end() && compared->second == patient->second.last);
 }
 
 void InputChanges::look_at(const std::string& session, const std::string& patient_id, const Patient& patient,

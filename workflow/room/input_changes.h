@@ -34,6 +34,10 @@ class InputChanges {
   void look(const std::map<std::string, Patient>& patients,
             const std::function<bool(const std::string& patient_id, Clock::Time last)>& is_quiet, const Found& found);
 
+  // Whether that was done since the last news of a patient have come. Of a patient who has left the source there are
+  // none.
+  bool is_compared(const std::string& patient_id, const std::map<std::string, Patient>& patients) const;
+
   // Compares a patient's results again: what a person has chosen may have changed.
   void compare_again(const std::string& patient_id) { compared_.erase(patient_id); }
 

@@ -41,6 +41,7 @@ void remove_from(StudyFiles& files, const fs::path& file, const std::string& uid
   std::erase_if(files.plans, is_it);
   std::erase_if(files.structures, is_it);
   std::erase_if(files.images, is_it);
+  std::erase_if(files.drrs, is_it);
   std::erase_if(files.other_xrays, is_it);
 }
 
@@ -60,6 +61,7 @@ std::optional<KnownFile> known_file_in(const StudyFiles& one) {
   if (!one.plans.empty()) return known(one.plans.front());
   if (!one.structures.empty()) return known(one.structures.front());
   if (!one.images.empty()) return known(one.images.front());
+  if (!one.drrs.empty()) return known(one.drrs.front());
   if (!one.other_xrays.empty()) return known(one.other_xrays.front());
   return std::nullopt;
 }
@@ -75,9 +77,10 @@ std::vector<fs::path> PatientFiles::forget(const fs::path& file) {
   copies_of_.erase(first, end);
   file_of_uid_.erase(uid);
   StudyFiles& files = patients_.at(patient_id).files;
+  for (const fs::path& copy : copies) remove_from(files, copy, uid);
   remove_from(files, file, uid);
   if (files.cts.empty() && files.plans.empty() && files.structures.empty() && files.images.empty() &&
-      files.other_xrays.empty())
+      files.drrs.empty() && files.other_xrays.empty())
     patients_.erase(patient_id);
   known_.erase(known);
   return copies;
@@ -89,6 +92,7 @@ void PatientFiles::forget_copy(const fs::path& file) {
   const std::string uid = gone->first;
   copies_of_.erase(gone);
   const fs::path used = file_of_uid_.at(uid);
+  remove_from(patients_.at(known_.at(used).patient_id).files, file, uid);
   const auto [first, end] = copies_of_.equal_range(uid);
   const auto other = std::find_if(first, end, [&](const auto& copy) { return differ(copy.second, used); });
   note_other(patients_.at(known_.at(used).patient_id).files, used, other == end ? fs::path() : other->second);
@@ -114,6 +118,7 @@ PatientFiles::Taken PatientFiles::take(const fs::path& file, Notes& notes) {
       copies_of_.emplace(found->uid, file);
       if (differ(before, file)) {
         note_other(patient.files, before, file);
+        std::ranges::move(one.plans, std::back_inserter(patient.files.plans));  // choose_parts() refuses the two
         taken.differs = true;
         notes.warnings.push_back(fmt::format("{}: left aside: differs from {}, which has the same SOPInstanceUID",
                                              file.string(), before.string()));
@@ -127,6 +132,9 @@ PatientFiles::Taken PatientFiles::take(const fs::path& file, Notes& notes) {
   known_[file] = *found;
   Patient& patient = patients_[found->patient_id];
   patient.last = clock_.now();
+  for (const StudyFiles::Image& drr : one.drrs)
+    notes.warnings.push_back(
+        fmt::format("{}: says that it is a DRR: it is left aside where the patient has X-rays", drr.file.string()));
   merge(std::move(one), patient.files);
   return taken;
 }

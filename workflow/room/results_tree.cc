@@ -64,9 +64,6 @@ std::vector<std::string> of_same_xrays(const fs::path& results, const std::strin
   }
 }
 
-// From what a result that was handed over was registered.
-fs::path handed_over_inputs(fs::path folder) { return folder += ".inputs.json"; }
-
 // Folders of registrations under way: ".NAME.registering-PROCESS", and what isoshift register writes beside them.
 constexpr const char* kRegistering = ".registering-";
 
@@ -177,16 +174,20 @@ void ResultsTree::check_is_new(const std::string& session) const {
                     folder.string()));
 }
 
-void ResultsTree::publish(const std::string& session) { publish(session, registering(session)); }
+void ResultsTree::publish(const std::string& session, const FileHashes& made) {
+  publish(session, {.folder = registering(session), .files = made}, "");
+}
 
-void ResultsTree::publish(const std::string& session, const fs::path& folder) {
+void ResultsTree::publish(const std::string& session, const MadeResult& result, const std::string& handed_over) {
   check_is_new(session);
   check_is_not_deleted(session);
-  const SessionRecord record = record_of(session, folder);
+  const SessionRecord record = record_of(session, result.folder, result.files);
   const std::string text = json_of(record);
   replace_text(record_file(session), text);
-  audit_.append("registered", {{"session", session}, {"verdict", record.verdict}, {"record", sha256_of(text)}});
-  if (::rename(folder.c_str(), this->session(session).c_str()) != 0)
+  Json line = {{"session", session}, {"verdict", record.verdict}, {"record", sha256_of(text)}};
+  if (!handed_over.empty()) line["handed_over"] = handed_over;
+  audit_.append("registered", line);
+  if (::rename(result.folder.c_str(), this->session(session).c_str()) != 0)
     throw WriteError(fmt::format("{}: cannot be written: {}", this->session(session).string(), std::strerror(errno)));
   flush(path_ / "sessions");
 }
@@ -230,8 +231,8 @@ ManualBasis ResultsTree::manual_basis(const std::string& session) const {
   return {.newest = newest_of_same_xrays(session), .order = order(session), .inputs = inputs(session)};
 }
 
-// First the inputs, then the line in the audit log, then the folder, which counts.
-std::string ResultsTree::hand_over(const ManualBasis& basis, const fs::path& folder, const std::string& by) {
+// First the line in the audit log, then the statement, then the folder, which counts.
+std::string ResultsTree::hand_over(const ManualBasis& basis, const MadeResult& result, const std::string& by) {
   const FileLock lock = lock_releases();
   const std::string& session = basis.newest;
   check_is_not_deleted(session);
@@ -246,18 +247,14 @@ std::string ResultsTree::hand_over(const ManualBasis& basis, const fs::path& fol
         fmt::format("session {}: an earlier result by hand waits for isoshift watch. Try again when it has been "
                     "taken over",
                     session));
-  const SessionRecord record = record_of(further_name(session), folder);
-  const fs::path inputs = handed_over_inputs(place);
-  if (basis.inputs)
-    replace_text(inputs, file_text(json_of(*basis.inputs)));
-  else
-    fs::remove(inputs);
-  audit_.append("handed over", {{"session", session},
-                                {"by", by},
-                                {"user", system_user().name},
-                                {"verdict", record.verdict},
-                                {"result", record.files.at(kResultFile)}});
-  fs::rename(folder, place);
+  const SessionRecord record = record_of(further_name(session), result.folder, result.files);
+  const std::string xrays = name_of_xrays(session), user = system_user().name;
+  Json statement = {{"schema", 1}, {"session", xrays}, {"by", by}, {"user", user}, {"on", local_time()}};
+  statement["files"] = result.files;
+  statement["inputs"] = basis.inputs ? json_of(*basis.inputs) : Json(nullptr);
+  put_statement(kHandOverStatement, path_, xrays, std::move(statement),
+                {{"session", xrays}, {"by", by}, {"user", user}, {"verdict", record.verdict}}, audit_, key_);
+  fs::rename(result.folder, place);
   flush(path_ / "handed_over");
   return record.session;
 }
@@ -273,11 +270,29 @@ bool ResultsTree::is_handed_over(const std::string& session) const { return fs::
 
 std::string ResultsTree::take_over(const std::string& session) {
   std::string name = further_name(session);
-  const fs::path folder = handed_over_folder(session);
-  if (const fs::path inputs = handed_over_inputs(folder); fs::exists(inputs))
-    keep_inputs(name, session_inputs_from(read_json_file(inputs).json));
-  publish(name, folder);
-  fs::remove(handed_over_inputs(folder));
+  const std::string xrays = name_of_xrays(session);
+  MadeResult result{.folder = handed_over_folder(session), .files = {}};
+  const auto refuse = [&](const std::string& why) {
+    return Error(fmt::format("{}: {}. {}", result.folder.string(), why, kHandOverStatement.consequence));
+  };
+  const auto statement = newest_statement(kHandOverStatement, path_, xrays, audit_, key_);
+  if (!statement) throw refuse("nobody has handed it over on the screen of isoshift serve");
+  const std::string proof = audit_.newest_statement(kHandOverStatement.event, xrays);
+  if (const std::string made = audit_.made_of_hand_over(proof); !made.empty() && fs::exists(this->session(made)))
+    throw refuse(fmt::format("what was handed over last is session {} already", made));
+  try {
+    result.files = statement->at("files").get<FileHashes>();
+    if (const nlohmann::json& inputs = statement->at("inputs"); !inputs.is_null())
+      keep_inputs(name, session_inputs_from(inputs));
+  } catch (const nlohmann::json::exception& error) {
+    throw refuse(fmt::format("who has handed it over is of another version of isoshift: {}", error.what()));
+  }
+  try {
+    (void)record_of(name, result.folder, result.files);
+  } catch (const Error& error) {
+    throw refuse(error.what());
+  }
+  publish(name, result, proof);
   return name;
 }
 
@@ -407,7 +422,7 @@ std::map<std::string, std::string> ResultsTree::chosen() const {
   for (const std::string& session : audit_.sessions_with(kChoiceStatement.event))
     if (!is_deleted(path_, session)) choices[session] = "";  // its files may be gone
   std::set<fs::path> files;
-  for (const auto& entry : fs::directory_iterator(path_ / kChoiceStatement.event)) files.insert(entry.path());
+  for (const auto& entry : fs::directory_iterator(path_ / kChoiceStatement.folder)) files.insert(entry.path());
   for (const fs::path& file : files) {
     const std::string name = file.filename().string();
     std::error_code gone;
@@ -428,6 +443,17 @@ void ResultsTree::check_stands(const std::string& session) const {
   if (const auto decided = decision(session); decided && decided->forbids())
     throw Error(fmt::format("session {}: {}. Take that back first, on the screen of isoshift serve", session,
                             in_words(*decided)));
+  check_inputs(session);
+}
+
+// The files from which the X-rays were registered last, as they are on the disk now: isoshift watch looks at files only
+// when no more of them come. What an earlier version of isoshift has registered is not compared.
+void ResultsTree::check_inputs(const std::string& session) const {
+  const std::optional<SessionInputs> before = inputs(session);
+  if (!before || !fs::exists(order_file(name_of_xrays(session)))) return;
+  if (const std::string parts = what_changed(*before, order(session).parts, FileContents()); !parts.empty())
+    throw Error(fmt::format("session {}: {} changed after the registration. isoshift watch registers its X-rays again",
+                            session, parts));
 }
 
 void ResultsTree::check_second_person(const SessionRecord& record, const std::string& releaser) const {

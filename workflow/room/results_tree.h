@@ -10,7 +10,8 @@
 //   orders/NAME.json         how the session was registered: what a person who registers it by hand begins with
 //   inputs/NAME.json         the SHA-256 of the files from which it was registered
 //   handed_over/NAME/        a result of the session's X-rays by hand that watch has yet to take over; beside it, in
-//                            NAME.inputs.json, from what it was registered
+//                            NAME.N.json, who has handed it over, the SHA-256 of its files as they were made, and from
+//                            what it was registered
 //   sent/NAME.PEER.FILE      the mark that this peer has confirmed this file; it counts with its line in the audit log
 //   deleted/NAME.json        that the results of these X-rays were deleted
 //   objections.json          what other X-rays of the patient say against results
@@ -63,6 +64,12 @@ struct ManualBasis {
   bool operator==(const ManualBasis&) const = default;
 };
 
+// A result that a registration has left, and the SHA-256 of its files as the registration wrote them.
+struct MadeResult {
+  std::filesystem::path folder;
+  FileHashes files;
+};
+
 // Throws Error if another user owns the results tree: isoshift watch could not read files that this user writes there.
 void check_is_owner(const std::filesystem::path& results);
 
@@ -88,9 +95,10 @@ class ResultsTree {
   // Throws Error if there is a session of this name already.
   void check_is_new(const std::string& session) const;
   // Writes the record of a session, adds its line to the audit log, and moves the folder to its place, in this order,
-  // so that a session without a record cannot be one that was registered here. Throws Error if one of the three steps
-  // fails. The caller must hold the lock of the tree.
-  void publish(const std::string& session);
+  // so that a session without a record cannot be one that was registered here. `made`: the files as the registration
+  // wrote them. Throws Error if one of the three steps fails, or if the folder holds anything else. The caller must
+  // hold the lock of the tree.
+  void publish(const std::string& session, const FileHashes& made);
 
   // Keeps how a session is registered, and from what. The caller must hold the lock of the tree.
   void keep_order(const std::string& session, const RegistrationOrder& order);
@@ -103,11 +111,12 @@ class ResultsTree {
   ManualBasis manual_basis(const std::string& session) const;
   // Hands a finished result by hand to the process that registers, as a line in the audit log says, and returns the
   // name that it will have. The folder is moved away. Throws Error, and changes nothing, if it is no result of these
-  // X-rays, if the basis is another one now, or if an earlier one was not taken over yet.
-  std::string hand_over(const ManualBasis& basis, const std::filesystem::path& folder, const std::string& by);
+  // X-rays or was changed since it was made, if the basis is another one now, or if an earlier one was not taken over
+  // yet.
+  std::string hand_over(const ManualBasis& basis, const MadeResult& result, const std::string& by);
   std::vector<std::string> handed_over() const;  // sessions
   // Publishes what was handed over as a session of its own, with the inputs of its basis, and returns its name. Throws
-  // as publish() does. The caller must hold the lock of the tree.
+  // as publish() does, and if hand_over() did not hand it over, or not once. The caller must hold the lock of the tree.
   std::string take_over(const std::string& session);
   // Whether a result of the session's X-rays by hand waits to be taken over.
   bool is_handed_over(const std::string& session) const;
@@ -208,12 +217,14 @@ class ResultsTree {
   std::vector<std::string> released() const;  // sessions
   // The record of a session. Throws Error if the session's folder has changed since its registration.
   SessionRecord checked(const std::string& session) const;
-  void publish(const std::string& session, const std::filesystem::path& folder);
+  // `handed_over`: the SHA-256 of the file that says who has; empty if nobody has.
+  void publish(const std::string& session, const MadeResult& result, const std::string& handed_over);
   bool is_decided(const std::string& session) const;
   void check_is_not_deleted(const std::string& session) const;
-  // Throws Error if a newer result, one by hand that waits to be taken over, or a decision forbids that the session is
-  // released or sent.
+  // Throws Error if a newer result, one by hand that waits to be taken over, a decision, or a file that has changed
+  // since the registration forbids that the session is released or sent.
   void check_stands(const std::string& session) const;
+  void check_inputs(const std::string& session) const;
   void check_second_person(const SessionRecord& record, const std::string& releaser) const;
   FileLock lock_releases() const;
   void check_objects_are_new(const Release& release) const;

@@ -1,6 +1,7 @@
 #pragma once
 // Registers sessions in the background, one at a time.
 
+#include <map>
 #include <optional>
 #include <string>
 
@@ -21,7 +22,8 @@ class Runner {
     bool may_be_over_soon = true;  // another attempt with the same files may succeed
   };
   struct End {
-    std::optional<Failure> failure;  // unset: the result is in the folder
+    std::optional<Failure> failure = std::nullopt;  // unset: the result is in the folder
+    std::map<std::string, std::string> files = {};  // SHA-256 by name, of all files that the registration wrote there
   };
   // How the registration ended; nothing while it runs. An end is returned once.
   virtual std::optional<End> end() = 0;

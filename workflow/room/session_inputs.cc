@@ -31,6 +31,15 @@ std::string sha256_of_all(const Files& files, const std::function<std::string(co
   return isoshift::sha256_of(fmt::format("{}", fmt::join(all, "\n")));
 }
 
+SessionInputs::Part input_of(const Files& files, const FileContents& contents, const SessionInputs::Part& before) {
+  SessionInputs::Part part;
+  part.versions = sha256_of_all(files, [&](const fs::path& file) { return contents.version(file); });
+  part.contents = part.versions == before.versions
+                      ? before.contents
+                      : sha256_of_all(files, [&](const fs::path& file) { return contents.sha256(file); });
+  return part;
+}
+
 }  // namespace
 
 std::string FileContents::version(const fs::path& file) const {
@@ -50,13 +59,7 @@ SessionInputs inputs_of(const StudyParts& parts, const FileContents& contents) {
 SessionInputs inputs_of(const StudyParts& parts, const FileContents& contents, const SessionInputs& before) {
   const auto files = files_of(parts);
   SessionInputs inputs;
-  for (std::size_t n = 0; n < files.size(); ++n) {
-    SessionInputs::Part& part = inputs.parts[n];
-    part.versions = sha256_of_all(files[n], [&](const fs::path& file) { return contents.version(file); });
-    part.contents = part.versions == before.parts[n].versions
-                        ? before.parts[n].contents
-                        : sha256_of_all(files[n], [&](const fs::path& file) { return contents.sha256(file); });
-  }
+  for (std::size_t n = 0; n < files.size(); ++n) inputs.parts[n] = input_of(files[n], contents, before.parts[n]);
   return inputs;
 }
 
@@ -65,6 +68,19 @@ std::string what_changed(const SessionInputs& before, const SessionInputs& now) 
   for (std::size_t n = 0; n < before.parts.size(); ++n)
     if (before.parts[n].contents != now.parts[n].contents) changed.emplace_back(SessionInputs::kParts[n]);
   return fmt::format("{}", fmt::join(changed, " and "));
+}
+
+std::string what_changed(const SessionInputs& before, const StudyParts& parts, const FileContents& contents) {
+  SessionInputs now = before;
+  const auto files = files_of(parts);
+  for (std::size_t n = 0; n < files.size(); ++n) {
+    try {
+      now.parts[n] = input_of(files[n], contents, before.parts[n]);
+    } catch (const Error&) {
+      continue;  // a file is gone
+    }
+  }
+  return what_changed(before, now);
 }
 
 nlohmann::ordered_json json_of(const SessionInputs& inputs) {

@@ -38,6 +38,8 @@ SessionInputs inputs_of(const StudyParts& parts, const FileContents& contents, c
 
 // Which parts have other contents, in words: "CT and RT Plan". Empty: none.
 std::string what_changed(const SessionInputs& before, const SessionInputs& now);
+// The same of the files of `parts` as they are now. A part of which a file is gone tells nothing.
+std::string what_changed(const SessionInputs& before, const StudyParts& parts, const FileContents& contents);
 
 nlohmann::ordered_json json_of(const SessionInputs& inputs);
 // Throws nlohmann::json::exception for anything else.

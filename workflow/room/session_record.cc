@@ -13,25 +13,8 @@
 #include "io/study/session_files.h"
 
 namespace isoshift {
-namespace {
 
 namespace fs = std::filesystem;
-
-// A link could lead to another file tomorrow, and a folder would hide files from the record.
-std::map<std::string, std::string> hashes_in(const fs::path& folder) {
-  const fs::file_status status = fs::symlink_status(folder);
-  if (!fs::exists(status)) throw Error(fmt::format("{}: is missing", folder.string()));
-  if (!fs::is_directory(status)) throw Error(fmt::format("{}: is not a plain folder", folder.string()));
-  std::map<std::string, std::string> hashes;
-  for (const auto& entry : fs::directory_iterator(folder)) {
-    if (entry.symlink_status().type() != fs::file_type::regular)
-      throw Error(fmt::format("{}: is not a plain file", entry.path().string()));
-    hashes[entry.path().filename().string()] = sha256_of_file(entry.path());
-  }
-  return hashes;
-}
-
-}  // namespace
 
 std::string name_of_xrays(const std::string& session, int number) {
   const std::string first = session.substr(0, session.find('-'));
@@ -49,14 +32,14 @@ std::set<std::string> xrays_of(const fs::path& folder) {
   return xrays;
 }
 
-SessionRecord record_of(const std::string& session, const fs::path& folder) {
-  const nlohmann::json result = read_json_file(folder / kResultFile).json;
-  SessionRecord record{.session = session,
-                       .verdict = "",
-                       .on = local_time(),
-                       .pose_set_by = "",
-                       .files = hashes_in(folder),
-                       .sha256 = ""};
+SessionRecord record_of(const std::string& session, const fs::path& folder, const FileHashes& made) {
+  SessionRecord record{
+      .session = session, .verdict = "", .on = local_time(), .pose_set_by = "", .files = made, .sha256 = ""};
+  check_unchanged(record, folder);
+  const JsonFile file = read_json_file(folder / kResultFile);
+  if (made.at(kResultFile) != file.sha256)
+    throw Error(fmt::format("{}: is being changed", (folder / kResultFile).string()));
+  const nlohmann::json& result = file.json;
   try {
     record.verdict = result.at("verdict").get<std::string>();
     if (const nlohmann::json start = result.value("start", nlohmann::json()); !result.value("searched", true))
@@ -99,7 +82,7 @@ SessionRecord read_session_record(const fs::path& path) {
 }
 
 void check_unchanged(const SessionRecord& record, const fs::path& folder) {
-  const std::map<std::string, std::string> found = hashes_in(folder);
+  const std::map<std::string, std::string> found = sha256_of_folder(folder);
   for (const auto& [file, sha256] : record.files) {
     const auto same = found.find(file);
     if (same == found.end()) throw Error(fmt::format("{}: is missing", (folder / file).string()));

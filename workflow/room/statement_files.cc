@@ -30,7 +30,7 @@ int count_of(const fs::path& folder, const std::string& session) {
 std::optional<nlohmann::json> newest_statement(const StatementKind& kind, const fs::path& results,
                                                const std::string& session, const AuditLog& audit,
                                                const std::optional<SigningKey>& key) {
-  const fs::path folder = results / kind.event;
+  const fs::path folder = results / kind.folder;
   const int count = count_of(folder, session);
   const std::string proven = audit.newest_statement(kind.event, session);
   if (count == 0 && proven.empty()) return std::nullopt;
@@ -60,7 +60,7 @@ void put_statement(const StatementKind& kind, const fs::path& results, const std
   } catch (const Error& error) {
     throw Error(fmt::format("session {}: nothing is {}: {}", session, kind.event, error.what()));
   }
-  const fs::path folder = results / kind.event;
+  const fs::path folder = results / kind.folder;
   replace_text(numbered(folder, session, count_of(folder, session) + 1), text);
 }
 

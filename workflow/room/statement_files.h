@@ -13,15 +13,19 @@
 namespace isoshift {
 
 struct StatementKind {
-  const char* event;  // of the lines in the audit log; also the name of the folder in the results tree
+  const char* event;   // of the lines in the audit log
+  const char* folder;  // in the results tree
   const char* name;
   const char* consequence;  // of a file that the audit log or the key does not prove
 };
 inline constexpr StatementKind kDecisionStatement{
-    "decided", "decision",
+    "decided", "decided", "decision",
     "Nothing of the session is released or sent until a person takes it back or decides against the result"};
-inline constexpr StatementKind kChoiceStatement{"chosen", "choice",
+inline constexpr StatementKind kChoiceStatement{"chosen", "chosen", "choice",
                                                 "The choice does not count until a person chooses again"};
+inline constexpr StatementKind kHandOverStatement{
+    "handed over", "handed_over", "result by hand",
+    "Nothing of the session is released or sent until a person moves the folder in handed_over away"};
 
 // The newest statement about a session; nothing if there is none. `results`: the results tree. Throws Error if the
 // files do not say what the audit log proves.

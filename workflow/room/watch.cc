@@ -71,7 +71,8 @@ void Watch::round() {
   troubles_.attempt("comparing X-rays with results", [&] {
     look_for_objections();
     // In its first round a source may only have seen that there are files.
-    set_sendable({.is_known = was_source_read_ && is_source_read_, .waiting = sessions_whose_files_come()});
+    set_sendable({.is_known = was_source_read_ && is_source_read_,
+                  .waiting = objections_.sessions_of([&](const std::string& id) { return may_have_news(id); })});
   });
   troubles_.attempt("releasing", [&] { release_automatically(); });
   troubles_.attempt("writing the audit log", [&] { tree_.write_kept_audit(); });
@@ -413,7 +414,7 @@ void Watch::end_registration() {
       fail(session, news, *end->failure);
     } else {
       tree_.keep_inputs(session, made->inputs);
-      tree_.publish(session);
+      tree_.publish(session, end->files);
       changes_.registered(session);
       changes_.compare_again(made->patient_id);  // somebody may have chosen in the meantime
       take_result(session, made);
@@ -445,9 +446,10 @@ void Watch::look_for_objections() {
   kept_objections_ = objections_.by_session();
 }
 
-// A file that is coming may be an X-ray that speaks against them.
-std::set<std::string> Watch::sessions_whose_files_come() const {
-  return objections_.sessions_of([&](const std::string& patient_id) { return parts_.source.is_coming(patient_id); });
+// A file that is coming may be an X-ray that speaks against results; one that has come may be another plan, which is
+// compared with that of the results once no more files come.
+bool Watch::may_have_news(const std::string& patient_id) const {
+  return parts_.source.is_coming(patient_id) || !changes_.is_compared(patient_id, parts_.source.patients());
 }
 
 void Watch::set_sendable(Sendable sendable) {
@@ -467,15 +469,15 @@ void Watch::release_by_rule(const std::string& session) {
 }
 
 // A release that fails must not block the others. A result against which other X-rays speak is released by a person or
-// not at all; while the source does not answer, a file is on its way, or a file of the source, of whatever patient,
-// cannot be read, it is not known whether any do.
+// not at all; while the source does not answer, files of the patient come or were not compared with the result yet, or
+// a file of the source, of whatever patient, cannot be read, it is not known whether any do.
 void Watch::release_automatically() {
   if (!is_source_read_ || !parts_.source.unreadable().empty()) return;
   std::erase_if(accepted_, [&](const auto& one) { return objections_.by_session().contains(one.first); });
   std::string trouble;
   std::erase_if(accepted_, [&](const auto& one) {
     const auto& [session, patient_id] = one;
-    if (parts_.source.is_coming(patient_id)) return false;
+    if (may_have_news(patient_id)) return false;
     try {
       release_by_rule(session);
       return true;

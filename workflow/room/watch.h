@@ -118,7 +118,7 @@ class Watch {
   void end_registration();
   void fail(const std::string& session, Clock::Time news, const Runner::Failure& failure);
   void look_for_objections();
-  std::set<std::string> sessions_whose_files_come() const;
+  bool may_have_news(const std::string& patient_id) const;
   void set_sendable(Sendable sendable);
   void release_automatically();
   void release_by_rule(const std::string& session);

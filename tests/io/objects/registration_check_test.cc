@@ -105,15 +105,28 @@ TEST_F(RegistrationCheckTest, ACutNumberIsNamed) {
   });
 }
 
-TEST_F(RegistrationCheckTest, AFirstItemThatIsNotTheIdentityIsFound) {
-  expect_error("item 1: is not the registered frame with an exact identity", [&](DicomItem d) {
+TEST_F(RegistrationCheckTest, TheOrderOfTheItemsIsWorthKnowingAndNoError) {
+  const Eigen::Matrix4d moved = result();
+  edit(path_, [&](DicomItem d) {
     const std::string source = item(d, 1).text(DCM_FrameOfReferenceUID).value();
-    const Eigen::Matrix4d moved = result();
     put_matrix(d, 1, Eigen::Matrix4d::Identity());
     put_matrix(d, 0, moved);
     item(d, 1).put(DCM_FrameOfReferenceUID, study_->ct->frame_of_reference_uid);
     item(d, 0).put(DCM_FrameOfReferenceUID, source);
   });
+  const CheckedRegistration checked = check_registration(path_);
+  EXPECT_FALSE(checked.has_errors());
+  ASSERT_EQ(checked.findings.size(), 1U);
+  EXPECT_THAT(checked.findings[0].text, HasSubstr("item 2, and not the first, is the registered frame"));
+  EXPECT_EQ(checked.registered_from_source->matrix(), moved);
+}
+
+TEST_F(RegistrationCheckTest, ARegisteredFrameWithoutAnExactIdentityIsFound) {
+  edit(path_, [&](DicomItem d) { item(d, 0).put(DCM_FrameOfReferenceUID, "1.2.3.4"); });
+  std::string errors;
+  for (const RegistrationFinding& finding : check_registration(path_).findings)
+    if (finding.is_error) errors += finding.text + "\n";
+  EXPECT_THAT(errors, HasSubstr("no item is the registered frame with an exact identity"));
 }
 
 TEST_F(RegistrationCheckTest, AFrameMovedAgainstItselfIsFound) {

@@ -161,6 +161,49 @@ TEST_F(ResultFolderTest, AShiftThatWasChangedByHandIsRefused) {
       ThrowsMessage<Error>(HasSubstr("result.json: verdict is \"fine\", expected accepted, review or rejected")));
 }
 
+// What is said twice is compared: both fields are named.
+TEST_F(ResultFolderTest, AResultThatContradictsItselfIsRefused) {
+  SetupResult report = bent_report(Verdict::kAccepted);
+  report.uncertainty = uncertainty_of_independent_axes({0.1, 0.2, 0.3}, {0.001, 0.002, 0.003});
+  report.site = small_couch();
+  report.stages = {{.name = "fine", .parameters = {{"pixel_mm", 1.0}}, .evaluations = 3}};
+  SetupResult::View& view = report.views.front();
+  view.gantry_deg = 0.0;
+  view.source_room_mm = {0, 0, 1000};
+  view.pixel_from_room.emplace() << 0.5, 0, -0.06, 60, 0, -0.5, -0.06, 60, 0, 0, -0.001, 1;
+  const auto json = nlohmann::json::parse(json_report(report));
+  ASSERT_NO_THROW(report_from_json(json.dump(), "result.json"));
+  const std::vector<std::tuple<const char*, nlohmann::json, const char*, const char*>> edits = {
+      {"/reasons", {"the views disagree"}, "verdict", "reasons"},
+      {"/verdict", "review", "verdict", "reasons"},
+      {"/verdict", "rejected", "", "setup_error"},
+      {"/uncertainty/translation_mm/1", 2.0, "uncertainty/translation_mm/1", "uncertainty/covariance"},
+      {"/uncertainty/covariance/1/1", 0.0004, "target/sigma_mm", "uncertainty/covariance"},
+      {"/uncertainty/covariance/1/0", 0.1, "uncertainty/covariance", "not symmetric"},
+      {"/uncertainty/rotation_deg", nullptr, "uncertainty/rotation_deg", "uncertainty/covariance"},
+      {"/target/displacement_mm/2", 3.0, "target/displacement_mm/2", "setup_error and target/center_room_mm"},
+      {"/target/center_room_mm/1", 60.0, "couch_applied", "target/center_room_mm"},
+      {"/views/0/gantry_deg", 45.0, "views/0/gantry_deg is 45", "views/0/source_room_mm"},
+      {"/views/0/source_room_mm/0", 400.0, "views/0/source_room_mm", "views/0/pixel_from_room"},
+      {"/views/0/pixel_from_room/0/3", 300.0, "views/0/source_room_mm", "views/0/pixel_from_room"},
+      {"/views/0/sop_instance_uid", "1.2.99", "references/images/0", "views/sop_instance_uid"},
+      {"/action", "no shift needed", "action", "site/action_level"},
+      {"/site/action_level/translation_mm", 50.0, "action", "site/action_level"},
+      {"/couch_applied/lateral_mm", 1.0, "couch_applied/lateral_mm", "site"},
+      {"/left_over/0/mm/0", 1.0, "left_over/0/mm/0", "setup_error"},
+      {"/evaluations", 7, "evaluations", "stages"},
+      {"/bodies/0/is_determined", false, "bodies/0/is_determined", "bodies/sigma_mm"}};
+  for (const auto& [place, value, field, other] : edits) {
+    auto changed = json;
+    changed[nlohmann::json::json_pointer(place)] = value;
+    ASSERT_NE(changed, json) << place;
+    EXPECT_THAT([&] { report_from_json(changed.dump(), "result.json"); },
+                ThrowsMessage<Error>(testing::AllOf(HasSubstr("result.json: "), HasSubstr(field), HasSubstr(other),
+                                                    HasSubstr("the file was changed after it was made"))))
+        << place;
+  }
+}
+
 TEST_F(ResultFolderTest, ThePdfIsADicomObjectToo) {
   const CommandOutcome checked = run_shell("dciodvfy -new " + (folder_ / "report.dcm").string());
   EXPECT_THAT(checked.out, Not(HasSubstr("Error"))) << checked.out;

@@ -53,6 +53,31 @@ TEST_F(MotionTraceTest, ReadsTheTraceOfTrack) {
   EXPECT_EQ(trace[1].position_mm, Eigen::Vector3d(2, 3, 4));
 }
 
+TEST_F(MotionTraceTest, CurvesOfGatingSystemsAreNamed) {
+  EXPECT_THAT(
+      error_of("[Header]\nCRC=0\nData_layout=amplitude,phase,timestamp,validflag,ttlin,mark,ttlout\n[Data]\n"
+               "0.6,0,111424,0,0,,0\n"),
+      testing::AllOf(HasSubstr("expected t_s (or Timestamp, in ms) and x, y, z"), HasSubstr("Varian RPM (.vxp)")));
+  EXPECT_THAT(error_of("Gestartet: 01.03.2026, 10:15:00\n\nZeit [s]\tAmplitude [cm]\n0,00\t0,000\n"),
+              HasSubstr("the breathing curve of a gating system"));
+}
+
+TEST_F(MotionTraceTest, AStandstillOfSecondsIsSaid) {
+  const auto trace = [](int from, int to) {
+    std::string text = "t_s,x,y,z\n";
+    for (int n = 0; n < 200; ++n) {
+      const double x = std::sin(0.1 * (n > from && n < to ? from : n));
+      text += fmt::format("{:.1f},{:.4f},0,{:.4f}\n", 0.1 * n, x, 5.0 * x);
+    }
+    return text;
+  };
+  read(trace(100, 121));
+  EXPECT_TRUE(notes_.warnings.empty()) << "2 s";
+  read(trace(100, 161));
+  EXPECT_THAT(notes_.warnings,
+              testing::ElementsAre(HasSubstr("stands still to the last digit for 6.0 s, from 10.0 s on")));
+}
+
 TEST_F(MotionTraceTest, ASingleWrongTimeIsLeftOutWithAWarning) {
   std::string text = "t_s,x,y,z\n";
   for (int n = 0; n < 200; ++n) text += (n == 100 ? "3" : std::to_string(n)) + ",1,2,3\n";

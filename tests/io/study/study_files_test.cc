@@ -3,13 +3,17 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <fstream>
+
 #include "base/error.h"
+#include "io/study/session_files.h"
 #include "tests/support/small_study.h"
 
 namespace isoshift::study_files_test {
 namespace {
 
 namespace fs = std::filesystem;
+using testing::AllOf;
 using testing::Contains;
 using testing::ElementsAre;
 using testing::HasSubstr;
@@ -89,6 +93,47 @@ TEST_F(StudyFilesTest, AnXrayOfAPlanThatIsNotHereIsLeftAside) {
   StudyParts named;
   named.images = {study_.image(0), study_.image(1), stray};
   EXPECT_EQ(find(named).images.size(), 3U) << "what a person names is a matter for checks";
+}
+
+// As planning systems export them with the plan.
+TEST_F(StudyFilesTest, PlanningDrrsAndFluencesAreLeftAsideWhereThereAreXrays) {
+  const std::vector<std::string> types = {"DRR", "FLUENCE"};
+  std::vector<fs::path> computed;
+  for (const std::string& type : types) {
+    computed.push_back(study_.path() / ("RtImage_" + type + ".dcm"));
+    fs::copy_file(study_.image(0), computed.back());
+    edit(computed.back(), [&](DicomItem d) {
+      d.put(DCM_SOPInstanceUID, "1.2.3." + std::to_string(computed.size()));
+      d.put(DCM_ImageType, "DERIVED\\SECONDARY\\" + type);
+      d.put(DCM_ReportedValuesOrigin, "PLAN");
+    });
+  }
+  EXPECT_THAT(find().images, ElementsAre(study_.image(0), study_.image(1)));
+  for (const fs::path& file : computed)
+    EXPECT_THAT(notes_.left_aside, Contains(AllOf(HasSubstr(file.string()), HasSubstr("says that it was computed"))));
+  const StudyParts one_is_named = {.images = {study_.image(1), computed[0]}};
+  EXPECT_THAT(find(one_is_named).images, ElementsAre(study_.image(1), computed[0])) << "that is a matter for checks";
+  std::vector<SessionFiles> sessions = sessions_of(scan_study({study_.path()}), false);
+  ASSERT_EQ(sessions.size(), 1U);
+  EXPECT_EQ(sessions[0].images.size(), 2U);
+  fs::remove_all(study_.image(0).parent_path());
+  EXPECT_EQ(find().images.size(), 2U) << "nothing else is there: checks say what they are";
+  EXPECT_FALSE(sessions_of(scan_study({study_.path()}), false).empty());
+}
+
+TEST_F(StudyFilesTest, XraysOfFormatsThatAreNotReadAreNamed) {
+  const std::string his("\x00\x70\x44\x00 and more", 13);
+  for (const auto& [name, content, words] :
+       {std::tuple("ap.xim", std::string("VMS.XI\0\0\1", 9), "Varian linac (XIM)"),
+        std::tuple("lat.bin", his, "Elekta imager (HIS)"), std::tuple("1.raw", std::string(64, 'x'), "ExacTrac")}) {
+    std::ofstream(study_.path() / name, std::ios::binary) << content;
+    find();
+    EXPECT_THAT(notes_.left_aside, Contains(AllOf(HasSubstr(name), HasSubstr(words), HasSubstr("export it as"))));
+  }
+  EXPECT_THAT(error_of_finding({.images = {study_.path() / "ap.xim"}}),
+              HasSubstr("ap.xim: an image of a Varian linac"));
+  fs::remove_all(study_.image(0).parent_path());
+  EXPECT_THAT(error_of_finding(), AllOf(HasSubstr("no RT Image found"), HasSubstr("1.raw: pixels without a header")));
 }
 
 TEST_F(StudyFilesTest, TwoWholeStudiesNeedAName) {

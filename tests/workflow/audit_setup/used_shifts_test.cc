@@ -20,8 +20,10 @@ namespace isoshift::used_shifts_test {
 namespace {
 
 namespace fs = std::filesystem;
+using testing::AllOf;
 using testing::ElementsAre;
 using testing::HasSubstr;
+using testing::Not;
 
 class AuditArchive : public testing::Test {
  protected:
@@ -138,6 +140,87 @@ TEST_F(AuditArchive, ATableFillsInWhatItKnows) {
   EXPECT_THAT(sessions[0].used, ElementsAre(1.5, -2.0, 3.25, std::nullopt, std::nullopt, 0.0));
   EXPECT_THAT(sessions[0].used_from, HasSubstr("line 2"));
   EXPECT_FALSE(sessions[1].used[0]);
+}
+
+// What isoshift found in five sessions, and a table that says the same to 0.1 mm and degrees.
+class UsedTable : public AuditArchive {
+ protected:
+  UsedTable() {
+    const double found[5][6] = {{3.1, -5.2, 1.4, 1.2, -0.8, 0.4},
+                                {-2.4, 4.4, 6.1, -1.9, 0.6, 1.1},
+                                {5.6, 1.2, -3.3, 0.5, 1.6, -1.3},
+                                {-0.7, -2.8, 4.9, 2.2, -1.5, 0.9},
+                                {1.9, 7.3, -2.2, -0.9, 0.3, -2.0}};
+    for (std::size_t n = 0; n < 5; ++n) {
+      AuditedSession& session = sessions_.emplace_back();
+      session.name = std::string(1, static_cast<char>('a' + n));
+      for (std::size_t axis = 0; axis < 6; ++axis) session.found[axis] = found[n][axis];
+    }
+  }
+  // A table of the shifts, with columns as `header` names them, of which column n says `factor[n]` times axis[n].
+  std::string error_of_table(const std::string& header, const std::array<double, 6>& factor,
+                             const std::array<std::size_t, 6>& axis = {0, 1, 2, 3, 4, 5}) {
+    std::string text = header + "\n";
+    for (const AuditedSession& session : sessions_) {
+      text += session.name;
+      for (std::size_t n = 0; n < 6; ++n)
+        text += fmt::format(",{:.3f}", factor[n] * (*session.found[axis[n]] + (n % 2 == 0 ? 0.1 : -0.1)));
+      text += "\n";
+    }
+    replace_text(folder_ / "used.csv", text);
+    read_ = sessions_;
+    try {
+      read_used_table(folder_ / "used.csv", read_);
+    } catch (const Error& error) {
+      return error.what();
+    }
+    return "";
+  }
+  std::vector<AuditedSession> sessions_, read_;
+};
+
+TEST_F(UsedTable, OtherUnitsThanTheHeaderSaysAreFound) {
+  const std::string header = used_shifts_header();
+  EXPECT_EQ(error_of_table(header, {1, 1, 1, 1, 1, 1}), "");
+  EXPECT_EQ(error_of_table(header, {1, -1, -1, 1, 1, -1}), "") << "signs are another matter";
+  const std::string in_cm = error_of_table(header, {0.1, 0.1, 0.1, 1, 1, 1});
+  for (const char* name : {"lateral", "longitudinal", "vertical"})
+    EXPECT_THAT(in_cm, HasSubstr(fmt::format("10 times {0}_mm", name)));
+  EXPECT_THAT(in_cm, AllOf(HasSubstr("name the column lateral_cm"), Not(HasSubstr("yaw"))));
+  EXPECT_THAT(error_of_table(header, {1, 1, -0.1, 1, 1, 1}), HasSubstr("10 times vertical_mm"));
+  constexpr double kRad = 0.0174533;
+  EXPECT_THAT(error_of_table(header, {1, 1, 1, kRad, kRad, kRad}),
+              AllOf(HasSubstr("57.3 times yaw_deg"), HasSubstr("name the column yaw_rad")));
+  EXPECT_THAT(error_of_table(header, {10, 10, 10, 1, 1, 1}), HasSubstr("0.1 times lateral_mm"));
+  const std::string stated = "session,lateral_cm,longitudinal_cm,vertical_cm,yaw_rad,pitch_rad,roll_rad";
+  EXPECT_EQ(error_of_table(stated, {0.1, 0.1, 0.1, kRad, kRad, kRad}), "") << "as it says";
+  EXPECT_NEAR(*read_[0].used[1], -5.3, 1e-3);
+  EXPECT_NEAR(*read_[0].used[3], 1.1, 0.05);
+  EXPECT_THAT(error_of_table(stated, {1, 1, 1, 1, 1, 1}),
+              AllOf(HasSubstr("name the column lateral_mm"), HasSubstr("name the column roll_deg")));
+}
+
+TEST_F(UsedTable, ExchangedColumnsAreFoundAndMayBeNamedInTheirOrder) {
+  const std::string exchanged = error_of_table(used_shifts_header(), {1, 1, 1, 1, 1, 1}, {0, 2, 1, 3, 4, 5});
+  EXPECT_THAT(exchanged, AllOf(HasSubstr("longitudinal_mm fits to what was found as vertical_mm"),
+                               HasSubstr("name the column longitudinal_mm"), Not(HasSubstr("lateral_mm fits"))));
+  EXPECT_EQ(error_of_table("session,lateral_mm,vertical_mm,longitudinal_mm,yaw_deg,pitch_deg,roll_deg",
+                           {1, 1, 1, 1, 1, 1}, {0, 2, 1, 3, 4, 5}),
+            "");
+  EXPECT_THAT(error_of_table(used_shifts_header(), {0.1, 0.1, 0.1, 1, 1, 1}, {0, 2, 1, 3, 4, 5}),
+              HasSubstr("10 times longitudinal_mm fits to what was found as vertical_mm"));
+}
+
+TEST_F(UsedTable, WhatWasNotAppliedIsInNoOtherUnit) {
+  EXPECT_EQ(error_of_table(used_shifts_header(), {0, 0, 0, 0, 0, 0}), "");
+  EXPECT_EQ(error_of_table(used_shifts_header(), {1, 0, 1, 1, 0, 0}), "");
+  EXPECT_EQ(error_of_table(used_shifts_header(), {0.5, 0.5, 2, 1, 1, 1}), "");
+}
+
+// As a spreadsheet set to German writes it.
+TEST_F(UsedTable, SemicolonsAndDecimalCommasAreNamed) {
+  EXPECT_THAT(error_of("session;lateral_mm;longitudinal_mm\na;1,5;2\n"),
+              AllOf(HasSubstr(", line 1: semicolons separate the cells"), HasSubstr("decimal point")));
 }
 
 TEST_F(AuditArchive, MistakesInATableAreNamedWithLineAndColumn) {

@@ -46,6 +46,13 @@ TEST_F(KnownPosesTest, AnglesMayBeLeftOut) {
   EXPECT_FALSE(poses.have_angles);
 }
 
+TEST_F(KnownPosesTest, ColumnsMayBeInCmAndRad) {
+  const KnownPoses poses = read("session,x_cm,y_mm,z_cm,rx_rad,ry_deg,rz_rad\na,1.5,2,-0.3,0,0,1.5707963267948966\n");
+  EXPECT_TRUE(poses.by_session.at("a").translation().isApprox(Eigen::Vector3d(15, 2, -3)));
+  EXPECT_TRUE(poses.by_session.at("a").linear().isApprox(rotation_z(rad_from_deg(90)), 1e-12));
+  EXPECT_THAT(refusal("session,x_cm,y_mm,z_mm\na,200,2,3\n"), HasSubstr("from -100 to 100"));
+}
+
 TEST_F(KnownPosesTest, MistakesAreNamed) {
   EXPECT_THAT(refusal("session,x_mm,y_mm\na,1,2\n"), HasSubstr("has no column z_mm"));
   EXPECT_THAT(refusal("session,x_mm,y_mm,z_mm,x_cm\na,1,2,3,4\n"), HasSubstr("column \"x_cm\""));

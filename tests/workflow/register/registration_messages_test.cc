@@ -42,8 +42,10 @@ TEST(RegistrationMessages, OrdersComeBackAsTheyWere) {
 TEST(RegistrationMessages, AnswersComeBackAsTheyWere) {
   for (const RegistrationMessage& message :
        {RegistrationMessage(Ready()), RegistrationMessage(Progressed{.step = "Registering", .share = 0.25}),
-        RegistrationMessage(Ended{Verdict::kAccepted}), RegistrationMessage(Ended{Verdict::kReview}),
-        RegistrationMessage(Ended{Verdict::kRejected}), RegistrationMessage(Failed{.why = "no CT\n       Name \xFC"}),
+        RegistrationMessage(Ended{.verdict = Verdict::kAccepted, .files = {{"result.json", "12ab"}}}),
+        RegistrationMessage(Ended{.verdict = Verdict::kReview}),
+        RegistrationMessage(Ended{.verdict = Verdict::kRejected}),
+        RegistrationMessage(Failed{.why = "no CT\n       Name \xFC"}),
         RegistrationMessage(Failed{.why = "disk full", .is_of_disk = true})})
     EXPECT_EQ(registration_message_from(line_without_end(to_line(message)), ""), message) << to_line(message);
 }
@@ -59,6 +61,8 @@ TEST(RegistrationMessages, DamagedAndUnknownOnesAreErrorsThatNameTheSender) {
   EXPECT_EQ(error_of("{\"ready\":true}"), "a worker: ready: expected an object");
   EXPECT_EQ(error_of("{\"ended\":{}}"), "a worker: ended: verdict is missing, expected a verdict");
   EXPECT_EQ(error_of("{\"ended\":{\"verdict\":\"fine\"}}"), "a worker: ended: verdict is \"fine\", expected a verdict");
+  EXPECT_EQ(error_of("{\"ended\":{\"verdict\":\"review\"}}"),
+            "a worker: ended: files is missing, expected the SHA-256 of every file");
   EXPECT_THAT(error_of("{\"failed\":{\"why\":\"x\"}}"), HasSubstr("failed: is_of_disk is missing"));
   EXPECT_THAT(error_of("{\"failed\":{\"why\":\"x\",\"is_of_disk\":false,\"again\":1}}"),
               HasSubstr("failed: there is no key again"));

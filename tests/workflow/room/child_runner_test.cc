@@ -51,8 +51,12 @@ class ChildRunnerTest : public testing::Test {
 
 TEST_F(ChildRunnerTest, RegistersWhatIsOrdered) {
   ChildRunner runner;
-  begin(runner, "echo $* >words; cat >order; mkdir out; echo {} >out/result.json; exit 3");
-  EXPECT_FALSE(end_of(runner).failure);
+  const Ended ended{.verdict = Verdict::kReview, .files = {{"result.json", "its SHA-256"}}};
+  write_text(folder_ / "answer", to_line(RegistrationMessage(Ready())) + to_line(RegistrationMessage(ended)));
+  begin(runner, "echo $* >words; cat >order; mkdir out; echo {} >out/result.json; cat answer; exit 3");
+  const Runner::End end = end_of(runner);
+  EXPECT_FALSE(end.failure);
+  EXPECT_EQ(end.files, ended.files);
   EXPECT_EQ(text_of("words"), "__child register\n");
   EXPECT_EQ(
       registration_order_from(text_of("order"), "the order"),
@@ -94,6 +98,13 @@ TEST_F(ChildRunnerTest, AnEndWithoutAResultIsAFailure) {
   const Runner::End end = end_of(runner);
   ASSERT_TRUE(end.failure);
   EXPECT_THAT(end.failure->why, HasSubstr("ended with status 139 and left no result: driver: lost"));
+}
+
+// Of a child that was killed before it could say which files are its own.
+TEST_F(ChildRunnerTest, AFolderThatTheChildDoesNotAnswerForIsNoResult) {
+  ChildRunner runner;
+  begin(runner, "mkdir out; echo {} >out/result.json");
+  EXPECT_THAT(end_of(runner).failure.value().why, HasSubstr("ended with status 0 and left no result"));
 }
 
 TEST_F(ChildRunnerTest, ARegistrationThatDoesNotEndIsEnded) {

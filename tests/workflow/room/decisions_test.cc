@@ -28,8 +28,9 @@ class DecisionsTest : public ResultsTreeTest {
   fs::path decided(int number) const {
     return tree_.path() / "decided" / (a_ + "." + std::to_string(number) + ".json");
   }
+  static MadeResult made(const fs::path& folder) { return {.folder = folder, .files = sha256_of_folder(folder)}; }
   // A result of the X-rays of a_ whose pose somebody has set by hand, finished and not handed over.
-  fs::path write_by_hand(const std::string& set_by = "jdoe", const std::string& verdict = "review") {
+  MadeResult write_by_hand(const std::string& set_by = "jdoe", const std::string& verdict = "review") {
     write_registering(tree_, {"1.2.1", "1.2.2"}, verdict);
     const fs::path folder = tree_.registering(a_);
     nlohmann::json result = nlohmann::json::parse(text_of(folder / kResultFile));
@@ -37,7 +38,7 @@ class DecisionsTest : public ResultsTreeTest {
     result["start"] = {{"set_by", set_by}};
     replace_text(folder / kResultFile, result.dump());
     replace_text(folder / "report.dcm", "report of a pose set by " + set_by);
-    return folder;
+    return made(folder);
   }
   std::string by_hand(const std::string& set_by = "jdoe") {
     tree_.hand_over(tree_.manual_basis(a_), write_by_hand(set_by), set_by);
@@ -157,7 +158,7 @@ TEST_F(DecisionsTest, OnlyAResultOfTheSameXraysIsHandedOver) {
   const fs::path other = tree_.registering(register_session(tree_, {"1.2.7"}, "review"));
   fs::create_directories(other);
   write_text(other / kResultFile, R"({"verdict": "review", "views": [{"sop_instance_uid": "1.2.7"}]})");
-  EXPECT_THROW(tree_.hand_over(tree_.manual_basis(a_), other, "jdoe"), Error);
+  EXPECT_THROW(tree_.hand_over(tree_.manual_basis(a_), made(other), "jdoe"), Error);
   EXPECT_TRUE(fs::exists(other));
   EXPECT_THAT(tree_.handed_over(), IsEmpty());
   EXPECT_EQ(lines_of("handed over"), 0);
@@ -165,9 +166,9 @@ TEST_F(DecisionsTest, OnlyAResultOfTheSameXraysIsHandedOver) {
 
 TEST_F(DecisionsTest, ASecondResultWaitsUntilTheFirstHasBeenTakenOver) {
   tree_.hand_over(tree_.manual_basis(a_), write_by_hand(), "jdoe");
-  const fs::path second = write_by_hand("rroe");
+  const MadeResult second = write_by_hand("rroe");
   EXPECT_THROW(tree_.hand_over(tree_.manual_basis(a_), second, "rroe"), Error);
-  EXPECT_TRUE(fs::exists(second));
+  EXPECT_TRUE(fs::exists(second.folder));
   tree_.take_over(a_);
   EXPECT_NO_THROW(tree_.hand_over(tree_.manual_basis(a_), second, "rroe"));
 }

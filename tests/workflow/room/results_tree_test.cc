@@ -197,6 +197,26 @@ TEST_F(ResultsTreeTest, WhatMayNotBeReleasedIsRefused) {
   EXPECT_EQ(tree_.release(review, kDoe, {"record"}).objects.size(), 1U);  // its report
 }
 
+// Where no watch runs that would compare them.
+TEST_F(ResultsTreeTest, WhatWasRegisteredFromFilesThatHaveChangedIsNeitherReleasedNorSent) {
+  const fs::path plan = folder_ / "plan.dcm", xray = folder_ / "xray.dcm";
+  replace_text(plan, "the plan");
+  replace_text(xray, "an X-ray");
+  const StudyParts parts{.images = {xray}, .plan = plan};
+  tree_.keep_order(a_, {.parts = parts});
+  tree_.keep_inputs(a_, inputs_of(parts, FileContents()));
+  replace_text(plan, "another plan of this name");
+  EXPECT_THAT(error_of_release(a_), HasSubstr("session " + a_ + ": RT Plan changed after the registration"));
+  replace_text(plan, "the plan");
+  tree_.release(a_, kDoe, {"record"});
+  const Delivery delivery = tree_.pending().deliveries.at(0);
+  EXPECT_EQ(error_of_sending(delivery), "");
+  replace_text(plan, "another plan of this name");
+  EXPECT_THAT(error_of_sending(delivery), HasSubstr("RT Plan changed after the registration"));
+  fs::remove(plan);
+  EXPECT_EQ(error_of_sending(delivery), "") << "files that were taken away tell nothing";
+}
+
 TEST_F(ResultsTreeTest, AFolderThatIsNotWhatWasRegisteredIsNotReleased) {
   const std::string b = register_session(tree_, {"1.2.3"}, "accepted");
   const fs::path folder = tree_.session(a_), other = tree_.session(b), aside = folder_ / "aside";
@@ -283,7 +303,7 @@ TEST_F(ResultsTreeTest, AnObjectIsReleasedWithOneSessionOnly) {
   const std::string b = write_registering(tree_, {"1.2.3"}, "review");
   fs::copy_file(tree_.session(a_) / "report.dcm", tree_.registering(b) / "report.dcm",
                 fs::copy_options::overwrite_existing);
-  tree_.publish(b);
+  EXPECT_EQ(error_of_publishing(b), "");
   tree_.release(a_, kDoe, {"record"});
   EXPECT_THAT(error_of_release(b), HasSubstr("its report.dcm has already been released with session " + a_));
 }

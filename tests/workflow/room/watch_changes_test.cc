@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "base/sha256.h"
 #include "tests/support/watch_releases.h"
 
 namespace isoshift::watch_changes_test {
@@ -54,7 +55,7 @@ class WatchChanges : public WatchReleases {
     const fs::path folder = room_.folder / "by_hand";
     fs::remove_all(folder);
     fs::copy(tree.session(session(patient)), folder);
-    tree.hand_over(tree.manual_basis(session(patient)), folder, "jdoe");
+    tree.hand_over(tree.manual_basis(session(patient)), {.folder = folder, .files = sha256_of_folder(folder)}, "jdoe");
   }
   std::string objection(const std::string& session) const {
     return ResultsTree(room_.file.results).objection(session).words;
@@ -98,6 +99,52 @@ TEST_F(WatchChanges, WhatWasReleasedAndNotSentStays) {
   room_.sender.down = {};
   room_.pass(3600s, 10s);
   EXPECT_THAT(room_.sender.stored(), SizeIs(0));
+}
+
+// Its files are compared when no more of them come, and nothing is sent before.
+TEST_F(WatchChanges, WhatIsReleasedBeforeAReplacedPlanIsComparedIsNotSent) {
+  revise_plan();
+  room_.pass(2s);
+  release("P");
+  room_.pass(3600s, 10s);
+  EXPECT_THAT(room_.sender.attempts(), SizeIs(0));
+  EXPECT_THAT(objection(session("P")), HasSubstr("RT Plan changed after the registration"));
+  EXPECT_THAT(sessions(), SizeIs(2));
+}
+
+TEST_F(WatchChanges, ARestartIsNoWayAroundTheComparison) {
+  revise_plan();
+  room_.pass(2s);
+  release("P");
+  room_.start();
+  room_.source.bring(plan_of("P"));
+  room_.pass(3600s, 10s);
+  EXPECT_THAT(room_.sender.attempts(), SizeIs(0));
+}
+
+TEST_F(WatchChanges, TheRuleReleasesNothingThatWasRegisteredFromAPlanThatIsReplacedMeanwhile) {
+  allow_automatic_release();
+  room_.runner.length = 30s;
+  room_.start();
+  bring("Q");
+  room_.pass(30s);
+  ASSERT_TRUE(room_.runner.is_running());
+  room_.pass(8s);
+  room_.contents.written["/in/plan.Q"] = "revised";
+  room_.source.bring(plan_of("Q"));
+  room_.pass(3600s, 10s);
+  EXPECT_FALSE(is_released("Q"));
+  EXPECT_THAT(room_.sender.attempts(), SizeIs(0));
+}
+
+TEST_F(WatchChanges, WhatTheSameFilesCameAgainForIsSent) {
+  room_.source.bring(plan_of("P"));
+  room_.pass(2s);
+  release("P");
+  room_.pass(2s);
+  EXPECT_THAT(room_.sender.attempts(), SizeIs(0)) << "before they were compared";
+  room_.pass(60s);
+  EXPECT_THAT(room_.sender.stored(), SizeIs(4));
 }
 
 TEST_F(WatchChanges, TheSameContentsSentAgainChangeNothing) {

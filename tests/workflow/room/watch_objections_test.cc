@@ -233,5 +233,19 @@ TEST_F(WatchReleases, APeerReceivesTheNewestReleaseLast) {
   EXPECT_THAT(sent, ElementsAre(session("S"), session("P"), session("R"), session("Q")));
 }
 
+// That planning sends with a plan.
+TEST_F(WatchReleases, ADrrIsNoXrayThatSpeaksAgainstAResult) {
+  room_.start();
+  bring("P");
+  room_.pass(60s);
+  StudyFiles drr = xray("P", "drr", "RtImage_Bm1", second_of(11, 0));
+  std::swap(drr.images, drr.drrs);
+  room_.source.bring(drr);
+  room_.pass(60s);
+  EXPECT_THAT(room_.runs(), SizeIs(1));
+  EXPECT_EQ(ResultsTree(room_.file.results).objection(session("P")).words, "");
+  EXPECT_THAT(room_.index(), HasSubstr("1 sessions registered, 0 waiting"));
+}
+
 }  // namespace
 }  // namespace isoshift::watch_objections_test
