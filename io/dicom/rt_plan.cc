@@ -97,6 +97,9 @@ RtPlan read_rt_plan(const std::filesystem::path& path) {
   plan.label = dataset.text(DCM_RTPlanLabel).value_or("");
   plan.made_on = dataset.text(DCM_RTPlanDate).value_or("");
   plan.frame_of_reference_uid = dataset.uid(DCM_FrameOfReferenceUID);
+  for (const DicomItem& structures : dataset.items(DCM_ReferencedStructureSetSequence))
+    if (plan.structure_set_uid.empty())
+      plan.structure_set_uid = structures.uid(DCM_ReferencedSOPInstanceUID).value_or("");
   plan.approval_status = dataset.text(DCM_ApprovalStatus).value_or("");
   plan.geometry = dataset.text(DCM_RTPlanGeometry).value_or("");
   const bool is_ion = plan.sop_class_uid == UID_RTIonPlanStorage;

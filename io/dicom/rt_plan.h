@@ -46,6 +46,7 @@ struct RtPlan {
   std::string label;
   std::string made_on;  // RTPlanDate; may be empty
   std::optional<std::string> frame_of_reference_uid;
+  std::string structure_set_uid;  // ReferencedStructureSetSequence; empty: it refers to none
   std::string approval_status;
   std::string geometry;  // RTPlanGeometry: PATIENT, or TREATMENT_DEVICE where there is no structure set
   std::vector<Beam> beams;

@@ -315,6 +315,7 @@ Study load_study(const StudyRequest& request, Notes& notes, const Progress& prog
   Study study;
   study.machine = request.machine;
   study.image_files = parts.images;
+  study.unused_structures = parts.unused_structures;
   if (!parts.plan.empty()) study.plan = read_rt_plan(parts.plan);
   if (!parts.structures.empty()) study.structures = read_rt_structures(parts.structures);
   XrayFiles files(request.one_per_imager);

@@ -7,6 +7,7 @@
 #include <cstdio>
 
 #include "base/error.h"
+#include "base/option_name.h"
 #include "geometry/mask.h"
 #include "io/dicom/structure_mask.h"
 #include "workflow/register/study_bodies.h"
@@ -19,7 +20,8 @@ constexpr double kRenderedBeyondMm = 15.0;
 
 const Structure& structure_of(const Study& study, const std::string& name) {
   if (!study.structures)
-    throw Error(fmt::format("structure {}: the study holds no RT Structure Set (--structures FILE names one)", name));
+    throw Error(fmt::format("structure {}: {} ({} names one)", name, why_no_structures(study.unused_structures),
+                            option("structures", "FILE")));
   return structure_named(*study.structures, name);
 }
 

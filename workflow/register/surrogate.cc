@@ -183,8 +183,8 @@ NearTarget bones_near(const Study& study, const Spine& spine, const Target& targ
 Surrogate surrogate_of(const Study& study, const Target& target, const std::string& by_site, BodyStore& bodies) {
   if (!by_site.empty()) {
     if (!study.structures)
-      throw Error(fmt::format("surrogate {} (the site file): the study holds no RT Structure Set ({} names one)",
-                              by_site, option("structures", "FILE")));
+      throw Error(fmt::format("surrogate {} (the site file): {} ({} names one)", by_site,
+                              why_no_structures(study.unused_structures), option("structures", "FILE")));
     Volume<std::uint8_t> drawn =
         mask_of(structure_named(*study.structures, by_site), study.ct->hu.size, study.ct->hu.patient_from_voxel);
     if (!holds_bone(study.ct->hu, drawn))
