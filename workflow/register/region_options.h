@@ -1,11 +1,13 @@
 #pragma once
 // The region, as the user asks for it.
 
+#include <cstdint>
 #include <map>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "geometry/volume.h"
 #include "io/study/study.h"
 #include "registration/preprocess/preprocess.h"
 #include "registration/region.h"
@@ -26,8 +28,17 @@ struct RegionOptions {
   std::vector<std::string> in_words() const;
 };
 
+// A volume of the CT that a person or a file chose, as drawn: 1 inside, on the CT's lattice.
+struct ChosenVolume {
+  std::string words;  // "structure Spine"
+  Volume<std::uint8_t> mask;
+  bool is_excluded = false;  // and not what is compared
+};
+
 // The CT as it is rendered, and the region projected into the views.
 struct RegionOfStudy {
+  std::vector<ChosenVolume> chosen;
+
   // The CT inside the volume of interest, without excluded structures; unset: the whole CT.
   std::optional<Volume<float>> rendered_ct;
   ProjectedRegion projected;
@@ -35,5 +46,9 @@ struct RegionOfStudy {
 // Throws UsageError for a radius that is not positive or holds the whole CT and for a body that there is not, and Error
 // for a structure the study lacks.
 RegionOfStudy region_of(const RegionOptions& options, const Study& study, double threshold_hu);
+
+// The surroundings of a place, whatever was chosen to be compared; what was excluded stays excluded.
+RegionOfStudy ball_about(const Eigen::Vector3d& center_patient_mm, double radius_mm, const RegionOptions& options,
+                         const Study& study, double threshold_hu);
 
 }  // namespace isoshift

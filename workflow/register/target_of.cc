@@ -13,6 +13,7 @@
 #include "drr/attenuation.h"
 #include "geometry/mask.h"
 #include "io/dicom/structure_mask.h"
+#include "workflow/register/region_check.h"
 
 namespace isoshift {
 namespace {
@@ -94,6 +95,11 @@ Target target_from(const Candidate& candidate, const Study& study, std::string c
 
 TargetChoice choice_of(const Candidate& candidate, const Study& study, const std::string& why) {
   TargetChoice choice{.target = target_from(candidate, study, why), .doubts = {}};
+  if (!is_in_body(candidate.mask, study.ct->hu))
+    choice.doubts.push_back(
+        fmt::format("the target {} lies outside of the body for the larger part: its contours may be of another CT, "
+                    "flipped or turned",
+                    choice.target.name));
   if (candidate.reaches_beyond_ct)
     choice.doubts.push_back(
         fmt::format("the target {} reaches beyond the CT: where its center lies, and what carries it, "
