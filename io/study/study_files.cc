@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "base/error.h"
+#include "base/local_time.h"
 #include "base/option_name.h"
 #include "base/parallel.h"
 #include "base/sha256.h"
@@ -366,7 +367,8 @@ StudyParts chosen(StudyFiles files, std::vector<StudyFiles::Plan> other_plans, c
 StudyFiles files_of_session(const SessionChoice& choice, StudyFiles files, bool takes_other_xrays,
                             std::vector<std::string>& doubts) {
   compare_copies(files);
-  const SessionFiles session = chosen_session(choice, sessions_of(files, takes_other_xrays));
+  const double now_s = utc_seconds_at(local_time()).value();
+  const SessionFiles session = chosen_session(choice, sessions_of(files, takes_other_xrays), now_s);
   doubts = session.doubts;
   StudyFiles own = files_for(session, files);
   own.registrations = files.registrations;
