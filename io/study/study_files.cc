@@ -2,7 +2,6 @@
 
 #include <dcmtk/dcmdata/dcuid.h>
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -433,9 +432,9 @@ std::vector<fs::path> files_below(const std::vector<fs::path>& paths, const std:
 
 std::string why_no_structures(const UnusedStructures& unused) {
   const auto names = [](const std::vector<fs::path>& files) {
-    std::vector<std::string> names;
-    for (const fs::path& file : files) names.push_back(file.filename().string());
-    return fmt::format("{}", fmt::join(names, ", "));
+    std::string list;
+    for (const fs::path& file : files) list += (list.empty() ? "" : ", ") + file.filename().string();
+    return list;
   };
   if (!unused.rivals.empty())
     return fmt::format("nothing tells which of {} RT Structure Sets on this CT is meant ({})", unused.rivals.size(),

@@ -137,7 +137,7 @@ std::vector<std::string> region_doubts(const Study& study, std::span<const Chose
   std::vector<std::string> doubts, words;
   std::optional<Volume<std::uint8_t>> compared;
   for (const ChosenVolume& volume : chosen) {
-    if (auto doubt = volume_doubt(study, volume)) doubts.push_back(std::move(*doubt));
+    if (auto doubt = volume.is_drawn ? volume_doubt(study, volume) : std::nullopt) doubts.push_back(std::move(*doubt));
     if (volume.is_excluded) continue;
     words.push_back(fmt::format("{} ({})", volume.words, bone_held_by(volume.mask, study).in_words()));
     if (compared)

@@ -19,9 +19,9 @@ namespace isoshift {
 bool is_in_body(const Volume<std::uint8_t>& mask, const Volume<float>& ct_hu);
 
 // Why a person must look at the chosen volumes; each doubt names the volume, its share in bone and its distance from
-// the isocenter. A volume must lie in the body, and hold bone on a third of its slices; all together, grown by the
-// margin, must hold a quarter of the bone within 20 mm of the target. `surrogate`: the structure whose bones carry the
-// target, if a site names one: then it is some of their bone that must be held.
+// the isocenter. A drawn volume must lie in the body, and hold bone on a third of its slices; all together, grown by
+// the margin, must hold a quarter of the bone within 20 mm of the target. `surrogate`: the structure whose bones carry
+// the target, if a site names one: then it is some of their bone that must be held.
 std::vector<std::string> region_doubts(const Study& study, std::span<const ChosenVolume> chosen, double margin_mm,
                                        const Target& target, const std::optional<Volume<std::uint8_t>>& surrogate);
 

@@ -46,12 +46,13 @@ Volume<std::uint8_t> sphere(const Volume<float>& ct, const Eigen::Vector3d& cent
   return mask;
 }
 
-// With `volume`, all that is compared; without, everything but what is excluded.
-RegionOfStudy region_within(std::optional<Volume<std::uint8_t>> volume, const RegionOptions& options,
+// `volume`: what is compared, `rendered`: what of the CT is rendered, and a little around it; unset: all.
+RegionOfStudy region_within(std::optional<Volume<std::uint8_t>> volume,
+                            const std::optional<Volume<std::uint8_t>>& rendered, const RegionOptions& options,
                             const Study& study, double threshold_hu) {
   RegionOfInterest region;
   RegionOfStudy result;
-  if (volume) result.rendered_ct = only_inside(study.ct->hu, dilated(*volume, kRenderedBeyondMm));
+  if (rendered) result.rendered_ct = only_inside(study.ct->hu, dilated(*rendered, kRenderedBeyondMm));
   region.volume = std::move(volume);
   region.cut_ends = beyond_the_ct(study.ct->hu, threshold_hu);
   for (const std::string& name : options.excluded) {
@@ -60,8 +61,10 @@ RegionOfStudy region_within(std::optional<Volume<std::uint8_t>> volume, const Re
     // A couch lies behind everything: its pixels stay, only its voxels go.
     if (structure_of(study, name).interpreted_type == "SUPPORT") continue;
     region.excluded.push_back(dilated(mask, options.margin_mm));
-    result.chosen.push_back(
-        {.words = fmt::format("structure {}, which is excluded,", name), .mask = std::move(mask), .is_excluded = true});
+    result.chosen.push_back({.words = fmt::format("structure {}, which is excluded,", name),
+                             .mask = std::move(mask),
+                             .is_drawn = true,
+                             .is_excluded = true});
   }
   result.projected = ProjectedRegion(region);
   return result;
@@ -111,13 +114,13 @@ RegionOfStudy region_of(const RegionOptions& options, const Study& study, double
     throw UsageError(fmt::format("--around-isocenter {}: expected more than 0 mm", *options.around_isocenter_mm));
   std::vector<ChosenVolume> chosen;
   std::optional<Volume<std::uint8_t>> compared;
-  const auto add = [&](std::string words, Volume<std::uint8_t> exact, double margin_mm) {
+  const auto add = [&](std::string words, Volume<std::uint8_t> exact, double margin_mm, bool is_drawn = false) {
     Volume<std::uint8_t> grown = margin_mm > 0.0 ? dilated(exact, margin_mm) : exact;
     if (compared)
       unite(*compared, grown);
     else
       compared = std::move(grown);
-    chosen.push_back({.words = std::move(words), .mask = std::move(exact)});
+    chosen.push_back({.words = std::move(words), .mask = std::move(exact), .is_drawn = is_drawn});
   };
   if (options.around_isocenter_mm) {
     add(fmt::format("the sphere of {} mm about the isocenter", *options.around_isocenter_mm),
@@ -129,7 +132,7 @@ RegionOfStudy region_of(const RegionOptions& options, const Study& study, double
                       *options.around_isocenter_mm));
   }
   for (const std::string& name : options.structures)
-    add("structure " + name, mask_in_ct(study, name), options.margin_mm);
+    add("structure " + name, mask_in_ct(study, name), options.margin_mm, true);
   if (!options.bodies.empty()) {
     const BodyMap map = bodies_of(*study.ct, study.structures ? &*study.structures : nullptr);
     for (const int body : options.bodies) {
@@ -137,14 +140,22 @@ RegionOfStudy region_of(const RegionOptions& options, const Study& study, double
       add(body_in_words(map, body), std::move(mask), options.margin_mm);
     }
   }
-  RegionOfStudy result = region_within(std::move(compared), options, study, threshold_hu);
+  RegionOfStudy result = region_within(compared, compared, options, study, threshold_hu);
   std::ranges::move(chosen, std::back_inserter(result.chosen));
   return result;
 }
 
-RegionOfStudy ball_about(const Eigen::Vector3d& center_patient_mm, double radius_mm, const RegionOptions& options,
-                         const Study& study, double threshold_hu) {
-  return region_within(sphere(study.ct->hu, center_patient_mm, radius_mm), options, study, threshold_hu);
+RegionOfStudy ball_about(const Eigen::Vector3d& center_patient_mm, double radius_mm,
+                         std::span<const ChosenVolume> chosen, const RegionOptions& options, const Study& study,
+                         double threshold_hu) {
+  const Volume<std::uint8_t> ball = sphere(study.ct->hu, center_patient_mm, radius_mm);
+  std::optional<Volume<std::uint8_t>> rendered;
+  for (const ChosenVolume& volume : chosen) {
+    if (volume.is_excluded) continue;
+    if (!rendered) rendered = ball;
+    unite(*rendered, dilated(volume.mask, options.margin_mm));
+  }
+  return region_within(ball, rendered, options, study, threshold_hu);
 }
 
 }  // namespace isoshift

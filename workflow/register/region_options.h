@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <map>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -32,6 +33,7 @@ struct RegionOptions {
 struct ChosenVolume {
   std::string words;  // "structure Spine"
   Volume<std::uint8_t> mask;
+  bool is_drawn = false;     // by contours, which may lie anywhere; bodies and spheres lie where they must
   bool is_excluded = false;  // and not what is compared
 };
 
@@ -47,8 +49,10 @@ struct RegionOfStudy {
 // for a structure the study lacks.
 RegionOfStudy region_of(const RegionOptions& options, const Study& study, double threshold_hu);
 
-// The surroundings of a place, whatever was chosen to be compared; what was excluded stays excluded.
-RegionOfStudy ball_about(const Eigen::Vector3d& center_patient_mm, double radius_mm, const RegionOptions& options,
-                         const Study& study, double threshold_hu);
+// The surroundings of a place are compared, whatever was chosen; what was excluded stays excluded. What was chosen is
+// rendered, too: it does not end at the ball.
+RegionOfStudy ball_about(const Eigen::Vector3d& center_patient_mm, double radius_mm,
+                         std::span<const ChosenVolume> chosen, const RegionOptions& options, const Study& study,
+                         double threshold_hu);
 
 }  // namespace isoshift

@@ -91,11 +91,13 @@ const BentPatient& TargetRegistration::bent_patient() const {
 const TargetRegistration::OwnBall& TargetRegistration::own_ball() const {
   std::call_once(ball_once_, [&] {
     const RenderingOptions& rendering = request_.rendering;
-    RegionOfStudy region =
-        ball_about(*options_.target_patient_mm, kAboutTargetMm, request_.region, study_, rendering.threshold_hu);
-    RendererPyramid renderers(rendering.kind(), region.rendered_ct.value(), rendering.model(), beams_of(study_),
-                              rendering.options());
-    ball_.emplace(std::move(region), std::move(renderers));
+    RegionOfStudy region = ball_about(*options_.target_patient_mm, kAboutTargetMm, setup_.chosen(), request_.region,
+                                      study_, rendering.threshold_hu);
+    ball_.emplace();
+    if (region.rendered_ct)
+      ball_->renderers.emplace(rendering.kind(), *region.rendered_ct, rendering.model(), beams_of(study_),
+                               rendering.options());
+    ball_->region = std::move(region);
   });
   return *ball_;
 }
@@ -110,9 +112,10 @@ void TargetRegistration::doubt_contradicted_region(std::span<const FixedImage> i
   const Eigen::Vector3d target_room_mm = target_found_room_mm(options_, found);
   std::vector<Stage> stages = options_.stages;
   stages.back().similarity = SimilarityKind::kGradientCorrelation;  // a part of the CT is rendered
-  const auto wanted_room_mm = place_wanted_near_target(
-      own_ball().renderers, {.images = {images.begin(), images.end()}, .region = own_ball().region.projected},
-      found.actual_room_from_patient, target_room_mm, {.stages = stages, .dof = options_.dof});
+  const auto wanted_room_mm =
+      place_wanted_near_target(own_ball().renderers ? *own_ball().renderers : setup_.renderers(),
+                               {.images = {images.begin(), images.end()}, .region = own_ball().region.projected},
+                               found.actual_room_from_patient, target_room_mm, {.stages = stages, .dof = options_.dof});
   if (!wanted_room_mm) {
     found.demote(Verdict::kReview,
                  fmt::format("the X-rays show too little within {:.0f} mm of the target to confirm what "

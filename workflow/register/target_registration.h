@@ -34,7 +34,7 @@ class TargetRegistration {
   // What is rendered and compared of the target's own surroundings.
   struct OwnBall {
     RegionOfStudy region;
-    RendererPyramid renderers;
+    std::optional<RendererPyramid> renderers;  // nothing: those of the whole CT
   };
 
   const BentPatient& bent_patient() const;

@@ -51,7 +51,10 @@ Study study_of_trunk() {
 
 ChosenVolume chosen(const Study& study, const Place& is_in, bool is_excluded = false) {
   const Volume<float>& ct = study.ct->hu;
-  ChosenVolume volume{.words = "structure Spine", .mask = {ct.size, ct.patient_from_voxel}, .is_excluded = is_excluded};
+  ChosenVolume volume{.words = "structure Spine",
+                      .mask = {ct.size, ct.patient_from_voxel},
+                      .is_drawn = true,
+                      .is_excluded = is_excluded};
   for (int k = 0; k < ct.size.z(); ++k)
     for (int j = 0; j < ct.size.y(); ++j)
       for (int i = 0; i < ct.size.x(); ++i)
