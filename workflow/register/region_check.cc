@@ -16,7 +16,7 @@ namespace isoshift {
 namespace {
 
 constexpr float kAirHu = -400.0F;
-constexpr double kLeastInBody = 0.5, kLeastSlicesWithBone = 1.0 / 3.0, kLeastOfTargetsBone = 0.25;
+constexpr double kLeastInBody = 0.2, kLeastSlicesWithBone = 1.0 / 3.0, kLeastOfTargetsBone = 0.25;
 
 bool is_bone(float hu) { return hu >= static_cast<float>(BodyOptions().bone_hu); }
 
@@ -122,7 +122,7 @@ std::optional<std::string> volume_doubt(const Study& study, const ChosenVolume& 
   const HeldBone held = bone_held_by(volume.mask, study);
   if (!is_in_body(volume.mask, study.ct->hu))
     return fmt::format(
-        "{} lies outside of the body for the larger part ({}): its contours may be of another CT, flipped "
+        "{} lies outside of the body for the most part ({}): its contours may be of another CT, flipped "
         "or turned",
         volume.words, held.in_words());
   if (volume.is_excluded || held.slices_with_bone >= kLeastSlicesWithBone * held.slices) return std::nullopt;

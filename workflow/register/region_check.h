@@ -15,7 +15,8 @@
 
 namespace isoshift {
 
-// Whether a mask on the CT's lattice lies in the patient, lungs included, for the larger part.
+// Whether a fifth of a mask on the CT's lattice or more lies in the patient, lungs included: loose contours hold much
+// air.
 bool is_in_body(const Volume<std::uint8_t>& mask, const Volume<float>& ct_hu);
 
 // Why a person must look at the chosen volumes; each doubt names the volume, its share in bone and its distance from

@@ -97,7 +97,7 @@ TargetChoice choice_of(const Candidate& candidate, const Study& study, const std
   TargetChoice choice{.target = target_from(candidate, study, why), .doubts = {}};
   if (!is_in_body(candidate.mask, study.ct->hu))
     choice.doubts.push_back(
-        fmt::format("the target {} lies outside of the body for the larger part: its contours may be of another CT, "
+        fmt::format("the target {} lies outside of the body for the most part: its contours may be of another CT, "
                     "flipped or turned",
                     choice.target.name));
   if (candidate.reaches_beyond_ct)
