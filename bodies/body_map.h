@@ -38,8 +38,8 @@ struct BodyMap {
   std::vector<Joint> joints;
 };
 
-// A bone that a person has drawn, such as a vertebra or the jaw: 1 inside. It becomes one body, and what it covers is
-// taken from the others.
+// A bone that a person has drawn, such as a vertebra or the jaw: 1 inside. It replaces the body that was found there,
+// and what it covers is taken from the others.
 struct DrawnBone {
   std::string name;
   Volume<std::uint8_t> mask;

@@ -40,9 +40,9 @@ class Finder {
     const std::vector<Vertebra> vertebrae = find_vertebrae(ct_, hu_);
     is_trunk_ = is_trunk(vertebrae, hu_);
     if (is_trunk_) remove_contrast_agent(bone_, hu_, vertebrae);  // elsewhere no vessel is as thick as a bone
-    take_drawn(drawn);
     take_vertebrae(vertebrae);
     take_other_bones(vertebrae);
+    take_drawn(drawn, vertebrae);
     take_couch(dense.couch);
     if (parts_.size() > kMostBodies) parts_.resize(kMostBodies);
     return labeled(vertebrae);
@@ -57,17 +57,47 @@ class Finder {
     parts_.push_back(std::move(part));
   }
 
-  void take_drawn(std::span<const DrawnBone> drawn) {
+  VoxelSet voxels_of(const DrawnBone& bone) const {
+    const Eigen::Affine3d from_lattice = bone.mask.patient_from_voxel.inverse() * hu_.patient_from_voxel;
+    VoxelSet voxels;
+    for (int k = 0; k < hu_.size.z(); ++k)
+      for (int j = 0; j < hu_.size.y(); ++j)
+        for (int i = 0; i < hu_.size.x(); ++i)
+          if (interpolated(bone.mask, from_lattice * Eigen::Vector3d(i, j, k), 0.0F) >= 0.5F)
+            voxels.push_back(static_cast<std::uint32_t>(hu_.index(i, j, k)));
+    return voxels;
+  }
+
+  // What a person has drawn replaces what was found there: the vertebra whose center it holds, and bodies of which it
+  // covers half. From others it takes what it covers.
+  void take_drawn(std::span<const DrawnBone> drawn, const std::vector<Vertebra>& vertebrae) {
+    const std::size_t found = parts_.size();
+    std::vector<bool> is_replaced(vertebrae.size());
     for (const DrawnBone& one : drawn) {
-      const Eigen::Affine3d from_lattice = one.mask.patient_from_voxel.inverse() * hu_.patient_from_voxel;
-      VoxelSet voxels;
-      for (int k = 0; k < hu_.size.z(); ++k)
-        for (int j = 0; j < hu_.size.y(); ++j)
-          for (int i = 0; i < hu_.size.x(); ++i)
-            if (interpolated(one.mask, from_lattice * Eigen::Vector3d(i, j, k), 0.0F) >= 0.5F)
-              voxels.push_back(static_cast<std::uint32_t>(hu_.index(i, j, k)));
-      if (!voxels.empty()) add(Body::Kind::kBone, one.name, std::move(voxels), next_bone_++);
+      VoxelSet voxels = voxels_of(one);
+      if (voxels.empty()) continue;
+      const auto is_drawn = [&](std::uint32_t n) { return std::ranges::binary_search(voxels, n); };
+      std::vector<std::size_t> held;  // vertebrae that were found
+      for (std::size_t v = 0; v < vertebrae.size(); ++v)
+        if (!is_replaced[v] && is_drawn(voxel_at(vertebrae[v].center_patient_mm))) held.push_back(v);
+      for (std::size_t p = 0; p < parts_.size(); ++p) {
+        VoxelSet& others = parts_[p].voxels;
+        const std::size_t before = others.size();
+        std::erase_if(others, is_drawn);
+        const bool is_other_bone = p >= vertebrae.size() && p < found;
+        if (is_other_bone && 2 * others.size() <= before) others.clear();
+      }
+      if (held.size() != 1) {
+        add(Body::Kind::kBone, one.name, std::move(voxels), next_bone_++);
+        continue;
+      }
+      is_replaced[held.front()] = true;
+      parts_[held.front()].body.name = one.name;
+      parts_[held.front()].voxels = std::move(voxels);
     }
+    const auto others = parts_.begin() + static_cast<std::ptrdiff_t>(vertebrae.size());
+    parts_.erase(std::remove_if(others, parts_.end(), [](const Part& part) { return part.voxels.empty(); }),
+                 parts_.end());
   }
 
   void take_vertebrae(const std::vector<Vertebra>& vertebrae) {
@@ -136,6 +166,12 @@ class Finder {
     for (std::uint32_t n = 0; n < couch.voxels.size(); ++n)
       if (couch.voxels[n] != 0) voxels.push_back(n);
     if (!voxels.empty()) add(Body::Kind::kCouch, "couch", std::move(voxels), next_bone_++);
+  }
+
+  std::uint32_t voxel_at(const Eigen::Vector3d& at_patient_mm) const {
+    const Eigen::Array3i at =
+        (hu_.patient_from_voxel.inverse() * at_patient_mm).array().round().cast<int>().max(0).min(hu_.size.array() - 1);
+    return static_cast<std::uint32_t>(hu_.index(at.x(), at.y(), at.z()));
   }
 
   Eigen::Vector3d patient_mm(std::uint32_t n) const {

@@ -227,8 +227,13 @@ void run_inspect_bodies(const std::vector<std::filesystem::path>& paths, const s
                           [&](std::size_t done, std::size_t total) { bar.update(done, total); });
     }
     std::vector<DrawnBone> drawn;
-    for (const auto& structures : files.structures)
-      for (DrawnBone& bone : drawn_bones(read_rt_structures(structures.file), ct)) drawn.push_back(std::move(bone));
+    for (const auto& file : files.structures) {
+      RtStructures structures = read_rt_structures(file.file);
+      std::erase_if(structures.structures, [&](const Structure& structure) {
+        return structure.frame_of_reference_uid.value_or(ct.frame_of_reference_uid) != ct.frame_of_reference_uid;
+      });
+      for (DrawnBone& bone : drawn_bones(structures, ct)) drawn.push_back(std::move(bone));
+    }
     const BodyMap map = find_bodies(ct.hu, drawn);
     const std::string name = files.cts.size() == 1 ? "bodies" : fmt::format("bodies{}", n + 1);
     const std::string title = fmt::format("CT series {}: {} bodies", ct.series_instance_uid, map.bodies.size());

@@ -76,7 +76,7 @@ MachineProfile::Rule rule_from(JsonSection section) {
       throw Error(
           fmt::format("{}: where: images are not told apart by {}, but by {}", section.where(), keyword, known));
     }
-  rule.gantry_angle_offset_deg = section.number("gantry_angle_offset_deg", -360, 360).value_or(0.0);
+  rule.gantry_angle_offset_deg = section.number("gantry_angle_offset_deg", -360, 360);
   if (const auto plane = section.find<std::string>("spacing_plane", "SID or SAD")) {
     if (plane != "SID" && plane != "SAD") section.refuse("spacing_plane", "SID or SAD");
     rule.spacing_at_axis = plane == "SAD";
@@ -103,8 +103,8 @@ MachineProfile::Rule rule_from(JsonSection section) {
     rule.rows = section.required<int>("rows", "the height of the images, in pixels");
     if (!rule.switches.sid_mm)
       throw Error(fmt::format("{}: sid_mm is missing, which pixel_from_room needs", section.where()));
-    if (rule.gantry_angle_offset_deg != 0.0 || rule.spacing_at_axis || rule.imager || rule.switches.assume_centered ||
-        rule.switches.sad_mm || rule.switches.position_mm)
+    if (rule.gantry_angle_offset_deg.value_or(0.0) != 0.0 || rule.spacing_at_axis || rule.imager ||
+        rule.switches.assume_centered || rule.switches.sad_mm || rule.switches.position_mm)
       throw Error(fmt::format("{}: pixel_from_room says where all pixels are; it goes with no other geometry",
                               section.where()));
   }
@@ -181,9 +181,11 @@ RtImage with_machine(RtImage image, const MachineProfile& profile, const RtImage
     image.pixel_from_room = rule->pixel_from_room;
     note("projection matrix supplied");
   }
-  if (rule->gantry_angle_offset_deg != 0.0 && image.gantry_angle_deg) {
-    *image.gantry_angle_deg += rule->gantry_angle_offset_deg;
-    note(fmt::format("{} {:+} degrees", described(DCM_GantryAngle), rule->gantry_angle_offset_deg));
+  image.gantry_offset_deg = rule->gantry_angle_offset_deg;
+  if (const double offset_deg = rule->gantry_angle_offset_deg.value_or(0.0);
+      offset_deg != 0.0 && image.gantry_angle_deg) {
+    *image.gantry_angle_deg += offset_deg;
+    note(fmt::format("{} {:+} degrees", described(DCM_GantryAngle), offset_deg));
   }
   if (rule->spacing_at_axis && sad_mm && sid_mm) {
     const double magnified = *sid_mm / *sad_mm;

@@ -16,7 +16,7 @@ struct MachineProfile {
   // For the images whose attributes are these.
   struct Rule {
     std::map<std::string, std::string, std::less<>> where;  // keyword of kEquipmentAttributes to value; all must match
-    double gantry_angle_offset_deg = 0.0;                   // source angle = GantryAngle + this
+    std::optional<double> gantry_angle_offset_deg;          // source angle = GantryAngle + this; nothing: not told
     bool spacing_at_axis = false;       // spacing and position count in the plane of the axis, not of the receptor
     std::optional<KnownImager> imager;  // what is known of its errors
     RtImageSwitches switches;

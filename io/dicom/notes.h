@@ -25,7 +25,8 @@ struct AllowKey {
 inline constexpr AllowKey kAllowKeys[] = {
     {"patient-mismatch", "inputs of different patients"},
     {"for-mismatch", "plan or structures and CT in different frames of reference"},
-    {"plan-mismatch", "an X-ray that refers to another plan, or another isocenter than the plan's"},
+    {"plan-mismatch",
+     "an X-ray that refers to another plan, another isocenter than the plan's, or angles that are not the beam's"},
     {"planned-geometry", "a geometry that is planned or typed in, not measured (ReportedValuesOrigin)"},
     {"gaps", "a CT with missing slices or uneven spacing, interpolated"},
     {"drr", "an RT Image that is itself a DRR"},

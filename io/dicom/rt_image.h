@@ -74,7 +74,8 @@ struct RtImage {
 
   std::map<std::string, std::string, std::less<>> equipment;   // what machine profiles tell images apart by, by keyword
   std::optional<Eigen::Matrix<double, 3, 4>> pixel_from_room;  // replaces the geometry of the attributes above
-  std::optional<KnownImager> imager;                           // what a machine profile knows of its errors
+  std::optional<double> gantry_offset_deg;  // what a machine profile has added to GantryAngle; nothing: it does not say
+  std::optional<KnownImager> imager;        // what a machine profile knows of its errors
 
   int columns = 0, rows = 0;
   std::optional<std::string> intensity_relationship;

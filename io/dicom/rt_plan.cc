@@ -5,6 +5,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <cmath>
 #include <set>
 
 #include "base/error.h"
@@ -24,6 +25,20 @@ void check_same_isocenter(const RtPlan::Beam& beam, const Eigen::Vector3d& isoce
                   fmt::join(*beam.isocenter_patient_mm, ", ")));
 }
 
+// GantryAngle of a beam whose gantry stands still.
+std::optional<double> standing_gantry_deg(const std::vector<DicomItem>& points) {
+  constexpr double kSameDeg = 0.01;
+  std::optional<double> standing_deg;
+  for (const DicomItem& point : points) {
+    const auto here_deg = point.number(DCM_GantryAngle);
+    const bool has_moved =
+        here_deg && standing_deg && std::abs(std::remainder(*here_deg - *standing_deg, 360.0)) > kSameDeg;
+    if (has_moved || point.text(DCM_GantryRotationDirection).value_or("NONE") != "NONE") return std::nullopt;
+    if (here_deg) standing_deg = here_deg;
+  }
+  return standing_deg;
+}
+
 RtPlan::Beam read_beam(const DicomItem& beam_item, const DcmTagKey& control_points, const DicomItem& plan) {
   RtPlan::Beam beam;
   beam.number = beam_item.required_integer(DCM_BeamNumber);
@@ -36,6 +51,7 @@ RtPlan::Beam read_beam(const DicomItem& beam_item, const DcmTagKey& control_poin
     const bool is_ion = control_points == DCM_IonControlPointSequence;
     beam.jaws = read_jaws(points.front().items(DCM_BeamLimitingDevicePositionSequence),
                           beam_item.items(is_ion ? DCM_IonBeamLimitingDeviceSequence : DCM_BeamLimitingDeviceSequence));
+    beam.gantry_deg = standing_gantry_deg(points);
     beam.support_angle_deg = points.front().number(DCM_PatientSupportAngle);
     beam.eccentric_angle_deg = points.front().number(DCM_TableTopEccentricAngle);
     beam.pitch_deg = points.front().number(DCM_TableTopPitchAngle);
@@ -81,6 +97,9 @@ RtPlan read_rt_plan(const std::filesystem::path& path) {
   plan.label = dataset.text(DCM_RTPlanLabel).value_or("");
   plan.made_on = dataset.text(DCM_RTPlanDate).value_or("");
   plan.frame_of_reference_uid = dataset.uid(DCM_FrameOfReferenceUID);
+  for (const DicomItem& structures : dataset.items(DCM_ReferencedStructureSetSequence))
+    if (plan.structure_set_uid.empty())
+      plan.structure_set_uid = structures.uid(DCM_ReferencedSOPInstanceUID).value_or("");
   plan.approval_status = dataset.text(DCM_ApprovalStatus).value_or("");
   plan.geometry = dataset.text(DCM_RTPlanGeometry).value_or("");
   const bool is_ion = plan.sop_class_uid == UID_RTIonPlanStorage;
@@ -103,17 +122,12 @@ RtPlan read_rt_plan(const std::filesystem::path& path) {
   return plan;
 }
 
-std::vector<RtPlan::Beam> selected_beams(const RtPlan& plan, std::span<const int> beam_numbers) {
-  if (beam_numbers.empty()) return plan.beams;
-  std::vector<RtPlan::Beam> selected;
-  for (const int number : beam_numbers) {
-    const auto beam = std::ranges::find(plan.beams, number, &RtPlan::Beam::number);
-    if (beam == plan.beams.end())
-      throw Error(fmt::format("{}: has no beam {}, to which an image refers ({})", plan.path.string(), number,
-                              described(DCM_ReferencedBeamNumber)));
-    selected.push_back(*beam);
-  }
-  return selected;
+const RtPlan::Beam& beam_numbered(const RtPlan& plan, int number) {
+  const auto beam = std::ranges::find(plan.beams, number, &RtPlan::Beam::number);
+  if (beam == plan.beams.end())
+    throw Error(fmt::format("{}: has no beam {}, to which an image refers ({})", plan.path.string(), number,
+                            described(DCM_ReferencedBeamNumber)));
+  return *beam;
 }
 
 Eigen::Vector3d common_isocenter(const RtPlan& plan, std::span<const RtPlan::Beam> beams) {

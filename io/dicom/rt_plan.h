@@ -20,6 +20,7 @@ struct RtPlan {
     std::string delivery_type;                            // TreatmentDeliveryType: TREATMENT, SETUP
     std::string machine;                                  // TreatmentMachineName; may be empty
     std::optional<Eigen::Vector3d> isocenter_patient_mm;  // IsocenterPosition of the first control point
+    std::optional<double> gantry_deg;  // GantryAngle, where the gantry stands still; an arc has no single angle
     // Angles of the table at the first control point: PatientSupportAngle, TableTop{Eccentric,Pitch,Roll}Angle.
     std::optional<double> support_angle_deg, eccentric_angle_deg, pitch_deg, roll_deg;
     JawOpenings jaws;  // of the first control point
@@ -45,6 +46,7 @@ struct RtPlan {
   std::string label;
   std::string made_on;  // RTPlanDate; may be empty
   std::optional<std::string> frame_of_reference_uid;
+  std::string structure_set_uid;  // ReferencedStructureSetSequence; empty: it refers to none
   std::string approval_status;
   std::string geometry;  // RTPlanGeometry: PATIENT, or TREATMENT_DEVICE where there is no structure set
   std::vector<Beam> beams;
@@ -53,8 +55,8 @@ struct RtPlan {
 
 RtPlan read_rt_plan(const std::filesystem::path& path);
 
-// The beams with the given numbers; if the list is empty, all beams. Throws Error for a number that no beam has.
-std::vector<RtPlan::Beam> selected_beams(const RtPlan& plan, std::span<const int> beam_numbers);
+// The beam to which an image refers by this number. Throws Error for a number that no beam has.
+const RtPlan::Beam& beam_numbered(const RtPlan& plan, int number);
 
 // The isocenter that the beams share within 0.01 mm. Throws Error where they differ or none has one.
 Eigen::Vector3d common_isocenter(const RtPlan& plan, std::span<const RtPlan::Beam> beams);

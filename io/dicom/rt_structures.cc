@@ -16,6 +16,7 @@ namespace {
 constexpr std::size_t kMaxStructures = 1000;
 constexpr std::size_t kMaxContours = 200'000;
 constexpr std::size_t kMaxPoints = 10'000'000;
+constexpr std::size_t kLeastPoints = 3;  // of a contour that encloses something
 
 void check_count(std::size_t count, std::size_t limit, const std::string& where, std::string_view of_what) {
   if (count > limit) throw Error(fmt::format("{}: more than {} {}: not a file to be read", where, limit, of_what));
@@ -64,7 +65,7 @@ void read_contours(const DicomItem& dataset, std::vector<Structure>& structures)
       check_count(++contours, kMaxContours, dataset.where(), "contours");
       Contour contour = is_closed(item) ? read_contour(item) : Contour{};
       check_count(points += contour.points_patient_mm.size(), kMaxPoints, dataset.where(), "points");
-      if (contour.points_patient_mm.size() < 3)
+      if (contour.points_patient_mm.size() < kLeastPoints)
         ++structure.ignored_contours;
       else
         structure.contours.push_back(std::move(contour));
@@ -90,6 +91,15 @@ bool equal_but_for_case(std::string_view one, std::string_view other) {
 }
 
 }  // namespace
+
+bool holds_closed_contour(const DicomItem& dataset) {
+  for (const DicomItem& roi : dataset.items(DCM_ROIContourSequence))
+    for (const DicomItem& item : roi.items(DCM_ContourSequence))
+      if (is_closed(item) && item.has_value(DCM_ContourData) &&
+          item.number(DCM_NumberOfContourPoints).value_or(kLeastPoints) >= kLeastPoints)
+        return true;
+  return false;
+}
 
 RtStructures read_rt_structures(const std::filesystem::path& path) {
   const DicomFile file = DicomFile::read(path, DicomFile::Extent::kHeader);

@@ -8,6 +8,7 @@
 #include <string_view>
 #include <vector>
 
+#include "io/dicom/dicom_dataset.h"
 #include "io/dicom/identity.h"
 
 namespace isoshift {
@@ -35,6 +36,10 @@ struct RtStructures {
   std::string label;
   std::vector<Structure> structures;
 };
+
+// Whether a dataset of a structure set holds a closed contour: one of points alone, such as a setup isocenter, does
+// not.
+bool holds_closed_contour(const DicomItem& dataset);
 
 RtStructures read_rt_structures(const std::filesystem::path& path);
 

@@ -8,6 +8,7 @@
 #include <ranges>
 
 #include "base/error.h"
+#include "base/option_name.h"
 #include "io/dicom/dicom_dataset.h"
 
 namespace isoshift {
@@ -49,20 +50,22 @@ std::vector<std::string> described(std::span<const SessionFiles> sessions) {
   return lines;
 }
 
-SessionFiles chosen_session(const SessionChoice& choice, const std::vector<SessionFiles>& sessions) {
+SessionFiles chosen_session(const SessionChoice& choice, const std::vector<SessionFiles>& sessions, double now_s) {
   const auto fail = [&](const std::string& what) {
     throw Error(fmt::format("{}. The sessions are:\n       {}", what, fmt::join(described(sessions), "\n       ")));
   };
   std::vector<SessionFiles> fitting;
+  std::string unnumbered;  // an X-ray of a session that may be of any fraction
   for (const SessionFiles& session : sessions) {
     if (!session.name.starts_with(choice.name)) continue;
     if (!choice.date.empty() && !is_of_day(session, choice.date)) continue;
-    if (choice.fraction && !fraction_of(session))
-      fail(fmt::format("{}: {} is missing or differs within the session, so that its fraction is not known",
-                       session.images.front().file.string(), isoshift::described(DCM_FractionNumber)));
+    if (choice.fraction && !fraction_of(session)) unnumbered = session.images.front().file.string();
     if (choice.fraction && fraction_of(session) != choice.fraction) continue;
     fitting.push_back(session);
   }
+  if (fitting.empty() && !unnumbered.empty())
+    fail(fmt::format("{}: {} is missing or differs within the session, so that its fraction is not known", unnumbered,
+                     isoshift::described(DCM_FractionNumber)));
   if (fitting.empty()) fail(fmt::format("there is no session {}", as_asked(choice)));
   if (!choice.is_latest && fitting.size() > 1)
     fail(fmt::format("{} sessions are {}", fitting.size(), as_asked(choice)));
@@ -70,6 +73,14 @@ SessionFiles chosen_session(const SessionChoice& choice, const std::vector<Sessi
     if (patient_id_of(session.patient) != patient_id_of(fitting.front().patient) ||
         !may_be_of_one_issuer(session.patient, fitting.front().patient))
       fail("the sessions that fit are of several patients");
+  if (choice.is_latest)
+    for (const SessionFiles& session : fitting)
+      for (const StudyFiles::Image& image : session.images)
+        if (image.at_s && *image.at_s > now_s + StudyFiles::kLargestUtcOffsetS)
+          fail(fmt::format(
+              "{}: was taken at {}, in the future: a clock is wrong, and it is not known which session is the "
+              "latest. Name it: {}",
+              image.file.string(), image.acquired, option("session", "NAME")));
   const auto newest = [](const SessionFiles& session) -> const StudyFiles::Image& { return session.images.back(); };
   for (const SessionFiles& session : fitting)
     for (const SessionFiles& other : fitting)

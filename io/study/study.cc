@@ -176,12 +176,13 @@ void check_nothing_missing(const std::vector<RtImage>& images, std::string refus
 
 // The beams that the images name in the plan; all beams where one of them names none.
 std::vector<RtPlan::Beam> imaged_beams(const Study& study) {
-  std::vector<int> numbers;
+  std::vector<RtPlan::Beam> beams;
   for (const RtImage& image : study.rt_images) {
-    if (!image.beam_number || image.plan_sop_instance_uid != study.plan->sop_instance_uid) return study.plan->beams;
-    numbers.push_back(*image.beam_number);
+    const RtPlan::Beam* beam = planned_beam(*study.plan, image);
+    if (beam == nullptr) return study.plan->beams;
+    if (std::ranges::find(beams, beam->number, &RtPlan::Beam::number) == beams.end()) beams.push_back(*beam);
   }
-  return selected_beams(*study.plan, numbers);
+  return beams;
 }
 
 bool is_inside(const Eigen::VectorXd& position, const Eigen::VectorXd& size) {
@@ -298,12 +299,11 @@ void check_together(const StudyRequest& request, const SaidOfSession& said, Stud
 void declare_planned_apertures(Study& study, Notes& notes) {
   for (std::size_t n = 0; n < study.xrays.size(); ++n) {
     const RtImage& image = study.rt_images[n];
-    if (study.xrays[n].declared_aperture || !study.plan || !image.beam_number ||
-        image.plan_sop_instance_uid != study.plan->sop_instance_uid)
-      continue;
-    const std::vector<RtPlan::Beam> beams = selected_beams(*study.plan, std::span(&*image.beam_number, 1));
-    for (const std::string& problem : beams.front().jaws.problems) notes.warnings.push_back(problem);
-    study.xrays[n].declared_aperture = declared_aperture(image, beams.front().jaws, study.xrays[n].view);
+    if (study.xrays[n].declared_aperture || !study.plan) continue;
+    const RtPlan::Beam* beam = planned_beam(*study.plan, image);
+    if (beam == nullptr) continue;
+    for (const std::string& problem : beam->jaws.problems) notes.warnings.push_back(problem);
+    study.xrays[n].declared_aperture = declared_aperture(image, beam->jaws, study.xrays[n].view);
     if (study.xrays[n].declared_aperture) study.xrays[n].declared_aperture->is_of_exposure = false;
   }
 }
@@ -315,6 +315,7 @@ Study load_study(const StudyRequest& request, Notes& notes, const Progress& prog
   Study study;
   study.machine = request.machine;
   study.image_files = parts.images;
+  study.unused_structures = parts.unused_structures;
   if (!parts.plan.empty()) study.plan = read_rt_plan(parts.plan);
   if (!parts.structures.empty()) study.structures = read_rt_structures(parts.structures);
   XrayFiles files(request.one_per_imager);

@@ -33,6 +33,7 @@ struct Study {
   std::shared_ptr<const CtSeries> ct;
   std::optional<RtPlan> plan;
   std::optional<RtStructures> structures;
+  UnusedStructures unused_structures;              // where there are none
   std::vector<std::filesystem::path> image_files;  // of all X-rays of the study, including those that are not used
   std::vector<RtImage> rt_images;  // headers with machine profile and switches applied, in order of acquisition
   std::vector<XrayImage> xrays;    // the same images, ready for registration

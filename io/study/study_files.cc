@@ -14,11 +14,13 @@
 #include <utility>
 
 #include "base/error.h"
+#include "base/local_time.h"
 #include "base/option_name.h"
 #include "base/parallel.h"
 #include "base/sha256.h"
 #include "io/dicom/dicom_dataset.h"
 #include "io/dicom/rt_image.h"
+#include "io/dicom/rt_structures.h"
 #include "io/study/session_choice.h"
 
 namespace isoshift {
@@ -236,7 +238,8 @@ bool is_drawn_on(const StudyFiles::Ct& ct, const StudyFiles::Structures& structu
                                            : structures.ct_series_uids.contains(ct.series_instance_uid);
 }
 
-// The structure set that the plan refers to, else all drawn on the CT; copies of one count once.
+// The structure set that the plan refers to, else all drawn on the CT; copies of one count once. Those without closed
+// contours compete with none that has some.
 std::vector<const StudyFiles::Structures*> candidates_of(const std::vector<StudyFiles::Structures>& all,
                                                          const StudyFiles::Plan* plan, const StudyFiles::Ct& ct) {
   std::vector<const StudyFiles::Structures*> candidates;
@@ -247,9 +250,16 @@ std::vector<const StudyFiles::Structures*> candidates_of(const std::vector<Study
           }))
         candidates.push_back(&structures);
   };
-  if (plan != nullptr)
-    add_where([&](const auto& structures) { return structures.sop_instance_uid == plan->structure_set_uid; });
-  if (candidates.empty()) add_where([&](const auto& structures) { return is_drawn_on(ct, structures); });
+  for (const bool has_contours : {true, false}) {
+    if (candidates.empty() && plan != nullptr)
+      add_where([&](const auto& structures) {
+        return structures.has_contours == has_contours && structures.sop_instance_uid == plan->structure_set_uid;
+      });
+    if (candidates.empty())
+      add_where([&](const auto& structures) {
+        return structures.has_contours == has_contours && is_drawn_on(ct, structures);
+      });
+  }
   return candidates;
 }
 
@@ -257,10 +267,15 @@ void choose_structures(const std::vector<StudyFiles::Structures>& all, const Stu
                        const StudyFiles::Ct& ct, StudyParts& parts, Notes& notes) {
   const auto candidates = candidates_of(all, plan, ct);
   if (candidates.size() == 1) parts.structures = candidates.front()->file;
+  const bool are_rivals = candidates.size() > 1 && candidates.front()->has_contours;
   const bool is_planned = plan != nullptr && !plan->structure_set_uid.empty() && !candidates.empty();
   if (is_planned && candidates.front()->sop_instance_uid != plan->structure_set_uid)
-    notes.warnings.push_back(fmt::format("{}: the RT Structure Set to which the plan refers is not there ({})",
-                                         plan->file.string(), plan->structure_set_uid));
+    notes.warnings.push_back(fmt::format(
+        "{}: the RT Structure Set to which the plan refers {} ({})", plan->file.string(),
+        std::ranges::find(all, plan->structure_set_uid, &StudyFiles::Structures::sop_instance_uid) == all.end()
+            ? "is not there"
+            : "has no closed contour",
+        plan->structure_set_uid));
   else if (is_planned && !is_drawn_on(ct, *candidates.front()))
     parts.doubts.push_back(
         fmt::format("the RT Structure Set of the plan, {}, was not drawn on this CT: the plan may "
@@ -268,12 +283,17 @@ void choose_structures(const std::vector<StudyFiles::Structures>& all, const Stu
                     candidates.front()->file.string()));
   for (const StudyFiles::Structures& structures : all) {
     if (structures.file == parts.structures) continue;
+    const bool is_rival = are_rivals && structures.has_contours && is_drawn_on(ct, structures);
+    if (parts.structures.empty())
+      (is_rival ? parts.unused_structures.rivals : parts.unused_structures.unusable).push_back(structures.file);
     std::string reason = "an RT Structure Set that was not drawn on the CT";
     if (candidates.size() == 1 && structures.sop_instance_uid == candidates.front()->sop_instance_uid)
       reason = fmt::format("the same RT Structure Set as {}", parts.structures.string());
+    else if (is_drawn_on(ct, structures) && !structures.has_contours)
+      reason = "an RT Structure Set without closed contours";
     else if (candidates.size() == 1 && is_drawn_on(ct, structures))
       reason = "an RT Structure Set that the plan does not refer to";
-    else if (is_drawn_on(ct, structures))
+    else if (is_rival)
       reason = fmt::format("one of {} RT Structure Sets drawn on the CT; name the one meant: {}", candidates.size(),
                            option("structures", "FILE"));
     notes.left_aside.push_back(fmt::format("{}: {}", structures.file.string(), reason));
@@ -375,6 +395,8 @@ StudyParts chosen(StudyFiles files, std::vector<StudyFiles::Plan> other_plans, c
                                            !named.plan.empty() ? "was not named" : "no X-ray refers to"));
   if (!named.structures.empty())
     take_named_structures(named.structures, files.structures, parts, notes);
+  else if (files.structures.empty())
+    parts.unused_structures = named.unused_structures;
   else
     choose_structures(files.structures, plan, ct, parts, notes);
   choose_images(files.images, plan, other_plans, !named.images.empty(), parts, notes);
@@ -390,7 +412,8 @@ StudyParts chosen(StudyFiles files, std::vector<StudyFiles::Plan> other_plans, c
 StudyFiles files_of_session(const SessionChoice& choice, StudyFiles files, bool takes_other_xrays,
                             std::vector<std::string>& doubts) {
   compare_copies(files);
-  const SessionFiles session = chosen_session(choice, sessions_of(files, takes_other_xrays));
+  const double now_s = utc_seconds_at(local_time()).value();
+  const SessionFiles session = chosen_session(choice, sessions_of(files, takes_other_xrays), now_s);
   doubts = session.doubts;
   StudyFiles own = files_for(session, files);
   own.registrations = files.registrations;
@@ -472,6 +495,20 @@ std::vector<fs::path> files_below(const std::vector<fs::path>& paths, const std:
   return files;
 }
 
+std::string why_no_structures(const UnusedStructures& unused) {
+  const auto names = [](const std::vector<fs::path>& files) {
+    std::string list;
+    for (const fs::path& file : files) list += (list.empty() ? "" : ", ") + file.filename().string();
+    return list;
+  };
+  if (!unused.rivals.empty())
+    return fmt::format("nothing tells which of {} RT Structure Sets on this CT is meant ({})", unused.rivals.size(),
+                       names(unused.rivals));
+  if (!unused.unusable.empty())
+    return fmt::format("no RT Structure Set of the study has a closed contour on this CT ({})", names(unused.unusable));
+  return "the study holds no RT Structure Set";
+}
+
 std::vector<fs::path> StudyParts::paths() const {
   std::vector<fs::path> paths = {study, plan, structures};
   paths.insert(paths.end(), ct.begin(), ct.end());
@@ -518,7 +555,8 @@ StudyFiles scan_file(const fs::path& path) {
                                 .sop_instance_uid = dataset.required_uid(DCM_SOPInstanceUID),
                                 .ct_series_uids = std::move(drawn.series_uids),
                                 .ct_sop_instance_uids = std::move(drawn.image_uids),
-                                .frame_of_reference_uids = drawn_in(dataset)});
+                                .frame_of_reference_uids = drawn_in(dataset),
+                                .has_contours = holds_closed_contour(dataset)});
   } else if (sop_class == UID_SpatialRegistrationStorage || sop_class == UID_DeformableSpatialRegistrationStorage) {
     files.registrations.push_back(path);
   } else {

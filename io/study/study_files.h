@@ -54,6 +54,7 @@ struct StudyFiles {
     std::set<std::string> ct_series_uids;           // of the images it was drawn on
     std::set<std::string> ct_sop_instance_uids;     // of these images
     std::set<std::string> frame_of_reference_uids;  // of its structures
+    bool has_contours = false;                      // closed ones: it can hold a target
   };
 
   std::vector<Ct> cts;
@@ -107,6 +108,17 @@ struct SessionChoice {
   bool operator==(const SessionChoice&) const = default;
 };
 
+// The structure sets that are there, where none of them is used.
+struct UnusedStructures {
+  std::vector<std::filesystem::path> rivals;    // with contours on the CT, and nothing tells which one is meant
+  std::vector<std::filesystem::path> unusable;  // drawn on another CT, or without closed contours
+
+  bool operator==(const UnusedStructures&) const = default;
+};
+
+// "the study holds no RT Structure Set", or what else is true.
+std::string why_no_structures(const UnusedStructures& unused);
+
 // The files of one registration: the parts that a person or a manifest names, or the parts that were found. A path or a
 // list that is empty names nothing.
 struct StudyParts {
@@ -114,7 +126,8 @@ struct StudyParts {
   SessionChoice session;        // among the X-rays of that folder
   std::vector<std::filesystem::path> ct, images;
   std::filesystem::path plan, structures;
-  std::vector<std::string> doubts;  // why the images may not show one setup: then the result needs a person's review
+  UnusedStructures unused_structures;  // where `structures` is empty
+  std::vector<std::string> doubts;     // why the images may not show one setup: then the result needs a person's review
 
   std::vector<std::filesystem::path> paths() const;  // all that are named
 
@@ -126,11 +139,12 @@ struct StudyParts {
 // - the CT in the plan's frame of reference, and of several such CTs the one on which the plan's structure set was
 // drawn;
 // - the images of that plan, and of the session that `named` chooses;
-// - the structure set to which the plan refers, or else the only structure set that was drawn on that CT.
+// - the structure set to which the plan refers, or else the only structure set that was drawn on that CT. Those without
+// closed contours count only where no other is there.
 // All other files are left aside in the notes, with the reason; so are DRRs, unless there is no other X-ray.
 // `takes_other_xrays`: a machine profile supplies the geometry of X-rays that are not RT Images. Throws Error if there
-// is no CT or no image, or if the files do not tell which of several candidates is meant. Several structure sets are an
-// error only where a structure set is needed.
+// is no CT or no image, or if the files do not tell which of several candidates is meant. Several structure sets are
+// rivals: an error where a structure set is needed, and a doubt about a target that nobody names.
 StudyParts find_parts(const StudyParts& named, bool takes_other_xrays, Notes& notes);
 
 // The same, with all scanned files as candidates.

@@ -131,6 +131,34 @@ TEST_F(BodiesOfAThorax, ADrawnBoneIsABodyWithItsName) {
   EXPECT_NEAR(named->volume_mm3, 4.0 / 3.0 * M_PI * 8000.0, 2000.0);
 }
 
+// The bones of two neighboring vertebrae as found, drawn by a person: nothing else of them is left, and no body is
+// added.
+TEST_F(BodiesOfAThorax, DrawnVertebraeReplaceTheFoundOnes) {
+  std::vector<DrawnBone> bones;
+  for (const int number : {2, 3}) {
+    Volume<std::uint8_t> drawn(map().labels.size, map().labels.patient_from_voxel);
+    for (std::size_t n = 0; n < drawn.voxels.size(); ++n) drawn.voxels[n] = map().labels.voxels[n] == number ? 1 : 0;
+    const Body& body = map().bodies[static_cast<std::size_t>(number - 1)];
+    ASSERT_EQ(body.kind, Body::Kind::kVertebra);
+    // A body of its own around the center, as TG-263 has VB_T9: without the arch.
+    for (int k = 0; k < drawn.size.z(); ++k)
+      for (int j = 0; j < drawn.size.y(); ++j)
+        for (int i = 0; i < drawn.size.x(); ++i) {
+          const double away_mm = (drawn.patient_from_voxel * Eigen::Vector3d(i, j, k) - body.center_patient_mm).norm();
+          if (away_mm < 8.0) drawn.at(i, j, k) = 1;
+          if (away_mm > 18.0) drawn.at(i, j, k) = 0;
+        }
+    bones.push_back({number == 2 ? "vertebrae_T9" : "VB_T8", drawn});
+  }
+  const BodyMap with = find_bodies(ct(), bones);
+  EXPECT_EQ(with.bodies.size(), map().bodies.size());
+  EXPECT_EQ(with.bodies[1].name, "vertebrae_T9");
+  EXPECT_EQ(with.bodies[2].name, "VB_T8");
+  EXPECT_EQ(with.bodies[2].kind, Body::Kind::kVertebra);
+  for (const char* found : {"vertebra 2", "vertebra 3"})
+    EXPECT_EQ(std::ranges::find(with.bodies, found, &Body::name), with.bodies.end());
+}
+
 TEST(Bodies, ACouchApartFromThePatientIsABodyOfItsOwn) {
   const std::vector<Shape> shapes = {make_shape(Shape::Kind::kEllipsoid, {0, 0, 0}, {80, 60, 200}, {.water = 1.0}),
                                      make_shape(Shape::Kind::kCylinder, {0, 10, 0}, {12, 12, 200}, {.bone = 0.5}),

@@ -223,6 +223,23 @@ TEST_F(ContradictionsCommandTest, APlanForAnotherTableIsWarnedOf) {
   EXPECT_THAT(warnings, testing::Not(HasSubstr("couch roll")));
 }
 
+// A couch angle on another scale turns the answer by twice its value. A site decides by its own action level.
+TEST_F(ContradictionsCommandTest, ARotationAboveFiveDegreesNeedsAReviewWithoutASiteFile) {
+  const auto reasons = [&](double rz_deg, bool has_site) {
+    PhantomOptions phantom = small_phantom();
+    phantom.placement.rotation_deg = Eigen::Vector3d(0.5, -0.5, rz_deg);
+    const SmallStudy study(phantom);
+    const std::filesystem::path site = study.path().parent_path() / "site.json";
+    std::ofstream(site) << R"({"site_file": 1, "name": "S"})";
+    register_study(study, has_site ? std::vector<std::string>{"--site", site.string()} : std::vector<std::string>());
+    return result_of(study)["reasons"].dump();
+  };
+  EXPECT_THAT(reasons(5.6, false),
+              HasSubstr("the couch would have to turn by -5.6 degrees (yaw), more than 5 degrees"));
+  EXPECT_THAT(reasons(5.6, true), testing::Not(HasSubstr("the couch would have to turn")));
+  EXPECT_THAT(reasons(-4.6, false), testing::Not(HasSubstr("the couch would have to turn")));
+}
+
 TEST_F(ContradictionsCommandTest, ATruthAboutAnotherSetupIsRefusedBeforeAnythingIsWritten) {
   std::ofstream(study_.truth(), std::ios::trunc)
       << R"({"patient_position": "FFS", "setup_error_room": {"translation_mm": [0, 0, 0],

@@ -157,6 +157,12 @@ TEST_F(RegisterCommandTest, AStartThatCannotBeOneIsRefused) {
   EXPECT_THAT(refusal("{}"), HasSubstr("holds no complete setup error"));
   EXPECT_THAT(refusal("no JSON"), HasSubstr("is not JSON"));
   EXPECT_THAT(refusal("{" + about + "[[1, 0, 0], [0, 1, 0], [0, 0, -1]]}}"), HasSubstr("is no rotation"));
+  // A person who edits the angles of a result or a truth, and not the matrix.
+  const std::string edited = "[[1, 0, 0], [0, 1, 0], [0, 0, 1]], ";
+  EXPECT_THAT(refusal("{" + about + edited + R"("rotation_deg_rx_ry_rz": [0, 0, 3]}})"),
+              HasSubstr("its angles (0, 0, 3) degrees about x, y and z (R = Rz Rx Ry) contradict its rotation_matrix"));
+  EXPECT_THAT(refusal("{" + about + edited + R"("rotation_deg": {"rx": -2, "ry": 0, "rz": 0}}})"),
+              HasSubstr("which is 2.00 degrees away"));
   EXPECT_THAT(refusal("{" + about + straight + R"(, "patient": {"id": "Smith"}})"),
               HasSubstr("is of another patient than the study (PatientID)"));
   EXPECT_THAT(refusal("{" + about + straight + R"(, "isocenter_patient_mm": [1, 2, 3]})"),

@@ -94,6 +94,24 @@ TEST_F(SessionChoiceCommandTest, AFractionIsChosenWhereTheXraysNumberIt) {
               HasSubstr("there is no session of 2026-03-02, of fraction 1"));
 }
 
+TEST_F(SessionChoiceCommandTest, SessionsWithoutANumberDoNotHideTheFractionThatIsAskedFor) {
+  for (const char* name : {"KV_G000.dcm", "KV_G090.dcm"})
+    edit(study_ / "RTIMAGE/F02" / name, [](DicomItem d) { d.put(DCM_FractionNumber, 2.0); });
+  ASSERT_EQ(register_with({"--fraction", "2"}).exit_status, 0);
+  EXPECT_THAT(found(), PoseNear(second_, 0.5, 3.0));
+  EXPECT_THAT(register_with({"--fraction", "1"}).err, HasSubstr("FractionNumber (3002,0029) is missing or differs"));
+}
+
+// The clock of an imager that is a century ahead.
+TEST_F(SessionChoiceCommandTest, XraysFromTheFutureAreNotTheLatest) {
+  for (const char* name : {"KV_G000.dcm", "KV_G090.dcm"})
+    edit(study_ / "RTIMAGE" / name, [](DicomItem d) { d.put(DCM_AcquisitionDate, "21260301"); });
+  const CommandOutcome outcome = register_with({"--latest"});
+  EXPECT_EQ(outcome.exit_status, 1);
+  EXPECT_THAT(outcome.err, HasSubstr("was taken at 2126-03-01 10:15:00, in the future: a clock is wrong"));
+  EXPECT_EQ(register_with({"--date", "2026-03-02"}).exit_status, 0);
+}
+
 TEST_F(SessionChoiceCommandTest, ASessionIsChosenByTheNameThatInspectGives) {
   number_fractions();
   const CommandOutcome inspected = run_command({"inspect", study_.string(), "--json"});

@@ -65,9 +65,7 @@ void LiveStudy::find_parts() {
   const RtStructures* const structures = study_.structures ? &*study_.structures : nullptr;
   if (structures != nullptr)
     for (const Structure& structure : structures->structures) {
-      const bool is_here = structure.frame_of_reference_uid.value_or(study_.ct->frame_of_reference_uid) ==
-                           study_.ct->frame_of_reference_uid;
-      if (!is_here || structure.contours.empty()) continue;
+      if (structure.contours.empty()) continue;
       structures_.push_back(structure.name);
       parts_.push_back({"structure " + structure.name, {"--structure", structure.name}});
     }

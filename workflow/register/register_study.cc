@@ -3,7 +3,11 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <cmath>
+#include <utility>
+
 #include "base/json_file.h"
+#include "base/option_name.h"
 #include "base/output_folder.h"
 #include "base/stopwatch.h"
 #include "io/report/result_folder.h"
@@ -39,6 +43,21 @@ SpatialRegistrationOptions registration_options(RegistrationSource source, const
   return {.content_label = kLabelOfReview, .content_description = kReviewDescription, .source = source};
 }
 
+// A patient turned by more than a couch corrects may lie right, but an angle in a file on a wrong scale looks the same
+// (couch 354 for 6 turns the answer by 12 degrees). A site that has a file decides by its own action level.
+void doubt_large_rotation(SetupResult& result) {
+  constexpr double kMostDeg = 5.0;
+  const ZxyAngles turn = couch_shift_for(result.setup_error, result.table).change;
+  for (const auto& [name, angle_rad] : {std::pair("yaw", turn.z_rad), {"pitch", turn.x_rad}, {"roll", turn.y_rad}})
+    if (std::abs(deg_from_rad(angle_rad)) > kMostDeg)
+      result.demote(
+          Verdict::kReview,
+          fmt::format("the couch would have to turn by {:.1f} degrees ({}), more than {:.0f} degrees about one "
+                      "axis: the patient may lie otherwise than planned, or an angle in a file may be on "
+                      "another scale. Look at both; a site file ({}) says from which rotation to act",
+                      deg_from_rad(angle_rad), name, kMostDeg, option("site", "FILE")));
+}
+
 }  // namespace
 
 std::string write_registration(const RegisterOptions& options, const Study& study, const SetupResult& result,
@@ -60,6 +79,7 @@ SetupResult register_loaded(const Study& study, const RegisterOptions& options, 
   RegistrationResult found = registration.from(setup_error * study.planned_room_from_patient, images, observer);
 
   SetupResult result = setup_result_of(study, images, options.registration, setup, choice.target, std::move(found));
+  if (!site) doubt_large_rotation(result);
   result.site = site;
   result.start = std::move(start);
   return result;

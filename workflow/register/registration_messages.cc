@@ -69,6 +69,8 @@ std::string to_line(const RegistrationOrder& order) {
                     {"images", raw(parts.images)},
                     {"plan", raw(parts.plan)},
                     {"structures", raw(parts.structures)},
+                    {"rival_structures", raw(parts.unused_structures.rivals)},
+                    {"unusable_structures", raw(parts.unused_structures.unusable)},
                     {"doubts", raw(parts.doubts)},
                     {"flags", raw(order.flags)},
                     {"site", raw(order.site)},
@@ -89,21 +91,24 @@ RegistrationOrder registration_order_from(const std::string& line, const std::st
   std::optional<JsonSection> section = message.section("register");
   if (!section) message.refuse_missing("register", "an order");
   message.end();
-  RegistrationOrder order{.parts = {.study = text_in(*section, "study"),
-                                    .ct = texts_in<fs::path>(*section, "ct"),
-                                    .images = texts_in<fs::path>(*section, "images"),
-                                    .plan = text_in(*section, "plan"),
-                                    .structures = text_in(*section, "structures"),
-                                    .doubts = texts_in<std::string>(*section, "doubts")},
-                          .flags = texts_in<std::string>(*section, "flags"),
-                          .site = text_in(*section, "site"),
-                          .anatomy = text_in(*section, "anatomy"),
-                          .start = text_in(*section, "start"),
-                          .is_searched = section->required<bool>("is_searched", kYesOrNo),
-                          .output = text_in(*section, "output"),
-                          .tells_progress = section->required<bool>("tells_progress", kYesOrNo),
-                          .at_a_time = section->required<int>("at_a_time", "a number of registrations"),
-                          .worker = section->required<int>("worker", "a number of a child")};
+  RegistrationOrder order{
+      .parts = {.study = text_in(*section, "study"),
+                .ct = texts_in<fs::path>(*section, "ct"),
+                .images = texts_in<fs::path>(*section, "images"),
+                .plan = text_in(*section, "plan"),
+                .structures = text_in(*section, "structures"),
+                .unused_structures = {.rivals = texts_in<fs::path>(*section, "rival_structures"),
+                                      .unusable = texts_in<fs::path>(*section, "unusable_structures")},
+                .doubts = texts_in<std::string>(*section, "doubts")},
+      .flags = texts_in<std::string>(*section, "flags"),
+      .site = text_in(*section, "site"),
+      .anatomy = text_in(*section, "anatomy"),
+      .start = text_in(*section, "start"),
+      .is_searched = section->required<bool>("is_searched", kYesOrNo),
+      .output = text_in(*section, "output"),
+      .tells_progress = section->required<bool>("tells_progress", kYesOrNo),
+      .at_a_time = section->required<int>("at_a_time", "a number of registrations"),
+      .worker = section->required<int>("worker", "a number of a child")};
   if (order.at_a_time < 1) section->refuse("at_a_time", "at least 1");
   if (order.worker < 0) section->refuse("worker", "at least 0");
   section->end();

@@ -58,6 +58,7 @@ RegistrationSetup::RegistrationSetup(const RegistrationRequest& request, const S
   else
     renderers_ = store.get(request.rendering, study.ct, beams);
   region_ = std::move(region.projected);
+  chosen_ = std::move(region.chosen);
   // X-rays show what lies before and behind a volume of interest, DRRs of that volume do not: intensities cannot be
   // compared, edges can.
   if (region_.has_volume() && !request.search.is_paper())

@@ -46,9 +46,11 @@ class RegistrationSetup {
   const RendererPyramid& renderers() const { return *renderers_; }
   const Volume<float>& rendered_ct() const { return region_ct_ ? *region_ct_ : ct_->hu; }
   const RegistrationOptions& options() const { return options_; }
+  const std::vector<ChosenVolume>& chosen() const { return chosen_; }  // what a person or a file chose of the CT
 
  private:
   ProjectedRegion region_;
+  std::vector<ChosenVolume> chosen_;
   std::shared_ptr<const CtSeries> ct_;
   std::optional<Volume<float>> region_ct_;  // where a volume of interest is rendered and not the whole CT
   std::shared_ptr<const RendererPyramid> renderers_;

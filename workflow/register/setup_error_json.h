@@ -9,7 +9,8 @@ namespace isoshift {
 
 nlohmann::json json_of_setup_error(const Eigen::Isometry3d& setup_error);
 
-// Throws nlohmann::json::exception for a missing or incomplete number, and Error for a matrix that is no rotation.
+// Throws nlohmann::json::exception for a missing or incomplete number, and Error for a matrix that is no rotation or
+// that contradicts the angles beside it.
 Eigen::Isometry3d setup_error_from(const nlohmann::json& json);
 
 // That of a result.json, a truth.json or a pose set by hand. Throws Error naming the file for one that has none.

@@ -33,8 +33,7 @@ std::vector<MarkedStructure> marked_structures(const Study& study, const RegionO
   for (const Structure& structure : study.structures->structures)
     if ((structure.interpreted_type == "PTV" || structure.interpreted_type == "CTV" ||
          structure.interpreted_type == "GTV") &&
-        !structure.contours.empty() &&
-        structure.frame_of_reference_uid.value_or(study.ct->frame_of_reference_uid) == study.ct->frame_of_reference_uid)
+        !structure.contours.empty())
       add(structure);
   return marked;
 }

@@ -11,17 +11,19 @@
 namespace isoshift {
 
 std::vector<DrawnBone> drawn_bones(const RtStructures& structures, const CtSeries& ct) {
+  // Names of people, of TG-263 (VB_L3, Bone_Mandible, Rib07_L) and of TotalSegmentator (vertebrae_L3, clavicula_left,
+  // rib_left_7). A margin about a bone (PRV) is none.
   static const std::regex bone(
-      "([CTL](\\d|1[0-2])|vert(ebra)?[ _-]?[CTL]?\\d+|skull|cranium|mandible|jaw|sacrum|sternum|"
-      "(femur|femoral[ _]?head|humerus|scapula|clavicle|pelvis|ilium|hip)([ _-].*)?)",
+      "(?!.*PRV)(bone[ _-])?("
+      "[CTL]0?(\\d|1[0-2])|(vert(ebrae?)?|VB)[ _-]?[CTLS]?\\d+|skull|cranium|mandible|jaw|sacrum|sternum|"
+      "rib[ _-]?(left|right|l|r)?[ _-]?\\d+([ _-](left|right|l|r))?|"
+      "(femur|femoral[ _]?head|humerus|scapula|clavicle|clavicula|pelvis|pelvic|ilium|ischium|pubis|hip|tibia|fibula|"
+      "patella|ulna|radius)([ _-].*)?)",
       std::regex::icase);
   std::vector<DrawnBone> result;
-  for (const Structure& structure : structures.structures) {
-    const bool is_here =
-        !structure.frame_of_reference_uid || *structure.frame_of_reference_uid == ct.frame_of_reference_uid;
-    if (is_here && !structure.contours.empty() && std::regex_match(structure.name, bone))
+  for (const Structure& structure : structures.structures)
+    if (!structure.contours.empty() && std::regex_match(structure.name, bone))
       result.push_back({structure.name, mask_of(structure, ct.hu.size, ct.hu.patient_from_voxel)});
-  }
   return result;
 }
 

@@ -10,7 +10,8 @@
 
 namespace isoshift {
 
-// Structures drawn on this CT that are single bones by their names, such as "L3", "Mandible" or "Femur_L".
+// Structures that are single bones by their names, such as "L3", "vertebrae_L3", "VB_L3", "Mandible" or "Femur_L".
+// Precondition: they are in the CT's frame of reference.
 std::vector<DrawnBone> drawn_bones(const RtStructures& structures, const CtSeries& ct);
 
 // The bodies as isoshift inspect --bodies numbers them, from 1. `structures`: null if the study has none.

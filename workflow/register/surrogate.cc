@@ -15,25 +15,11 @@
 #include "bodies/vertebrae.h"
 #include "io/dicom/structure_mask.h"
 #include "registration/bodies/carriers.h"
+#include "workflow/register/near_target.h"
+#include "workflow/register/region_check.h"
 
 namespace isoshift {
 namespace {
-
-constexpr double kLeastMm3 = 100.0;
-
-// Calls work(i, j, k) for the voxels within 20 mm of a place.
-template <class T, class Work>
-void for_voxels_near(const Volume<T>& volume, const Eigen::Vector3d& patient_mm, Work&& work) {
-  const Eigen::Vector3i& size = volume.size;
-  const Eigen::Vector3d center = volume.patient_from_voxel.inverse() * patient_mm;
-  const Eigen::Vector3d spacing = volume.spacing_mm(), reach = kCarriersNearMm * spacing.cwiseInverse();
-  const Eigen::Vector3i first = (center - reach).array().ceil().max(0.0).cast<int>();
-  const Eigen::Vector3i last = (center + reach).array().floor().min(size.array().cast<double>() - 1.0).cast<int>();
-  for (int k = first.z(); k <= last.z(); ++k)
-    for (int j = first.y(); j <= last.y(); ++j)
-      for (int i = first.x(); i <= last.x(); ++i)
-        if ((Eigen::Vector3d(i, j, k) - center).cwiseProduct(spacing).norm() <= kCarriersNearMm) work(i, j, k);
-}
 
 // Whether a CT shows bone near a place: as much as a small piece of rib, or a ball. Quicker than finding its bodies,
 // which only bent patients need.
@@ -43,22 +29,14 @@ bool is_bone_near(const Volume<float>& ct_hu, const Eigen::Vector3d& patient_mm)
   for_voxels_near(ct_hu, patient_mm, [&](int i, int j, int k) {
     if (ct_hu.at(i, j, k) >= bone_hu) found_mm3 += voxel_mm3;
   });
-  return found_mm3 >= kLeastMm3;
+  return found_mm3 >= kLeastBoneMm3;
 }
 
 bool holds_bone(const Volume<float>& ct_hu, const Volume<std::uint8_t>& structure) {
   double found_mm3 = 0.0;
   for (std::size_t n = 0; n < ct_hu.voxels.size(); ++n)
     if (structure.voxels[n] != 0 && ct_hu.voxels[n] >= BodyOptions().bone_hu) found_mm3 += ct_hu.spacing_mm().prod();
-  return found_mm3 >= kLeastMm3;
-}
-
-// The target's center and surface, as planned.
-std::vector<Eigen::Vector3d> points_patient_mm(const Study& study, const Target& target) {
-  const Eigen::Isometry3d patient_from_room = study.planned_room_from_patient.inverse();
-  std::vector<Eigen::Vector3d> points = {patient_from_room * target.center_room_mm};
-  for (const Eigen::Vector3d& point : target.extent_room_mm) points.push_back(patient_from_room * point);
-  return points;
+  return found_mm3 >= kLeastBoneMm3;
 }
 
 // Which bodies hang on the spine by bones that touch, without ribs between them, as a pelvis does. Ribs breathe, and a
@@ -180,18 +158,28 @@ NearTarget bones_near(const Study& study, const Spine& spine, const Target& targ
 
 }  // namespace
 
+std::vector<Eigen::Vector3d> points_patient_mm(const Study& study, const Target& target) {
+  const Eigen::Isometry3d patient_from_room = study.planned_room_from_patient.inverse();
+  std::vector<Eigen::Vector3d> points = {patient_from_room * target.center_room_mm};
+  for (const Eigen::Vector3d& point : target.extent_room_mm) points.push_back(patient_from_room * point);
+  return points;
+}
+
 Surrogate surrogate_of(const Study& study, const Target& target, const std::string& by_site, BodyStore& bodies) {
   if (!by_site.empty()) {
     if (!study.structures)
-      throw Error(fmt::format("surrogate {} (the site file): the study holds no RT Structure Set ({} names one)",
-                              by_site, option("structures", "FILE")));
+      throw Error(fmt::format("surrogate {} (the site file): {} ({} names one)", by_site,
+                              why_no_structures(study.unused_structures), option("structures", "FILE")));
     Volume<std::uint8_t> drawn =
         mask_of(structure_named(*study.structures, by_site), study.ct->hu.size, study.ct->hu.patient_from_voxel);
     if (!holds_bone(study.ct->hu, drawn))
       throw Error(fmt::format("surrogate {} (the site file): the CT shows no bone in this structure", by_site));
+    ChosenVolume volume{.words = fmt::format("surrogate {} (the site file)", by_site), .mask = std::move(drawn)};
+    std::optional<std::string> doubt = volume_doubt(study, volume);
+    if (!doubt) doubt = doubt_of_neck(study, spine_of(study.ct->hu), target);
     return {.words = fmt::format("bones in {} (the site file)", by_site),
-            .drawn = std::move(drawn),
-            .doubt = doubt_of_neck(study, spine_of(study.ct->hu), target)};
+            .drawn = std::move(volume.mask),
+            .doubt = std::move(doubt)};
   }
   if (std::ranges::any_of(points_patient_mm(study, target),
                           [&](const Eigen::Vector3d& point) { return is_bone_near(study.ct->hu, point); })) {

@@ -13,6 +13,7 @@
 #include "drr/attenuation.h"
 #include "geometry/mask.h"
 #include "io/dicom/structure_mask.h"
+#include "workflow/register/region_check.h"
 
 namespace isoshift {
 namespace {
@@ -60,11 +61,6 @@ bool reaches_beyond(const Volume<float>& ct, const Structure& structure) {
   });
 }
 
-bool is_drawn_here(const Structure& structure, const Study& study) {
-  const std::string& frame = study.ct->frame_of_reference_uid;
-  return !structure.contours.empty() && structure.frame_of_reference_uid.value_or(frame) == frame;
-}
-
 Candidate candidate_of(const Structure& structure, const Study& study) {
   const Volume<float>& ct = study.ct->hu;
   Candidate candidate{.structure = &structure, .mask = mask_of(structure, ct.size, ct.patient_from_voxel)};
@@ -99,6 +95,11 @@ Target target_from(const Candidate& candidate, const Study& study, std::string c
 
 TargetChoice choice_of(const Candidate& candidate, const Study& study, const std::string& why) {
   TargetChoice choice{.target = target_from(candidate, study, why), .doubts = {}};
+  if (!is_in_body(candidate.mask, study.ct->hu))
+    choice.doubts.push_back(
+        fmt::format("the target {} lies outside of the body for the most part: its contours may be of another CT, "
+                    "flipped or turned",
+                    choice.target.name));
   if (candidate.reaches_beyond_ct)
     choice.doubts.push_back(
         fmt::format("the target {} reaches beyond the CT: where its center lies, and what carries it, "
@@ -110,7 +111,7 @@ TargetChoice choice_of(const Candidate& candidate, const Study& study, const std
 TargetChoice named(const Study& study, const std::string& name, const std::string& by) {
   if (name == kIsocenter) return {.target = surroundings(by), .doubts = {}};
   if (!study.structures)
-    throw Error(fmt::format("target {} ({}): the study holds no RT Structure Set ({} names one)", name, by,
+    throw Error(fmt::format("target {} ({}): {} ({} names one)", name, by, why_no_structures(study.unused_structures),
                             option("structures", "FILE")));
   return choice_of(candidate_of(structure_named(*study.structures, name), study), study, by);
 }
@@ -140,13 +141,20 @@ std::vector<int> prescribed_rois(const Study& study) {
   return numbers;
 }
 
+// Numbers of ROIs count in the structure set to which the plan refers. A plan that refers to none is taken to mean the
+// one there is.
+bool are_rois_of_plan(const Study& study) {
+  return study.structures &&
+         (study.plan->structure_set_uid.empty() || study.plan->structure_set_uid == study.structures->sop_instance_uid);
+}
+
 // Of those, the ones that are drawn on this CT.
 std::vector<Candidate> prescribed(const Study& study) {
   std::vector<Candidate> candidates;
-  if (!study.structures) return candidates;
+  if (!study.plan || !are_rois_of_plan(study)) return candidates;
   for (const int number : prescribed_rois(study))
     for (const Structure& structure : study.structures->structures)
-      if (structure.number == number && is_drawn_here(structure, study))
+      if (structure.number == number && !structure.contours.empty())
         candidates.push_back(candidate_of(structure, study));
   return candidates;
 }
@@ -160,9 +168,11 @@ void doubt_lost_rois(const Study& study, TargetChoice& choice) {
     const std::string instead = fmt::format("Name the target: {} or isocenter", option("target", "NAME"));
     const auto found = std::ranges::find(study.structures->structures, number, &Structure::number);
     const std::string file = study.structures->path.filename().string();
-    if (found == study.structures->structures.end())
+    if (!are_rois_of_plan(study))
+      choice.doubts.push_back(fmt::format("{}, of another RT Structure Set than {}. {}", plans_target, file, instead));
+    else if (found == study.structures->structures.end())
       choice.doubts.push_back(fmt::format("{}, which {} does not have. {}", plans_target, file, instead));
-    else if (!is_drawn_here(*found, study))
+    else if (found->contours.empty())
       choice.doubts.push_back(fmt::format("{}, \"{}\", which has no closed contour on this CT in {}. {}", plans_target,
                                           found->name, file, instead));
   }
@@ -172,7 +182,7 @@ std::vector<Candidate> around_isocenter(const Study& study, std::string_view typ
   std::vector<Candidate> candidates;
   if (!study.structures) return candidates;
   for (const Structure& structure : study.structures->structures) {
-    if (structure.interpreted_type != type || !is_drawn_here(structure, study)) continue;
+    if (structure.interpreted_type != type || structure.contours.empty()) continue;
     Candidate candidate = candidate_of(structure, study);
     if (candidate.holds_isocenter) candidates.push_back(std::move(candidate));
   }
@@ -186,7 +196,7 @@ TargetChoice chosen_by_plan(const Study& study) {
     if (std::vector<Candidate> candidates = around_isocenter(study, type); !candidates.empty())
       return chosen_among(std::move(candidates), study, fmt::format("the {} that holds the isocenter", type));
   return {.target = surroundings(study.structures ? "no target volume holds the isocenter"
-                                                  : "the study holds no RT Structure Set"),
+                                                  : why_no_structures(study.unused_structures)),
           .doubts = {}};
 }
 
@@ -226,6 +236,10 @@ TargetChoice chosen(const Study& study, const TargetWish& wish) {
   if (!wish.by_site.empty()) return named(study, wish.by_site, "the site file");
   TargetChoice choice = chosen_by_plan(study);
   doubt_lost_rois(study, choice);
+  if (!study.unused_structures.rivals.empty())
+    choice.doubts.push_back(fmt::format("{}: the target may be drawn in one of them. Name it: {}, or {}",
+                                        why_no_structures(study.unused_structures), option("structures", "FILE"),
+                                        option("target", "isocenter")));
   return choice;
 }
 
@@ -237,7 +251,7 @@ std::vector<Target> structures_beside(const std::string& target, const Study& st
   std::vector<Target> beside;
   if (!study.structures) return beside;
   for (const Structure& structure : study.structures->structures) {
-    if (structure.name == target || !is_drawn_here(structure, study) ||
+    if (structure.name == target || structure.contours.empty() ||
         std::ranges::find(kToldOf, structure.interpreted_type) == kToldOf.end())
       continue;
     try {

@@ -7,6 +7,8 @@
 #include <mutex>
 #include <optional>
 #include <span>
+#include <string>
+#include <vector>
 
 #include "registration/bodies/register_bodies.h"
 #include "workflow/observer.h"
@@ -29,7 +31,14 @@ class TargetRegistration {
                           Observer& observer, std::optional<std::uint64_t> seed = {}) const;
 
  private:
+  // What is rendered and compared of the target's own surroundings.
+  struct OwnBall {
+    RegionOfStudy region;
+    std::optional<RendererPyramid> renderers;  // nothing: those of the whole CT
+  };
+
   const BentPatient& bent_patient() const;
+  const OwnBall& own_ball() const;
   void doubt_contradicted_region(std::span<const FixedImage> images, RegistrationResult& found) const;
 
   const Study& study_;
@@ -41,6 +50,9 @@ class TargetRegistration {
   RegistrationOptions options_;
   mutable std::once_flag bent_once_;
   mutable std::optional<BentPatient> bent_;
+  mutable std::once_flag ball_once_;
+  mutable std::optional<OwnBall> ball_;
+  std::vector<std::string> region_doubts_;
 };
 
 }  // namespace isoshift

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <functional>
+#include <iterator>
 #include <system_error>
 #include <vector>
 
@@ -20,7 +21,9 @@ using Files = std::vector<fs::path>;
 
 std::array<Files, SessionInputs::kParts.size()> files_of(const StudyParts& parts) {
   const auto one = [](const fs::path& file) { return file.empty() ? Files() : Files{file}; };
-  return {parts.ct, one(parts.plan), one(parts.structures), parts.images};
+  Files structures = one(parts.structures);
+  std::ranges::copy(parts.unused_structures.rivals, std::back_inserter(structures));
+  return {parts.ct, one(parts.plan), structures, parts.images};
 }
 
 std::string sha256_of_all(const Files& files, const std::function<std::string(const fs::path&)>& of_file) {

@@ -9,6 +9,7 @@
 #include "base/error.h"
 #include "base/graceful_end.h"
 #include "base/json_file.h"
+#include "base/option_name.h"
 #include "base/output_folder.h"
 #include "geometry/mask.h"
 #include "io/dicom/structure_mask.h"
@@ -67,7 +68,9 @@ class TrackRun {
 
   Eigen::Vector3d target_of(const Study& study) const {
     if (options_.registration.region.structures.empty()) return study.isocenter_patient_mm;
-    if (!study.structures) throw Error("the study holds no RT Structure Set (--structures FILE names one)");
+    if (!study.structures)
+      throw Error(
+          fmt::format("{} ({} names one)", why_no_structures(study.unused_structures), option("structures", "FILE")));
     const Structure& structure = structure_named(*study.structures, options_.registration.region.structures.front());
     return centroid_patient_mm(mask_of(structure, study.ct->hu.size, study.ct->hu.patient_from_voxel));
   }

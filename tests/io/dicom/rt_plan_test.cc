@@ -86,8 +86,7 @@ TEST_F(RtPlanTest, DifferentIsocentersAreRefusedUnlessTheBeamIsNamed) {
       HasSubstr("beams have different isocenters (IsocenterPosition (300A,012C)): (-12.5, 38, -410) and (-12.5, 48, "
                 "-410) mm.\n       Say which one the patient was set up to: --isocenter X,Y,Z"));
   const RtPlan plan = read_rt_plan(study_.plan());
-  const std::array second = {2};
-  EXPECT_THAT(common_isocenter(plan, selected_beams(plan, second)),
+  EXPECT_THAT(common_isocenter(plan, std::array{beam_numbered(plan, 2)}),
               VectorNear(Eigen::Vector3d(-12.5, 48, -410), 1e-12));
 }
 
@@ -101,8 +100,24 @@ TEST_F(RtPlanTest, AMissingIsocenterIsNamedWithItsSwitch) {
 }
 
 TEST_F(RtPlanTest, ABeamThatIsNotThereIsNamed) {
-  EXPECT_THAT(error_of([](const RtPlan& plan) { selected_beams(plan, std::array{7}); }),
+  EXPECT_THAT(error_of([](const RtPlan& plan) { beam_numbered(plan, 7); }),
               HasSubstr("has no beam 7, to which an image refers"));
+}
+
+// A static beam and one whose gantry goes once around, of two control points each.
+TEST_F(RtPlanTest, OnlyAGantryThatStandsStillHasAnAngle) {
+  const auto add_point = [](DicomItem plan, std::size_t beam, double gantry_deg) {
+    plan.items(DCM_BeamSequence)[beam].append_item(DCM_ControlPointSequence).put(DCM_GantryAngle, gantry_deg);
+  };
+  edit(study_.plan(), [&](DicomItem plan) {
+    add_point(plan, 0, 0.0);
+    add_point(plan, 1, 450.0);
+    plan.items(DCM_BeamSequence)[1].items(DCM_ControlPointSequence).front().put(DCM_GantryRotationDirection, "CW");
+  });
+  EXPECT_EQ(read_rt_plan(study_.plan()).beams[0].gantry_deg, 0.0);
+  EXPECT_FALSE(read_rt_plan(study_.plan()).beams[1].gantry_deg);
+  edit(study_.plan(), [&](DicomItem plan) { add_point(plan, 0, 40.0); });
+  EXPECT_FALSE(read_rt_plan(study_.plan()).beams[0].gantry_deg);
 }
 
 // An ion plan holds the same under other names.

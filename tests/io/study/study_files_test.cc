@@ -17,6 +17,7 @@ using testing::AllOf;
 using testing::Contains;
 using testing::ElementsAre;
 using testing::HasSubstr;
+using testing::UnorderedElementsAre;
 
 // A folder into which an exporter has put more than one study.
 class StudyFilesTest : public testing::Test {
@@ -223,12 +224,13 @@ TEST_F(StudyFilesTest, AStructureSetOfThePlanThatIsAbsentOrDrawnOnAnotherCtIsTol
 }
 
 TEST_F(StudyFilesTest, OfSeveralStructureSetsThePlanOrAPersonDecides) {
-  draw(study_, {{"Spine", {}}});
+  draw(study_, {{"Spine", {rectangle({0, 40, -400}, 20, 20)}}});
   const std::filesystem::path second = study_.path() / "RTSTRUCT2.dcm", copy = study_.path() / "copy.dcm";
   std::filesystem::copy(study_.structures(), second);
   edit(second, [](DicomItem d) { d.put(DCM_SOPInstanceUID, "1.2.3.5"); });
   StudyParts parts = find();
   EXPECT_EQ(parts.structures, std::filesystem::path());
+  EXPECT_THAT(parts.unused_structures.rivals, UnorderedElementsAre(study_.structures(), second));
   for (const std::filesystem::path& file : {study_.structures(), second})
     EXPECT_THAT(notes_.left_aside,
                 Contains(file.string() + ": one of 2 RT Structure Sets drawn on the CT; name the one "
@@ -249,6 +251,44 @@ TEST_F(StudyFilesTest, OfSeveralStructureSetsThePlanOrAPersonDecides) {
   EXPECT_THAT(notes_.left_aside,
               Contains(study_.structures().string() + ": an RT Structure Set that the plan does not refer to"));
   EXPECT_THAT(notes_.left_aside, Contains(copy.string() + ": the same RT Structure Set as " + second.string()));
+}
+
+// As treatment planning systems export them: a set that holds a setup isocenter, drawn on the same CT.
+TEST_F(StudyFilesTest, AStructureSetOfPointsDoesNotCompete) {
+  draw(study_, {{"InitLaserIso", {{{1, 2, 3}}}, "POINT"}, {"AcqIsocenter", {{{1, 2, 3}}}, "CLOSED_PLANAR"}});
+  const std::filesystem::path points = study_.path() / "RS_setup.dcm";
+  std::filesystem::rename(study_.structures(), points);
+  edit(points, [](DicomItem d) { d.put(DCM_SOPInstanceUID, "1.2.3.6"); });
+  EXPECT_EQ(find().structures, points) << "the only one there is";
+  draw(study_, {{"PTV", {rectangle({0, 40, -400}, 20, 20)}}});
+  EXPECT_EQ(find().structures, study_.structures());
+  EXPECT_THAT(notes_.left_aside, Contains(points.string() + ": an RT Structure Set without closed contours"));
+  for (const char* of_plan : {"1.2.3.9", "1.2.3.6"}) {  // not there, and that of the points
+    edit(study_.plan(), [&](DicomItem d) {
+      d.erase(DCM_ReferencedStructureSetSequence);
+      d.append_item(DCM_ReferencedStructureSetSequence).put(DCM_ReferencedSOPInstanceUID, of_plan);
+    });
+    EXPECT_EQ(find().structures, study_.structures()) << of_plan;
+  }
+  EXPECT_THAT(notes_.warnings, Contains(HasSubstr("to which the plan refers has no closed contour (1.2.3.6)")));
+}
+
+TEST_F(StudyFilesTest, WhyThereAreNoStructuresIsTold) {
+  const auto why = [&] { return why_no_structures(find().unused_structures); };
+  EXPECT_EQ(why(), "the study holds no RT Structure Set");
+  draw(study_, {{"PTV", {rectangle({0, 40, -400}, 20, 20)}}});
+  const std::filesystem::path second = study_.path() / "second.dcm";
+  std::filesystem::copy(study_.structures(), second);
+  edit(second, [](DicomItem d) { d.put(DCM_SOPInstanceUID, "1.2.3.5"); });
+  EXPECT_EQ(why(), "nothing tells which of 2 RT Structure Sets on this CT is meant (RTSTRUCT.dcm, second.dcm)");
+  for (const std::filesystem::path& file : {study_.structures(), second})
+    edit(file, [](DicomItem d) {
+      d.append_item(DCM_ReferencedFrameOfReferenceSequence)
+          .append_item(DCM_RTReferencedStudySequence)
+          .append_item(DCM_RTReferencedSeriesSequence)
+          .put(DCM_SeriesInstanceUID, "1.2.3");
+    });
+  EXPECT_EQ(why(), "no RT Structure Set of the study has a closed contour on this CT (RTSTRUCT.dcm, second.dcm)");
 }
 
 TEST_F(StudyFilesTest, ACtInNoPlansFrameIsRefused) {
@@ -276,10 +316,9 @@ TEST_F(StudyFilesTest, FilesThatLostTheirContentsAreSaid) {
   for (const char* name : {"export.done", "README", "notes.txt"}) std::ofstream(folder / name) << "text";
   std::ofstream(folder / "transfer.ok");
   const StudyFiles files = scan_study({folder.path()});
-  EXPECT_THAT(files.unreadable,
-              testing::UnorderedElementsAre(HasSubstr("empty.dcm: is empty or begins with zeros"),
-                                            HasSubstr("zeros: is empty or begins with zeros"),
-                                            HasSubstr("cut.dcm: is not a DICOM file, as its name says")));
+  EXPECT_THAT(files.unreadable, UnorderedElementsAre(HasSubstr("empty.dcm: is empty or begins with zeros"),
+                                                     HasSubstr("zeros: is empty or begins with zeros"),
+                                                     HasSubstr("cut.dcm: is not a DICOM file, as its name says")));
   EXPECT_EQ(files.left_aside.size(), 4U);
 }
 

@@ -21,20 +21,22 @@ std::string error_of(const std::string& line) {
 }
 
 TEST(RegistrationMessages, OrdersComeBackAsTheyWere) {
-  const RegistrationOrder full{.parts = {.study = "/in/study",
-                                         .ct = {"/in/CT, planning", "/in/M\xFCller\n"},
-                                         .images = {"/in/AP;1", "/in/M\xC3\xBCller \"x\""},
-                                         .plan = "/in/RTPLAN.dcm",
-                                         .structures = "/in/RTSTRUCT.dcm"},
-                               .flags = {"--preset=fast", "--allow=gaps=it's \xE4lter"},
-                               .site = "/etc/site.json",
-                               .anatomy = "head",
-                               .start = "/in/pose.json",
-                               .is_searched = false,
-                               .output = "/out/a",
-                               .tells_progress = true,
-                               .at_a_time = 4,
-                               .worker = 3};
+  const RegistrationOrder full{
+      .parts = {.study = "/in/study",
+                .ct = {"/in/CT, planning", "/in/M\xFCller\n"},
+                .images = {"/in/AP;1", "/in/M\xC3\xBCller \"x\""},
+                .plan = "/in/RTPLAN.dcm",
+                .structures = "/in/RTSTRUCT.dcm",
+                .unused_structures = {.rivals = {"/in/a.dcm", "/in/b.dcm"}, .unusable = {"/in/points.dcm"}}},
+      .flags = {"--preset=fast", "--allow=gaps=it's \xE4lter"},
+      .site = "/etc/site.json",
+      .anatomy = "head",
+      .start = "/in/pose.json",
+      .is_searched = false,
+      .output = "/out/a",
+      .tells_progress = true,
+      .at_a_time = 4,
+      .worker = 3};
   EXPECT_EQ(registration_order_from(line_without_end(to_line(full)), ""), full);
   EXPECT_EQ(registration_order_from(line_without_end(to_line(RegistrationOrder())), ""), RegistrationOrder());
 }

@@ -105,14 +105,54 @@ TEST(TargetOf, SeveralThatFitAreADoubt) {
 TEST(TargetOf, WithoutAVolumeAtTheIsocenterItIsTheSurroundings) {
   Study study = study_with({box(1, "far PTV", "PTV", {-50, 0, 0}, 30), box(2, "Body", "EXTERNAL", {0, 0, 0}, 140)});
   study.structures->structures.push_back({.number = 3, .name = "empty PTV", .interpreted_type = "PTV"});
-  Structure elsewhere = box(4, "PTV of another CT", "PTV", {10, 0, 0}, 30);
-  elsewhere.frame_of_reference_uid = "9.9";
-  study.structures->structures.push_back(elsewhere);
   EXPECT_EQ(target_of(study, {}).target.chosen_by, "no target volume holds the isocenter");
   study.structures.reset();
   study.plan.reset();
   EXPECT_EQ(target_of(study, {}).target.chosen_by, "the study holds no RT Structure Set");
   EXPECT_THAT(target_of(study, {}).doubts, IsEmpty());
+}
+
+// load_study() refuses structures of another frame of reference, unless a person allows them.
+TEST(TargetOf, AnAllowedFrameOfReferenceHoldsForTheDefaultToo) {
+  Structure elsewhere = box(4, "PTV", "PTV", {10, 0, 0}, 30);
+  elsewhere.frame_of_reference_uid = "9.9";
+  Study study = study_with({elsewhere});
+  EXPECT_EQ(target_of(study, {}).target.name, "PTV");
+  study.plan->dose_references = {{.number = 1, .type = "TARGET", .roi_number = 4}};
+  EXPECT_EQ(target_of(study, {}).target.chosen_by, "dose reference of the plan");
+  EXPECT_EQ(structures_beside("", study).size(), 1U);
+}
+
+TEST(TargetOf, RivalStructureSetsAreADoubtUnlessThePersonNamesTheTarget) {
+  Study study = study_with({});
+  study.structures.reset();
+  study.unused_structures.rivals = {"in/a.dcm", "in/b.dcm"};
+  const std::string why = "nothing tells which of 2 RT Structure Sets on this CT is meant (a.dcm, b.dcm)";
+  const TargetChoice choice = target_of(study, {});
+  EXPECT_EQ(choice.target.chosen_by, why);
+  EXPECT_THAT(choice.doubts,
+              ElementsAre(why + ": the target may be drawn in one of them. Name it: --structures FILE, or "
+                                "--target isocenter"));
+  EXPECT_THAT(target_of(study, {.by_person = "isocenter"}).doubts, IsEmpty());
+  study.unused_structures = {.rivals = {}, .unusable = {"in/a.dcm"}};
+  EXPECT_EQ(target_of(study, {}).target.chosen_by,
+            "no RT Structure Set of the study has a closed contour on this CT (a.dcm)");
+}
+
+// ROI numbers of the plan mean something else in another structure set.
+TEST(TargetOf, DoseReferencesAreOfThePlansOwnStructureSet) {
+  Study study = study_with({box(1, "PTV", "PTV", {10, 0, 0}, 40), box(2, "Cord", "ORGAN", {10, 0, 0}, 24)});
+  study.structures->path = "in/other.dcm";
+  study.structures->sop_instance_uid = "1.1";
+  study.plan->dose_references = {{.number = 1, .type = "TARGET", .roi_number = 2}};
+  study.plan->structure_set_uid = "1.2";
+  const TargetChoice choice = target_of(study, {});
+  EXPECT_EQ(choice.target.name, "PTV");
+  EXPECT_THAT(choice.doubts,
+              ElementsAre(HasSubstr("the plan's target is ROI number 2 (ReferencedROINumber (3006,0084)), of "
+                                    "another RT Structure Set than other.dcm")));
+  study.plan->structure_set_uid = "1.1";
+  EXPECT_EQ(target_of(study, {}).target.name, "Cord");
 }
 
 // One of them 60 mm away.
