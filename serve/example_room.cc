@@ -21,7 +21,7 @@ constexpr int kDays = 365;
 constexpr int kSourceHttp = 8142, kSourceDicom = 4142, kRecordHttp = 8143, kRecordDicom = 4143, kScreen = 8443;
 
 constexpr const char* kReadMe =
-    R"(A treatment room to try, on this computer: two Orthanc servers, isoshift watch and isoshift serve.
+    R"(A treatment room to try, on this computer: two Orthanc servers, isoshift room watch and isoshift serve.
 
   source   the room's server: CT, plan and X-rays arrive here by DICOM ({source_dicom}), watch reads them by HTTP ({source_http})
   record   the peer that receives released results by DICOM with TLS ({record_dicom}), as an archive would
@@ -32,8 +32,8 @@ Start each of the four in a terminal of its own, in this folder (Debian: apt ins
 
   /usr/sbin/Orthanc source.json
   /usr/sbin/Orthanc record.json
-  isoshift watch watch.json
-  isoshift serve serve.json
+  isoshift room watch watch.json
+  isoshift room serve serve.json
 
 Make a patient, whose X-rays show a setup error, and send all of it to source:
 
@@ -44,7 +44,7 @@ About 10 s after the last file the session is registered. Open https://localhost
 authority of its certificate, ca.pem: import it, or accept the warning for this trial. Sign in as {user}, with the
 password of this computer. Open the session, look at its report, and release it. Without a browser:
 
-  isoshift release SESSION --by "J. Doe" --watch watch.json
+  isoshift room release SESSION --by "J. Doe" --watch watch.json
 
 watch sends the registration object and the report to record. What arrived there:
 

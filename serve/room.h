@@ -1,5 +1,6 @@
 #pragma once
-// What the screen shows of a results tree, and what people do there. The engine, isoshift watch, is another process.
+// What the screen shows of a results tree, and what people do there. The engine, isoshift room watch, is another
+// process.
 
 #include <Eigen/Geometry>
 #include <filesystem>

@@ -44,7 +44,7 @@ struct Contradiction {
 
 // The motion that one view alone would want of the patient as a whole, on top of the pose that all views together want:
 // in the room and about the isocenter, its translation (mm) and then its rotation vector (rad). What the view hardly
-// sees has a large variance. Errors of the view's geometry are in it (isoshift geometry).
+// sees has a large variance. Errors of the view's geometry are in it (isoshift qa geometry).
 struct WantedMotion {
   Eigen::Matrix<double, 6, 1> motion = Eigen::Matrix<double, 6, 1>::Zero();
   Eigen::Matrix<double, 6, 6> covariance = Eigen::Matrix<double, 6, 6>::Zero();

@@ -1,4 +1,5 @@
-// isoshift audit: whether the audit log of isoshift watch is whole; records that a person has looked at broken lines.
+// isoshift room audit: whether the audit log of isoshift room watch is whole; records that a person has looked at
+// broken lines.
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -89,7 +90,7 @@ void add_audit_command(CLI::App& app, Console& console, int& exit_status) {
   auto options = std::make_shared<AuditOptions>();
   CLI::App* command = app.add_subcommand("audit", "Check that the audit log of watch is whole");
   command->footer(
-      "\nExample:\n  isoshift audit /var/lib/isoshift/results/audit.jsonl\n\n"
+      "\nExample:\n  isoshift room audit /var/lib/isoshift/results/audit.jsonl\n\n"
       "Every line of the log holds the SHA-256 of the line before. Prints the head, the SHA-256 that the next\n"
       "line will hold: keep it elsewhere, and --head finds out whether lines were cut off since. The heads that\n"
       "the releases beside the log hold are looked for, too.\n\n"

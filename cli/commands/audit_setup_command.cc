@@ -1,4 +1,4 @@
-// isoshift audit-setup: all sessions of an archive against the couch shifts that the clinic used.
+// isoshift qa audit-setup: all sessions of an archive against the couch shifts that the clinic used.
 
 #include <fmt/format.h>
 
@@ -53,13 +53,13 @@ void add_audit_setup_command(CLI::App& app, Console& console, int& exit_status) 
   CLI::App* command = app.add_subcommand(
       "audit-setup", "Compare all sessions of an archive with the couch shifts that the clinic used");
   command->footer(fmt::format(
-      "\nExample:\n  isoshift audit-setup results/ --used shifts.csv -o audit\n"
-      "  isoshift audit-setup results/ --used exported_registrations/ -o audit\n\n"
+      "\nExample:\n  isoshift qa audit-setup results/ --used shifts.csv -o audit\n"
+      "  isoshift qa audit-setup results/ --used exported_registrations/ -o audit\n\n"
       "Finds all results of register, batch and watch below the folder. Shows how well the used shifts agree with\n"
       "what isoshift found, drifts, systematic and random errors with margins, and sessions that stand out.\n"
       "The first line of a table is {}:\n"
       "the couch shift that was applied, along and about the table top's axes (IEC 61217); a session is named as the\n"
-      "folder of its result. (isoshift audit is something else: it checks the audit log of watch.)\n\n"
+      "folder of its result. (isoshift room audit is something else: it checks the audit log of watch.)\n\n"
       "Exit status: 0 the audit was made, whatever it found; 1 failed, 2 usage.",
       used_shifts_header()));
   command->add_option("archive", options->archive, "Folder that holds results")->required()->type_name("FOLDER");

@@ -1,4 +1,4 @@
-// isoshift commission: what a site's sessions with known moves prove about its localization.
+// isoshift qa commission: what a site's sessions with known moves prove about its localization.
 
 #include <memory>
 
@@ -49,7 +49,7 @@ void add_commission_command(CLI::App& app, Console& console, int& exit_status) {
       "commission", "Test a site's localization by registered sessions of a phantom whose moves are known");
   command->footer(
       "\nExample:\n  isoshift batch sessions/ -o results\n"
-      "  isoshift commission results --site site.json -o commissioning --by \"J. Doe\" --key site-key.pem\n\n"
+      "  isoshift qa commission results --site site.json -o commissioning --by \"J. Doe\" --key site-key.pem\n\n"
       "Without --moves or --positions the moves are those of the table's read-outs, from the first session.\n"
       "Exit status: 0 all passed, 1 failed, 2 usage, 3 something was not tested, 4 a test failed.");
   command->add_option("results", request.results, "Folder of registered sessions, as batch writes it")

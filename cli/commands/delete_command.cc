@@ -1,4 +1,4 @@
-// isoshift delete: deletes the results of a session, or of a patient, that watch has kept.
+// isoshift room delete: deletes the results of a session, or of a patient, that watch has kept.
 
 #include <fmt/format.h>
 
@@ -75,9 +75,10 @@ void run_delete(const DeleteOptions& options, Console& console) {
   }
   if (tree.try_lock())
     console.err
-        << "warning: isoshift watch is not running: until it runs, its index.html and the pages of months still "
+        << "warning: isoshift room watch is not running: until it runs, its index.html and the pages of months still "
            "name the patient\n";
-  console.out << "The source still holds the X-rays, CT and plan; isoshift watch does not register the X-rays again.\n";
+  console.out
+      << "The source still holds the X-rays, CT and plan; isoshift room watch does not register the X-rays again.\n";
 }
 
 }  // namespace
@@ -86,8 +87,8 @@ void add_delete_command(CLI::App& app, Console& console, int& exit_status) {
   auto options = std::make_shared<DeleteOptions>();
   CLI::App* command = app.add_subcommand("delete", "Delete results that watch has kept, and record that");
   command->footer(
-      "\nExamples:\n  isoshift delete 3fa94c1e02b7 --by \"J. Doe\"\n"
-      "  isoshift delete --patient 1234567 --by \"J. Doe\"\n\n"
+      "\nExamples:\n  isoshift room delete 3fa94c1e02b7 --by \"J. Doe\"\n"
+      "  isoshift room delete --patient 1234567 --by \"J. Doe\"\n\n"
       "Deletes all results of the session's X-rays, with records, releases, decisions and marks of what was sent.\n"
       "The audit log, which names no patient, keeps its lines and has one more. What is released and still to be\n"
       "sent is not deleted. X-rays, CT and plan in the source are not touched, and not registered again.");

@@ -1,5 +1,5 @@
-// isoshift geometry: what X-rays of a phantom with balls, or registrations of patients, tell about their imagers, and
-// what they do not.
+// isoshift qa geometry: what X-rays of a phantom with balls, or registrations of patients, tell about their imagers,
+// and what they do not.
 
 #include <fmt/format.h>
 
@@ -215,8 +215,8 @@ void add_geometry_command(CLI::App& app, Console& console, int&) {
   CLI::App* command = app.add_subcommand(
       "geometry", "Find how imagers differ from what their files say, by X-rays of metal balls or results of patients");
   command->footer(
-      "\nExample:\n  isoshift geometry monday/ tuesday/ --ct ball-phantom/ --positions where-it-lay.csv\n"
-      "  isoshift geometry --patients results/\n\n"
+      "\nExample:\n  isoshift qa geometry monday/ tuesday/ --ct ball-phantom/ --positions where-it-lay.csv\n"
+      "  isoshift qa geometry --patients results/\n\n"
       "Every folder is a session: X-rays at several gantry angles. What X-rays cannot tell is named as not "
       "determined.");
   command->add_option("sessions", request.sessions, "A folder of X-rays of the phantom per session")

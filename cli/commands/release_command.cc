@@ -1,4 +1,4 @@
-// isoshift release: sends a result that watch holds, and records who released it.
+// isoshift room release: sends a result that watch holds, and records who released it.
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -44,7 +44,7 @@ void run_release(const std::filesystem::path& file, const std::string& session, 
   const auto lock = tree.try_lock();
   if (lock)
     console.err
-        << "warning: isoshift watch is not running: whether other X-rays speak against this result is known only "
+        << "warning: isoshift room watch is not running: whether other X-rays speak against this result is known only "
            "up to when it last ran\n";
   ConsoleObserver observer(console);
   SystemClock clock;
@@ -56,10 +56,10 @@ void run_release(const std::filesystem::path& file, const std::string& session, 
   if (tree.pending_of(release).empty())
     console.out << "sent\n";
   else if (lock)
-    console.out
-        << "not sent yet, and isoshift watch is not running: once it runs, it tries until every peer has confirmed\n";
+    console.out << "not sent yet, and isoshift room watch is not running: once it runs, it tries until every peer has "
+                   "confirmed\n";
   else
-    console.out << "isoshift watch sends it, and tries until every peer has confirmed\n";
+    console.out << "isoshift room watch sends it, and tries until every peer has confirmed\n";
 }
 
 }  // namespace
@@ -74,7 +74,7 @@ void add_release_command(CLI::App& app, Console& console, int& exit_status) {
   CLI::App* command =
       app.add_subcommand("release", "Release a result that watch holds, and send it to the DICOM peers");
   command->footer(
-      "\nExample:\n  isoshift release 3fa94c1e02b7 --by \"J. Doe\"\n\n"
+      "\nExample:\n  isoshift room release 3fa94c1e02b7 --by \"J. Doe\"\n\n"
       "Checks that the result was not changed after the registration, and records who released it, as which\n"
       "user of the system. Then sends report.dcm and, if the result has one, spatial_registration.dcm.\n\n"
       "A result against which other X-rays of the patient speak is refused, unless they are newer and have a\n"

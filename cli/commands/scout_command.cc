@@ -1,4 +1,4 @@
-// isoshift scout: a CT against its own scout.
+// isoshift qa scout: a CT against its own scout.
 
 #include <fmt/format.h>
 
@@ -52,7 +52,7 @@ void add_scout_command(CLI::App& app, Console& console, int& exit_status) {
   CLI::App* command = app.add_subcommand(
       "scout", "Register a CT to its own scout, an X-ray at a known pose: the answer should be nothing");
   command->footer(
-      "\nExample:\n  isoshift scout planning_ct/ scout.dcm -o result\n\n"
+      "\nExample:\n  isoshift qa scout planning_ct/ scout.dcm -o result\n\n"
       "A scout (topogram, surview) sees two axes of translation and the rotation about its rays.\n"
       "Exit status: 0 accepted, 1 failed, 2 usage, 3 review, 4 rejected.");
   command->add_option("ct", request.ct, "Folder or file of the CT")->required()->type_name("PATH");

@@ -1,4 +1,4 @@
-// isoshift serve: the room's screen, as web pages.
+// isoshift room serve: the room's screen, as web pages.
 
 #include <fmt/format.h>
 
@@ -51,8 +51,8 @@ void add_serve_command(CLI::App& app, Console& console, int& exit_status) {
   CLI::App* command =
       app.add_subcommand("serve", "Show the sessions of a treatment room in browsers, and release them");
   command->footer(
-      "\nExamples:\n  isoshift serve /etc/isoshift/serve.json\n  isoshift serve --init room\n\n"
-      "Shows what isoshift watch has registered, until it is stopped. Whoever may, releases results there.\n"
+      "\nExamples:\n  isoshift room serve /etc/isoshift/serve.json\n  isoshift room serve --init room\n\n"
+      "Shows what isoshift room watch has registered, until it is stopped. Whoever may, releases results there.\n"
       "docs/commands/serve.md describes the serve file; docs/treatment-room.md leads through a first room.");
   CLI::Option* file =
       command

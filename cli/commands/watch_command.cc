@@ -1,4 +1,4 @@
-// isoshift watch: registers what comes into a treatment room, and holds the results until they are released.
+// isoshift room watch: registers what comes into a treatment room, and holds the results until they are released.
 
 #include <fmt/format.h>
 
@@ -70,7 +70,7 @@ void add_watch_command(CLI::App& app, Console& console, int& exit_status) {
   CLI::App* command =
       app.add_subcommand("watch", "Register X-rays as they arrive from a treatment room, and hold the results");
   command->footer(
-      "\nExample:\n  isoshift watch /etc/isoshift/watch.json\n\n"
+      "\nExample:\n  isoshift room watch /etc/isoshift/watch.json\n\n"
       "Follows a folder or an Orthanc server until it is stopped. index.html in the folder of the results lists the\n"
       "sessions. Nothing is sent before it is released. docs/commands/watch.md describes the watch file.");
   command

@@ -26,7 +26,7 @@ Eigen::Matrix<double, 3, 4> matrix_from(const std::vector<std::vector<double>>& 
   return matrix;
 }
 
-// What isoshift geometry --json says of an imager; every error, so that none counts as known by being left out.
+// What isoshift qa geometry --json says of an imager; every error, so that none counts as known by being left out.
 std::optional<KnownImager> known_imager_from(JsonSection& section) {
   std::optional<JsonSection> errors = section.section("imager_errors");
   const bool is_corrected = section.find<bool>("correct_imager", "true or false").value_or(false);

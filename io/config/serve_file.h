@@ -1,5 +1,5 @@
 #pragma once
-// Where isoshift serve listens, who may use it, and whose results it shows: a JSON file (docs/commands/serve.md).
+// Where isoshift room serve listens, who may use it, and whose results it shows: a JSON file (docs/commands/serve.md).
 
 #include <array>
 #include <cstdint>

@@ -1,5 +1,5 @@
 #pragma once
-// What isoshift watch follows, where its results go, and to which peers released results are sent: a JSON file
+// What isoshift room watch follows, where its results go, and to which peers released results are sent: a JSON file
 // (docs/commands/watch.md).
 
 #include <cstdint>

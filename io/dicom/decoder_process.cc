@@ -69,7 +69,8 @@ class DecoderProcess {
 
  private:
   static const std::filesystem::path& program() {
-    if (decoder_program().empty()) throw Error(
+    if (decoder_program().empty())
+      throw Error(
           "compressed pixel data cannot be decoded: the program isoshift, which decodes it, was not found.\n"
           "       Install it, or name it: ISOSHIFT_PROGRAM in the environment of Python, use_decoder() in C++.");
     return decoder_program();

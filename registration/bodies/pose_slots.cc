@@ -1,7 +1,7 @@
 #include "registration/bodies/pose_slots.h"
 
-#include "geometry/rotation.h"
 #include "geometry/linear_algebra.h"
+#include "geometry/rotation.h"
 #include "registration/pose_parameters.h"
 
 namespace isoshift {

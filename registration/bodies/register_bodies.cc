@@ -60,14 +60,16 @@ void report_match(const BodyScene& scene, const Carriers& carriers, const Carrie
     match.similarity_final = at_end[view];
     // The step from the common optimum to where this view and the springs are best.
     const QuadraticModel& alone = parts.views[view];
-    const Eigen::MatrixXd held = alone.curvature + parts.springs.curvature +
-                                 kSpringOfOneView * Eigen::MatrixXd::Identity(alone.curvature.rows(), alone.curvature.cols());
+    const Eigen::MatrixXd held =
+        alone.curvature + parts.springs.curvature +
+        kSpringOfOneView * Eigen::MatrixXd::Identity(alone.curvature.rows(), alone.curvature.cols());
     const Eigen::MatrixXd seen =
         product(seen_motions(level[view].view, points) / pixels_per_mm(level[view].view), target_motion);
     const auto count = static_cast<double>(points.size());
     const Eigen::VectorXd wanted = solve_symmetric(held, alone.gradient + parts.springs.gradient);
-    match.contradiction = {.mm = product(seen, wanted).norm() / std::sqrt(count),
-                           .sigma_mm = std::sqrt(product(seen, solve_symmetric(held, seen.transpose())).trace() / count)};
+    match.contradiction = {
+        .mm = product(seen, wanted).norm() / std::sqrt(count),
+        .sigma_mm = std::sqrt(product(seen, solve_symmetric(held, seen.transpose())).trace() / count)};
   }
 }
 

@@ -85,7 +85,8 @@ class TurnedViews::Implementation {
     const QuadraticModel& by_slots = parts.views[view];
     Eigen::MatrixXd together(by_slots.gradient.size(), 6);
     for (std::size_t slot = 0; slot < slots.count(); ++slot)
-      together.middleRows<6>(static_cast<Eigen::Index>(6 * slot)) = product(inverse(slots.motions(slot, at_base)), ways);
+      together.middleRows<6>(static_cast<Eigen::Index>(6 * slot)) =
+          product(inverse(slots.motions(slot, at_base)), ways);
     // What the view does not see is held.
     Eigen::VectorXd held = Eigen::VectorXd::Constant(6, kSpringOfOneView);
     held.tail<3>() *= kLeverMm * kLeverMm;

@@ -2,7 +2,6 @@
 
 #include "geometry/linear_algebra.h"
 
-
 namespace isoshift {
 namespace {
 

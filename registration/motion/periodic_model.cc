@@ -61,7 +61,8 @@ PeriodicTrajectory::PeriodicTrajectory(const std::vector<double>& times_s,
     : coefficients_(fitted(phases_of(times_s, period_s), positions_mm, kHarmonics)) {}
 
 Eigen::VectorXd PeriodicTrajectory::at(double phase_rad) const {
-  return transposed_product(coefficients_, harmonics(phase_rad, static_cast<int>(coefficients_.rows() / 2)).transpose());
+  return transposed_product(coefficients_,
+                            harmonics(phase_rad, static_cast<int>(coefficients_.rows() / 2)).transpose());
 }
 
 Eigen::VectorXd PeriodicTrajectory::derivative_at(double phase_rad) const {

@@ -97,7 +97,7 @@ WantedMotion without_spring(const std::vector<double>& parameters, const PoseInf
   Eigen::Matrix<double, 6, 1> units = Eigen::Matrix<double, 6, 1>::Ones();
   units.tail<3>() /= kLeverMm;
   return {.motion = units.asDiagonal() * product(inverse(information.held_curvature(kWeakSpring)),
-                                                product(information.held_curvature(kSpring), held)),
+                                                 product(information.held_curvature(kSpring), held)),
           .covariance = units.asDiagonal() * information.covariance(kWeakSpring) * units.asDiagonal()};
 }
 
@@ -158,9 +158,8 @@ Contradictions contradictions(const RendererPyramid& renderers, const FixedViews
     const Eigen::MatrixXd motions = seen_of_parameters(image.view, error, wanted.parameters.size());
     const Eigen::Map<const Eigen::VectorXd> parameters(wanted.parameters.data(),
                                                        static_cast<Eigen::Index>(wanted.parameters.size()));
-    result.of_views.push_back(
-        {.mm = product(motions, parameters).norm() / std::sqrt(targets),
-         .sigma_mm = std::sqrt(propagated(motions, wanted.covariance).trace() / targets)});
+    result.of_views.push_back({.mm = product(motions, parameters).norm() / std::sqrt(targets),
+                               .sigma_mm = std::sqrt(propagated(motions, wanted.covariance).trace() / targets)});
   }
   if (dof == Dof::kRigid) result.turn = turn_between(alone, room_from_patient);
   return result;

@@ -1,4 +1,4 @@
-// isoshift audit-setup, from folders of results to the page.
+// isoshift qa audit-setup, from folders of results to the page.
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
@@ -37,7 +37,7 @@ class AuditSetupCommandTest : public testing::Test {
   fs::path table() const { return folder_ / "used.csv"; }
   fs::path output() const { return folder_ / "audit"; }
   CommandOutcome run(std::vector<std::string> flags = {}) {
-    flags.insert(flags.begin(), {"audit-setup", results().string()});
+    flags.insert(flags.begin(), {"qa", "audit-setup", results().string()});
     return run_command(flags);
   }
 
@@ -106,7 +106,7 @@ TEST_F(AuditSetupCommandTest, LinksReportsWhateverTheyAreCalled) {
   fs::rename(results() / MadeArchive::name_of(3), results() / "day #3? 50% M\xC3\xBCller");
   const fs::path before = fs::current_path();
   fs::current_path(folder_.path());
-  const CommandOutcome outcome = run_command({"audit-setup", "results", "-o", "audit"});
+  const CommandOutcome outcome = run_command({"qa", "audit-setup", "results", "-o", "audit"});
   fs::current_path(before);
   ASSERT_EQ(outcome.exit_status, 0) << outcome.err;
   const std::string page = text_of(output() / "audit.html"), csv = text_of(output() / "audit.csv");

@@ -122,8 +122,8 @@ TEST_F(AuditedPhantomsCommandTest, DriftSwapAndWrongSignsAreFoundAndNothingElse)
   }
   write_table(fractions);
 
-  const CommandOutcome outcome =
-      run_command({"audit-setup", (folder_ / "results").string(), "--used", (folder_ / "used.csv").string(), "--json"});
+  const CommandOutcome outcome = run_command(
+      {"qa", "audit-setup", (folder_ / "results").string(), "--used", (folder_ / "used.csv").string(), "--json"});
   ASSERT_EQ(outcome.exit_status, 0) << outcome.err;
   const Json audit = Json::parse(outcome.out);
   const auto accepted = std::ranges::count_if(fractions, &Fraction::is_accepted);

@@ -1,4 +1,4 @@
-// isoshift commission, from results of sessions to what is signed.
+// isoshift qa commission, from results of sessions to what is signed.
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
@@ -66,7 +66,7 @@ class CommissionCommandTest : public testing::Test {
 
   CommandOutcome run(std::vector<std::string> flags) {
     replace_text(folder_ / "poses.csv", poses_);
-    flags.insert(flags.begin(), {"commission", (folder_ / "results").string()});
+    flags.insert(flags.begin(), {"qa", "commission", (folder_ / "results").string()});
     return run_command(flags);
   }
   std::string path(const std::string& name) const { return (folder_ / name).string(); }
@@ -224,7 +224,7 @@ TEST_F(CommissionCommandTest, WhatCannotBeDoneIsRefused) {
   poses_ += "other,0,0,0,0,0,0\n";
   EXPECT_THAT(refusal({"--moves", path("poses.csv")}), HasSubstr("names session other"));
   std::filesystem::create_directories(folder_ / "empty");
-  const CommandOutcome empty = run_command({"commission", path("empty")});
+  const CommandOutcome empty = run_command({"qa", "commission", path("empty")});
   EXPECT_EQ(empty.exit_status, kExitFailed);
   EXPECT_THAT(empty.err, HasSubstr("isoshift batch"));
   EXPECT_FALSE(std::filesystem::exists(folder_ / "out"));

@@ -104,7 +104,7 @@ TEST(ReleaseCommandTest, TheNameOfWhoReleasesIsOneLineOfText) {
   for (const auto& [name, why] : {std::pair("", "the argument is empty"), std::pair("  ", "expected the name"),
                                   std::pair("J. Doe\nverdict accepted", "holds a line break"),
                                   std::pair("J. \xff\xfe", "is not valid UTF-8 text")}) {
-    const CommandOutcome outcome = run_command({"release", "3fa94c1e02b7", "--by", name});
+    const CommandOutcome outcome = run_command({"room", "release", "3fa94c1e02b7", "--by", name});
     EXPECT_EQ(outcome.exit_status, 2) << name;
     EXPECT_THAT(outcome.err, HasSubstr(std::string("--by: ") + why));
   }

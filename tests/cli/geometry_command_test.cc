@@ -1,4 +1,4 @@
-// isoshift geometry, from X-rays of balls by a panel that does not lie where its files say.
+// isoshift qa geometry, from X-rays of balls by a panel that does not lie where its files say.
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
@@ -43,8 +43,8 @@ class GeometryCommandTest : public testing::Test {
 
   static std::string path(const std::string& name) { return (*folder_ / name).string(); }
   static CommandOutcome run(std::vector<std::string> more) {
-    more.insert(more.begin(), {"geometry", path("monday"), path("tuesday"), path("friday"), "--ct", path("monday/CT"),
-                               "--plan", path("monday/RTPLAN.dcm")});
+    more.insert(more.begin(), {"qa", "geometry", path("monday"), path("tuesday"), path("friday"), "--ct",
+                               path("monday/CT"), "--plan", path("monday/RTPLAN.dcm")});
     return run_command(more);
   }
 
@@ -77,7 +77,7 @@ TEST_F(GeometryCommandTest, FindsAPlantedShiftRollAndTilt) {
 // Tilts about x act like other places of the balls along y, unless the phantom moves along y.
 TEST_F(GeometryCommandTest, OfOneSessionTheMostIsFoundBesideItsPose) {
   const CommandOutcome outcome = run_command(
-      {"geometry", path("tuesday"), "--ct", path("monday/CT"), "--plan", path("monday/RTPLAN.dcm"), "--json"});
+      {"qa", "geometry", path("tuesday"), "--ct", path("monday/CT"), "--plan", path("monday/RTPLAN.dcm"), "--json"});
   ASSERT_EQ(outcome.exit_status, kExitAccepted) << outcome.err;
   const Json json = Json::parse(outcome.out);
   const Json imager = json["imagers"]["kV"];
@@ -94,7 +94,7 @@ TEST_F(GeometryCommandTest, WhatIsNotDeterminedIsNamed) {
   std::filesystem::create_directories(path("one-view"));
   std::filesystem::copy_file(path("tuesday/RTIMAGE/KV_G000.dcm"), path("one-view/KV_G000.dcm"));
   const CommandOutcome outcome =
-      run_command({"geometry", path("one-view"), "--ct", path("monday/CT"), "--plan", path("monday/RTPLAN.dcm")});
+      run_command({"qa", "geometry", path("one-view"), "--ct", path("monday/CT"), "--plan", path("monday/RTPLAN.dcm")});
   EXPECT_EQ(outcome.exit_status, kExitAccepted) << outcome.err;
   EXPECT_THAT(outcome.out, HasSubstr("not determined:"));
   EXPECT_THAT(outcome.out, HasSubstr("acts like a shift along y"));
@@ -112,7 +112,7 @@ TEST_F(GeometryCommandTest, PatientsTellRollAndTransverseShift) {
     const CommandOutcome registered = run_command({"register", study, "-o", path(std::string("results/") + seed)});
     ASSERT_NE(registered.exit_status, kExitFailed) << registered.err;
   }
-  const CommandOutcome outcome = run_command({"geometry", "--patients", path("results"), "--json"});
+  const CommandOutcome outcome = run_command({"qa", "geometry", "--patients", path("results"), "--json"});
   ASSERT_EQ(outcome.exit_status, kExitAccepted) << outcome.err;
   const Json json = Json::parse(outcome.out);
   const Json imager = json["imagers"]["kV"];
@@ -122,15 +122,15 @@ TEST_F(GeometryCommandTest, PatientsTellRollAndTransverseShift) {
   for (const char* unknown : {"shift_y_mm", "distance_mm", "tilt_x_deg", "tilt_y_deg"})
     EXPECT_FALSE(imager[unknown]["is_determined"].get<bool>()) << unknown;
   // One of them says too little by itself, and twice as much by its copy is an error.
-  const CommandOutcome one = run_command({"geometry", "--patients", path("results/11")});
+  const CommandOutcome one = run_command({"qa", "geometry", "--patients", path("results/11")});
   EXPECT_THAT(one.out, HasSubstr("kV saw 1 CT: nothing is determined by fewer than 4"));
   std::filesystem::copy(path("results/11"), path("results/copy"), std::filesystem::copy_options::recursive);
-  EXPECT_THAT(run_command({"geometry", "--patients", path("results")}).err, HasSubstr("are of the same X-ray"));
-  EXPECT_THAT(run_command({"geometry", "--patients", path("results"), path("monday")}).err,
+  EXPECT_THAT(run_command({"qa", "geometry", "--patients", path("results")}).err, HasSubstr("are of the same X-ray"));
+  EXPECT_THAT(run_command({"qa", "geometry", "--patients", path("results"), path("monday")}).err,
               HasSubstr("or with --patients"));
   for (const std::vector<std::string>& of_phantoms : std::vector<std::vector<std::string>>{
            {"--moves", path("positions.csv")}, {"--ct", path("monday/CT")}, {"--couch-angle", "0"}}) {
-    std::vector<std::string> words = {"geometry", "--patients", path("results")};
+    std::vector<std::string> words = {"qa", "geometry", "--patients", path("results")};
     words.insert(words.end(), of_phantoms.begin(), of_phantoms.end());
     const CommandOutcome refused = run_command(words);
     EXPECT_EQ(refused.exit_status, kExitUsage) << of_phantoms.front();
@@ -158,7 +158,7 @@ TEST_F(GeometryCommandTest, MistakesAreNamed) {
               HasSubstr("give one of them"));
   const CommandOutcome head = run_command({"phantom", "-o", path("head"), "--voxel-mm", "3", "--image-pixels", "128"});
   ASSERT_EQ(head.exit_status, 0);
-  const CommandOutcome no_balls = run_command({"geometry", path("head")});
+  const CommandOutcome no_balls = run_command({"qa", "geometry", path("head")});
   EXPECT_EQ(no_balls.exit_status, kExitFailed);
   EXPECT_THAT(no_balls.err, HasSubstr("balls"));
 }

@@ -42,7 +42,7 @@ class MachineProfileCommandTest : public testing::Test {
 
   static std::string path(const std::string& name) { return (*folder_ / name).string(); }
 
-  // A profile that knows the panel's shift, in the words of isoshift geometry --json.
+  // A profile that knows the panel's shift, in the words of isoshift qa geometry --json.
   static std::string profile(const std::string& name, bool corrects) {
     Json errors;
     for (const ImagerParameterInfo& info : imager_parameters())

@@ -1,4 +1,4 @@
-// isoshift scout, from files to the offset. The scout is a scan of shapes by lines, written here without any camera,
+// isoshift qa scout, from files to the offset. The scout is a scan of shapes by lines, written here without any camera,
 // projection or renderer of the program.
 
 #include <gmock/gmock.h>
@@ -84,7 +84,7 @@ class ScoutCommandTest : public testing::Test {
   }
 
   CommandOutcome run(std::vector<std::string> flags = {}) {
-    flags.insert(flags.begin(), {"scout", (study_.path() / "CT").string(), scout().string()});
+    flags.insert(flags.begin(), {"qa", "scout", (study_.path() / "CT").string(), scout().string()});
     return run_command(flags);
   }
   Json result(std::vector<std::string> flags = {}) {
@@ -183,11 +183,11 @@ TEST_F(ScoutCommandTest, ItsFilesAreWrittenWholeOrNotAtAll) {
     EXPECT_EQ(written["files_sha256"][name], sha256_of_file(folder / name)) << name;
   EXPECT_EQ(written["patient"]["id"], result()["patient"]["id"]);
   // Refused before anything is read.
-  const CommandOutcome again = run_command({"scout", "no-ct", "no-scout", "-o", folder.string()});
+  const CommandOutcome again = run_command({"qa", "scout", "no-ct", "no-scout", "-o", folder.string()});
   EXPECT_EQ(again.exit_status, 1);
   EXPECT_THAT(again.err, HasSubstr("--overwrite"));
   EXPECT_EQ(run({"-o", folder.string(), "--overwrite"}).exit_status, outcome.exit_status);
-  EXPECT_EQ(run_command({"scout", "no-ct", "no-scout", "-o", (study_.path() / "none").string()}).exit_status, 1);
+  EXPECT_EQ(run_command({"qa", "scout", "no-ct", "no-scout", "-o", (study_.path() / "none").string()}).exit_status, 1);
   EXPECT_FALSE(std::filesystem::exists(study_.path() / "none"));
 }
 
@@ -254,9 +254,9 @@ TEST_F(ScoutCommandTest, PaddingShowsNothing) {
 TEST_F(ScoutCommandTest, WrongCallsSayWhatIsWanted) {
   write_scout({});
   const std::string ct = (study_.path() / "CT").string();
-  EXPECT_THAT(run_command({"scout", scout().string(), ct}).err,
+  EXPECT_THAT(run_command({"qa", "scout", scout().string(), ct}).err,
               HasSubstr(ct + ": is a folder, expected the file of a scout (the CT is named first, then its scout)"));
-  EXPECT_THAT(run_command({"scout", scout().string(), scout().string()}).err, HasSubstr("holds no CT series"));
+  EXPECT_THAT(run_command({"qa", "scout", scout().string(), scout().string()}).err, HasSubstr("holds no CT series"));
   const CommandOutcome splat = run({"--renderer", "splat"});
   EXPECT_EQ(splat.exit_status, 2);
   EXPECT_THAT(splat.err, HasSubstr("--renderer splat: cannot render scouts; cpu, raycast, siddon and trilinear can"));

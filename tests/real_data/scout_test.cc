@@ -16,7 +16,7 @@ namespace {
 using Json = nlohmann::json;
 
 Json found_by(const std::filesystem::path& scout, std::vector<std::string> flags) {
-  flags.insert(flags.begin(), {"scout", (real_data() / "head/CT").string(), scout.string(), "--json"});
+  flags.insert(flags.begin(), {"qa", "scout", (real_data() / "head/CT").string(), scout.string(), "--json"});
   return Json::parse(run_command(flags).out);
 }
 

@@ -64,7 +64,7 @@ TEST_F(WinstonLutz, CommissionsItsLocalization) {
   run_command({"batch", (folder_ / "cases.csv").string(), "-o", results, "--dof", "translation", "--isocenter", "0,0,0",
                "--patient-position", "HFS", "--intensity", "LIN+"});
 
-  const auto moves = nlohmann::json::parse(run_command({"commission", results, "--json"}).out);
+  const auto moves = nlohmann::json::parse(run_command({"qa", "commission", results, "--json"}).out);
   EXPECT_EQ(moves["outcome"], "untested");
   EXPECT_EQ(moves["known_from"], "read-outs");
   EXPECT_EQ(moves["axes"]["x_mm"]["polarity"], "passed");
@@ -74,7 +74,7 @@ TEST_F(WinstonLutz, CommissionsItsLocalization) {
   EXPECT_EQ(moves["tested"]["gantry_angles_deg"], nlohmann::json({"0/90/180/270"}));
 
   const auto positions = nlohmann::json::parse(
-      run_command({"commission", results, "--positions", (folder_ / "positions.csv").string(), "--json"}).out);
+      run_command({"qa", "commission", results, "--positions", (folder_ / "positions.csv").string(), "--json"}).out);
   for (const char* axis : {"x_mm", "y_mm", "z_mm"}) {
     EXPECT_LT(moves["axes"][axis]["largest"], 0.1) << axis;
     EXPECT_LT(std::abs(positions["axes"][axis]["bias"].get<double>()), 0.1) << axis;
@@ -86,9 +86,10 @@ TEST_F(WinstonLutz, TellsOfItsReceptorWhatASingleBallCan) {
   ISOSHIFT_NEED_REAL_DATA("winston-lutz");
   for (const char* name : {"cardinal", "lat3mm", "ball-ct"})
     unpack((real_data() / "winston-lutz" / fmt::format("{}.zip", name)).string());
-  const CommandOutcome outcome = run_command(
-      {"geometry", (folder_ / "cardinal").string(), (folder_ / "lat3mm").string(), "--ct", (folder_ / "ball").string(),
-       "--isocenter", "0,0,0", "--patient-position", "HFS", "--intensity", "LIN+", "--json"});
+  const CommandOutcome outcome =
+      run_command({"qa", "geometry", (folder_ / "cardinal").string(), (folder_ / "lat3mm").string(), "--ct",
+                   (folder_ / "ball").string(), "--isocenter", "0,0,0", "--patient-position", "HFS", "--intensity",
+                   "LIN+", "--json"});
   ASSERT_EQ(outcome.exit_status, kExitAccepted) << outcome.err;
   const auto json = nlohmann::json::parse(outcome.out);
   EXPECT_EQ(json["places_used"], 8);

@@ -1,4 +1,4 @@
-"""What README.txt of isoshift serve --init leads through: two Orthanc servers, watch, serve, a phantom, and its result at the peer.
+"""What README.txt of isoshift room serve --init leads through: two Orthanc servers, watch, serve, a phantom, and its result at the peer.
 
   first_room.py ISOSHIFT WORK
 
@@ -25,8 +25,8 @@ PORTS = ("8142", "4142", "8143", "4143", "8443")
 
 def main(program, work):
     room = work / "room"
-    subprocess.run([program, "serve", "--init", room], check=True, capture_output=True)
-    again = subprocess.run([program, "serve", "--init", room], capture_output=True, text=True, check=False)
+    subprocess.run([program, "room", "serve", "--init", room], check=True, capture_output=True)
+    again = subprocess.run([program, "room", "serve", "--init", room], capture_output=True, text=True, check=False)
     expect(again.returncode == 1, "an earlier room was replaced")
     for file in room.iterdir():
         expect(file.name == ".isoshift" or file.stat().st_mode & 0o077 == 0, f"others can read {file}")
@@ -62,8 +62,8 @@ def main(program, work):
         start("Orthanc", "source.json")
         start("Orthanc", "record.json")
         wait_for(lambda: answers("8142", "/system", "source") and answers("8143", "/system", "record"), 30, "the Orthanc servers")
-        start("isoshift", "watch", "watch.json")
-        start("isoshift", "serve", "serve.json")
+        start("isoshift", "room", "watch", "watch.json")
+        start("isoshift", "room", "serve", "serve.json")
         subprocess.run([program, "phantom", "-o", work / "study"], check=True, capture_output=True)
         subprocess.run(["storescu", "+sd", "+r", "+sp", "*.dcm", "-aec", "SOURCE", "localhost", ports["4142"], work / "study"], check=True, capture_output=True)
         sessions = room / "results" / "sessions"
@@ -74,7 +74,7 @@ def main(program, work):
         wait_for(lambda: b"Sign in" in fetch("8443", "/sign-in"), 10, "the screen")
         time.sleep(1)
         expect(fetch("8143", "/instances", "record").strip() == b"[]", "something was sent before its release")
-        subprocess.run([program, "release", session, "--by", "J. Doe", "--watch", "watch.json"], cwd=room, check=True, capture_output=True)
+        subprocess.run([program, "room", "release", session, "--by", "J. Doe", "--watch", "watch.json"], cwd=room, check=True, capture_output=True)
         wait_for(lambda: len(json.loads(fetch("8143", "/instances", "record"))) == 2, 60, "the report and the registration at the peer")
         released = json.loads((room / "results" / "released" / f"{session}.json").read_text())
         expect("signature" in released, "the release is not signed")

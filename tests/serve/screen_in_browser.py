@@ -171,9 +171,9 @@ def main(program, work):
         wait_for(lambda: len(list((results / "sessions").glob("[!.]*/result.json"))) == count, 120, "a result")
         return time.time()
 
-    watch = subprocess.Popen([program, "watch", work / "watch.json"], stderr=(work / "watch.log").open("w"))
+    watch = subprocess.Popen([program, "room", "watch", work / "watch.json"], stderr=(work / "watch.log").open("w"))
     wait_for(lambda: (results / "engine.json").exists(), 30, "the engine")
-    serve = subprocess.Popen([program, "serve", work / "serve.json"], stderr=log.open("w"))
+    serve = subprocess.Popen([program, "room", "serve", work / "serve.json"], stderr=log.open("w"))
     wait_for(lambda: "serving" in log.read_text(), 30, "the server")
     address = re.search(r"http://\S+", log.read_text())[0]
     doe = roe = None

@@ -133,7 +133,7 @@ Section margins(const SetupAudit& audit) {
 }  // namespace
 
 std::string audit_html(const SetupAudit& audit, const std::filesystem::path& place) {
-  ResultsPage page{.title = "isoshift audit-setup",
+  ResultsPage page{.title = "isoshift qa audit-setup",
                    .summary = {counts_of(audit) + ".", "Not for clinical use unless validated by the site."}};
   page.sections.push_back(findings(audit, place));
   if (audit.compared > 0) {

@@ -58,8 +58,7 @@ bool are_on_a_line(const Eigen::Matrix3Xd& points) {
 Eigen::Isometry3d motion_between(const Eigen::Matrix3Xd& from, const Eigen::Matrix3Xd& to) {
   if (from.cols() > 2) return rigid_motion_between(from, to);
   Eigen::Isometry3d motion = Eigen::Isometry3d::Identity();
-  if (from.cols() == 2)
-    motion.linear() = rotation_between(from.col(1) - from.col(0), to.col(1) - to.col(0));
+  if (from.cols() == 2) motion.linear() = rotation_between(from.col(1) - from.col(0), to.col(1) - to.col(0));
   motion.translation() = to.rowwise().mean() - motion.linear() * from.rowwise().mean();
   return motion;
 }

@@ -148,7 +148,7 @@ void AuditLog::Proofs::add(const Json& line) {
 void AuditLog::refuse_another_log() const {
   throw Error(
       fmt::format("{}: is gone, was cut, or is another file than before. Nothing is released or sent until "
-                  "isoshift watch and isoshift serve are started again, by a person who knows why",
+                  "isoshift room watch and isoshift room serve are started again, by a person who knows why",
                   path_.string()));
 }
 
@@ -177,7 +177,7 @@ const AuditLog::Proofs& AuditLog::proofs() const {
   if (!chain_.broken.empty())
     throw Error(fmt::format(
         "{}: line {} does not follow from those before it: lines were changed, taken out or put in. Nothing "
-        "is released or sent until a person has looked (isoshift audit) and has recorded that",
+        "is released or sent until a person has looked (isoshift room audit) and has recorded that",
         path_.string(), chain_.broken.front()));
   read_version_ = {.inode = status.st_ino, .size = status.st_size, .written = status.st_mtim};
   return proofs_;

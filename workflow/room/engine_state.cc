@@ -71,7 +71,7 @@ std::optional<EngineSeen> read_engine_state(const std::filesystem::path& results
     seen.state.waiting = sessions_from(json.at("waiting"));
     seen.state.chosen = sessions_from(json.at("chosen"));
   } catch (const nlohmann::json::exception& error) {
-    throw Error(fmt::format("{}: is not what isoshift watch writes: {}", file.string(), error.what()));
+    throw Error(fmt::format("{}: is not what isoshift room watch writes: {}", file.string(), error.what()));
   }
   return seen;
 }

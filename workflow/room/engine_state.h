@@ -1,5 +1,5 @@
 #pragma once
-// What isoshift watch is doing, in engine.json of the results tree: for whoever shows it. The age of the file says
+// What isoshift room watch is doing, in engine.json of the results tree: for whoever shows it. The age of the file says
 // whether the engine runs.
 
 #include <chrono>

@@ -31,7 +31,7 @@ using Json = nlohmann::ordered_json;
 
 constexpr const char* kAgain =
     "Nothing of the session is sent. To have its X-rays registered again, move the session's folder away and restart "
-    "isoshift watch";
+    "isoshift room watch";
 
 // What a statement says, read by `from`.
 template <class From>
@@ -73,7 +73,7 @@ void check_is_owner(const fs::path& results) {
   struct stat of_results{};
   if (::stat(results.c_str(), &of_results) == 0 && of_results.st_uid != ::geteuid())
     throw Error(
-        fmt::format("{}: belongs to another user, who runs isoshift watch: run this command as that user "
+        fmt::format("{}: belongs to another user, who runs isoshift room watch: run this command as that user "
                     "(sudo -u USER)",
                     results.string()));
 }
@@ -120,7 +120,7 @@ std::map<std::string, Objection> ResultsTree::objections() const {
     for (const auto& [session, objection] : read_json_file(file).json.get<std::map<std::string, nlohmann::json>>())
       all[session] = {.words = objection.at("words"), .newer_have_results = objection.at("newer_have_results")};
   } catch (const nlohmann::json::exception&) {
-    throw Error(fmt::format("{}: is not a list of objections as isoshift watch writes it", file.string()));
+    throw Error(fmt::format("{}: is not a list of objections as isoshift room watch writes it", file.string()));
   }
   return all;
 }
@@ -222,7 +222,7 @@ RegistrationOrder ResultsTree::order(const std::string& session) const {
   if (!std::getline(text, line))
     throw Error(
         fmt::format("session {}: how it was registered is not known: {} cannot be read. An earlier version of "
-                    "isoshift watch registered it",
+                    "isoshift room watch registered it",
                     session, file.string()));
   return registration_order_from(line, file.string());
 }
@@ -276,7 +276,7 @@ std::string ResultsTree::take_over(const std::string& session) {
     return Error(fmt::format("{}: {}. {}", result.folder.string(), why, kHandOverStatement.consequence));
   };
   const auto statement = newest_statement(kHandOverStatement, path_, xrays, audit_, key_);
-  if (!statement) throw refuse("nobody has handed it over on the screen of isoshift serve");
+  if (!statement) throw refuse("nobody has handed it over on the screen of isoshift room serve");
   const std::string proof = audit_.newest_statement(kHandOverStatement.event, xrays);
   if (const std::string made = audit_.made_of_hand_over(proof); !made.empty() && fs::exists(this->session(made)))
     throw refuse(fmt::format("what was handed over last is session {} already", made));
@@ -340,15 +340,15 @@ std::optional<Release> ResultsTree::release_of(const std::string& session) const
   const fs::path path = release_file(session);
   const JsonFile file = read_json_file(path);
   if (!audit_.has_release(session, file.sha256))
-    throw Error(
-        fmt::format("{}: is not the newest release of session {} in audit.jsonl: isoshift release did not write this "
-                    "file, or it was changed since, or another release followed it. Nothing of the session is sent. "
-                    "Remove the file, and release the session with isoshift release",
-                    path.string(), session));
+    throw Error(fmt::format(
+        "{}: is not the newest release of session {} in audit.jsonl: isoshift room release did not write this "
+        "file, or it was changed since, or another release followed it. Nothing of the session is sent. "
+        "Remove the file, and release the session with isoshift room release",
+        path.string(), session));
   if (!is_signed(file.json, key_))
     throw Error(fmt::format(
         "{}: is not signed by the signing_key of the watch file. Nothing of the session is sent. Remove the "
-        "file, and release the session with isoshift release",
+        "file, and release the session with isoshift room release",
         path.string()));
   Release release;
   try {
@@ -359,7 +359,7 @@ std::optional<Release> ResultsTree::release_of(const std::string& session) const
   if (release.record != registered(session).sha256)
     throw Error(
         fmt::format("{}: releases an earlier registration of the session. Nothing of the session is sent. "
-                    "Remove the file, and release the session with isoshift release",
+                    "Remove the file, and release the session with isoshift room release",
                     path.string()));
   return release;
 }
@@ -438,22 +438,23 @@ void ResultsTree::check_stands(const std::string& session) const {
     throw Error(fmt::format("session {}: its X-rays have a newer result, session {}", session, newest));
   if (is_handed_over(session))
     throw Error(fmt::format(
-        "session {}: its X-rays have a newer result by hand, which isoshift watch has yet to take over ({})", session,
-        handed_over_folder(session).string()));
+        "session {}: its X-rays have a newer result by hand, which isoshift room watch has yet to take over ({})",
+        session, handed_over_folder(session).string()));
   if (const auto decided = decision(session); decided && decided->forbids())
-    throw Error(fmt::format("session {}: {}. Take that back first, on the screen of isoshift serve", session,
+    throw Error(fmt::format("session {}: {}. Take that back first, on the screen of isoshift room serve", session,
                             in_words(*decided)));
   check_inputs(session);
 }
 
-// The files from which the X-rays were registered last, as they are on the disk now: isoshift watch looks at files only
-// when no more of them come. What an earlier version of isoshift has registered is not compared.
+// The files from which the X-rays were registered last, as they are on the disk now: isoshift room watch looks at files
+// only when no more of them come. What an earlier version of isoshift has registered is not compared.
 void ResultsTree::check_inputs(const std::string& session) const {
   const std::optional<SessionInputs> before = inputs(session);
   if (!before || !fs::exists(order_file(name_of_xrays(session)))) return;
   if (const std::string parts = what_changed(*before, order(session).parts, FileContents()); !parts.empty())
-    throw Error(fmt::format("session {}: {} changed after the registration. isoshift watch registers its X-rays again",
-                            session, parts));
+    throw Error(
+        fmt::format("session {}: {} changed after the registration. isoshift room watch registers its X-rays again",
+                    session, parts));
 }
 
 void ResultsTree::check_second_person(const SessionRecord& record, const std::string& releaser) const {
@@ -504,7 +505,7 @@ void ResultsTree::remove(const std::string& session, const std::string& by) {
     if (is_to_be_sent(name))
       throw Error(
           fmt::format("session {}: was released and is still to be sent. Wait until it is sent, or reject it on the "
-                      "screen of isoshift serve",
+                      "screen of isoshift room serve",
                       name));
     add_unless_damaged([&] { return xrays_of(this->session(name)); });
   }

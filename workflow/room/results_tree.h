@@ -1,6 +1,6 @@
 #pragma once
-// The folder in which isoshift watch keeps results, releases and deliveries. These files are its only memory. Each is
-// written whole or not at all, so that a process that was stopped at any moment can continue from them:
+// The folder in which isoshift room watch keeps results, releases and deliveries. These files are its only memory. Each
+// is written whole or not at all, so that a process that was stopped at any moment can continue from them:
 //
 //   sessions/NAME/           the result of a session of X-rays
 //   registered/NAME.json     the SHA-256 of every file in that folder when it was registered
@@ -70,7 +70,8 @@ struct MadeResult {
   FileHashes files;
 };
 
-// Throws Error if another user owns the results tree: isoshift watch could not read files that this user writes there.
+// Throws Error if another user owns the results tree: isoshift room watch could not read files that this user writes
+// there.
 void check_is_owner(const std::filesystem::path& results);
 
 class ResultsTree {
@@ -168,8 +169,8 @@ class ResultsTree {
   std::filesystem::file_time_type newest_deletion() const;
 
   bool is_released(const std::string& session) const;
-  // The release of a session, if there is one. Throws Error for a release file that isoshift release did not write, or
-  // that was changed.
+  // The release of a session, if there is one. Throws Error for a release file that isoshift room release did not
+  // write, or that was changed.
   std::optional<Release> release_of(const std::string& session) const;
   // Releases a session with its objects. Throws Error, and releases nothing, if the session does not exist, was
   // rejected, has been released before, or has changed since its registration, if its X-rays have a newer result, if a

@@ -1,5 +1,5 @@
 #pragma once
-// The record of a registered session: which files its folder held when isoshift watch registered it.
+// The record of a registered session: which files its folder held when isoshift room watch registered it.
 
 #include <filesystem>
 #include <map>

@@ -22,7 +22,7 @@ constexpr std::chrono::days kKeptFor(60);  // objects of a patient of whom nothi
 
 FileLock only_watch_of(const ResultsTree& tree) {
   auto lock = tree.try_lock();
-  if (!lock) throw Error(fmt::format("{}: another isoshift watch is working here", tree.path().string()));
+  if (!lock) throw Error(fmt::format("{}: another isoshift room watch is working here", tree.path().string()));
   return *std::move(lock);
 }
 
@@ -55,7 +55,7 @@ Watch::Watch(const WatchFile& watch, const Parts& parts)
 void Watch::round() {
   if (!lock_.is_in_place())
     throw Error(
-        fmt::format("{}: its .watch.lock was removed or replaced, so another isoshift watch may be working here: "
+        fmt::format("{}: its .watch.lock was removed or replaced, so another isoshift room watch may be working here: "
                     "this watch ends",
                     tree_.path().string()));
   set_sendable({});
@@ -163,7 +163,7 @@ void Watch::delete_old_results() {
   next_deletion_ = parts_.clock.now() + std::chrono::days(1);
 }
 
-// Results that this watch or isoshift delete has deleted are not listed any more, and their X-rays not registered.
+// Results that this watch or isoshift room delete has deleted are not listed any more, and their X-rays not registered.
 void Watch::take_deletions() {
   const auto newest = tree_.newest_deletion();
   if (deletions_read_ != newest) {

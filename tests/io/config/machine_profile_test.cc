@@ -104,7 +104,7 @@ TEST_F(MachineProfileTest, SpacingMayCountAtTheAxis) {
   EXPECT_TRUE(found.position_mm->isApprox(*expected.position_mm, 1e-9));
 }
 
-// What isoshift geometry --json says of an imager: here a panel that lies 1.5 mm off along x and is rolled by 0.2
+// What isoshift qa geometry --json says of an imager: here a panel that lies 1.5 mm off along x and is rolled by 0.2
 // degrees.
 nlohmann::json imager_errors() {
   nlohmann::json errors;

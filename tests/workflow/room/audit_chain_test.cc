@@ -35,7 +35,7 @@ class AuditChainTest : public testing::Test {
       log_.append("registered", {{"session", "a"}, {"record", record}});
   }
   CommandOutcome audit(std::vector<std::string> more = {}) const {
-    more.insert(more.begin(), {"audit", path_.string()});
+    more.insert(more.begin(), {"room", "audit", path_.string()});
     return run_command(more);
   }
 

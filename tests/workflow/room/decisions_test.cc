@@ -202,7 +202,7 @@ TEST_F(DecisionsTest, WhatWasBegunByHandBeforeAnotherResultOrderOrInputsIsNotHan
 
 TEST_F(DecisionsTest, NothingIsReleasedWhileAResultByHandWaits) {
   tree_.hand_over(tree_.manual_basis(a_), write_by_hand(), "jdoe");
-  EXPECT_THAT(error_of_release(a_), HasSubstr("newer result by hand, which isoshift watch has yet to take over"));
+  EXPECT_THAT(error_of_release(a_), HasSubstr("newer result by hand, which isoshift room watch has yet to take over"));
   tree_.take_over(a_);
   EXPECT_THAT(error_of_release(a_), HasSubstr("have a newer result"));
 }

@@ -122,7 +122,7 @@ TEST_F(DeletionTest, TheCommandDeletesAllOfAPatient) {
   write_text(site, R"({"site_file": 1, "name": "S", "sessions": {"views": 2, "quiet_s": 5}})");
   write_text(watch, R"({"watch_file": 1, "folder": ".", "results": "results", "site": "site.json"})");
   const auto run = [&](std::vector<std::string> flags) {
-    flags.insert(flags.begin(), "delete");
+    flags.insert(flags.begin(), {"room", "delete"});
     flags.insert(flags.end(), {"--by", "J. Doe", "--watch", watch.string()});
     return run_command(flags);
   };

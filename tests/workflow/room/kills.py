@@ -44,7 +44,7 @@ class KilledRoom(Room):
 
     def start_program(self, name):
         with self.lock:
-            self.running[name] = subprocess.Popen([self.program, name, self.work / f"{name}.json"], stdout=self.log, stderr=self.log)
+            self.running[name] = subprocess.Popen([self.program, "room", name, self.work / f"{name}.json"], stdout=self.log, stderr=self.log)
 
     def kill_program(self, name):
         with self.lock:
@@ -173,7 +173,7 @@ def main(program, work, kills, patients):
         stored = collections.Counter(room.at_peer())
         expect(set(stored) == set(objects), f"at the peer, and not released: {set(stored) - set(objects)}")
         expect(set(stored.values()) == {1}, f"stored more than once: {[uid for uid, count in stored.items() if count > 1]}")
-        whole = subprocess.run([program, "audit", room.results / "audit.jsonl"], capture_output=True, text=True, check=False)
+        whole = subprocess.run([program, "room", "audit", room.results / "audit.jsonl"], capture_output=True, text=True, check=False)
         expect(whole.returncode == 0, f"audit: {whole.stdout}{whole.stderr}")
         print(f"{killed['watch']} kills of watch, {killed['serve']} of serve, {person.broken_off} browsers that broke off; {patients} sessions, "
               f"{len(released)} released, {len(stored)} objects stored once each; {whole.stdout.splitlines()[0]} of the audit log")

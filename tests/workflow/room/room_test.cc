@@ -86,7 +86,7 @@ TEST(Watch, FlagsOfTheFileAreCheckedAtStart) {
   for (const char* flag : {"--preste=fast", "--anatomy=pelvis", "--allow=everything", "--site=other.json"}) {
     std::ofstream(work / "watch.json") << R"({"watch_file": 1, "folder": "in", "results": "out", "site": "site.json",)"
                                        << R"( "register": [")" << flag << R"("]})";
-    const CommandOutcome outcome = run_command({"watch", (work / "watch.json").string()});
+    const CommandOutcome outcome = run_command({"room", "watch", (work / "watch.json").string()});
     EXPECT_EQ(outcome.exit_status, 1) << flag;
     EXPECT_THAT(outcome.err, testing::HasSubstr("watch.json: register: ")) << flag;
   }

@@ -38,7 +38,7 @@ class Room:
         self.watch = None
 
     def start_watch(self):
-        self.watch = subprocess.Popen([self.program, "watch", self.work / "watch.json"], stderr=self.log.open("a"))
+        self.watch = subprocess.Popen([self.program, "room", "watch", self.work / "watch.json"], stderr=self.log.open("a"))
 
     def end_watch(self, how=signal.SIGKILL):
         self.watch.send_signal(how)
@@ -55,7 +55,7 @@ class Room:
         return found
 
     def release(self, session, **environment):
-        return subprocess.run([self.program, "release", session, "--by", "J. Doe", "--watch", self.work / "watch.json"],
+        return subprocess.run([self.program, "room", "release", session, "--by", "J. Doe", "--watch", self.work / "watch.json"],
                               env=os.environ | environment, capture_output=True, text=True)
 
     def release_file(self, session):
@@ -79,7 +79,7 @@ def login_user():
 
 
 def forged(room, session):
-    """A release file that somebody wrote by hand, with all that isoshift release would write."""
+    """A release file that somebody wrote by hand, with all that isoshift room release would write."""
     folder = room.session(session)
     objects = [{"file": name, "sha256": sha256(folder / name)} for name in ("spatial_registration.dcm", "report.dcm") if (folder / name).exists()]
     room.release_file(session).write_text(json.dumps({

@@ -37,7 +37,7 @@ def main(program, work):
                        check=True, capture_output=True)
 
     # Files of the watch and of its registrations that grow beyond a limit cannot be written: SIGXFSZ stays ignored.
-    watch = subprocess.Popen([program, "watch", work / "watch.json"], stderr=log.open("a"), restore_signals=False)
+    watch = subprocess.Popen([program, "room", "watch", work / "watch.json"], stderr=log.open("a"), restore_signals=False)
     try:
         wait_for(lambda: (results / "index.html").exists(), 30, "the index")
         resource.prlimit(watch.pid, resource.RLIMIT_FSIZE, (FULL_AT_BYTES, resource.RLIM_INFINITY))
@@ -48,8 +48,8 @@ def main(program, work):
         resource.prlimit(watch.pid, resource.RLIMIT_FSIZE, (resource.RLIM_INFINITY, resource.RLIM_INFINITY))
         wait_for(lambda: len(sessions()) == 1, 120, "the session of a disk that was full")
 
-        released = subprocess.run([program, "release", *sessions(), "--by", "J. Doe", "--watch", work / "watch.json"], capture_output=True, text=True)
-        expect(released.returncode == 0 and "isoshift watch sends it" in released.stdout, f"release: {released.stdout}{released.stderr}")
+        released = subprocess.run([program, "room", "release", *sessions(), "--by", "J. Doe", "--watch", work / "watch.json"], capture_output=True, text=True)
+        expect(released.returncode == 0 and "isoshift room watch sends it" in released.stdout, f"release: {released.stdout}{released.stderr}")
         connection = peer.accept()  # it tries
         bring_study(2)
         wait_for(lambda: len(sessions()) == 2, 25, "a session while the peer says nothing")

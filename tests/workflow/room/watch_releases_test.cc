@@ -25,7 +25,7 @@ using testing::Pair;
 using testing::SizeIs;
 using testing::UnorderedElementsAre;
 
-// A person at the screen (isoshift serve) made another result of the X-rays, from a copy of the one there was.
+// A person at the screen (isoshift room serve) made another result of the X-rays, from a copy of the one there was.
 TEST_F(WatchReleases, AResultByHandIsTakenOverAndSupersedesTheOneBefore) {
   allow_automatic_release();
   room_.start();

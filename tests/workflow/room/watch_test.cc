@@ -222,7 +222,7 @@ TEST_F(WatchTest, OneWatchAtATimeWorksOnAResultsTree) {
                                     .contents = room_.contents});
     FAIL() << "a second watch began";
   } catch (const Error& error) {
-    EXPECT_THAT(error.what(), HasSubstr("another isoshift watch is working here"));
+    EXPECT_THAT(error.what(), HasSubstr("another isoshift room watch is working here"));
   }
 }
 

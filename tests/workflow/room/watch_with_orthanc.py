@@ -1,4 +1,4 @@
-"""A treatment room: studies come to an Orthanc server in any order, isoshift watch registers them, a person releases results, and
+"""A treatment room: studies come to an Orthanc server in any order, isoshift room watch registers them, a person releases results, and
 another Orthanc server receives them by C-STORE with TLS.
 
   watch_with_orthanc.py ISOSHIFT WORK [PATIENTS]
@@ -52,7 +52,7 @@ class Room:
         self.watch = None
 
     def start_watch(self):
-        self.watch = subprocess.Popen([self.program, "watch", self.work / "watch.json"], stderr=self.log)
+        self.watch = subprocess.Popen([self.program, "room", "watch", self.work / "watch.json"], stderr=self.log)
 
     def kill_watch(self):
         self.watch.send_signal(signal.SIGKILL)
@@ -70,7 +70,7 @@ class Room:
         return [line.split("STORED ")[1] for line in self.peer.log.read_text().splitlines() if "STORED " in line] if self.peer.log.exists() else []
 
     def release(self, session):
-        return subprocess.run([self.program, "release", session, "--by", "J. Doe", "--watch", self.work / "watch.json"], capture_output=True, text=True)
+        return subprocess.run([self.program, "room", "release", session, "--by", "J. Doe", "--watch", self.work / "watch.json"], capture_output=True, text=True)
 
 
 def studies(room):
