@@ -156,6 +156,14 @@ TEST_P(WatchForgeries, ALineInTheLogIsNotEnoughWhereThereIsAKey) {
   EXPECT_THAT(room_.observer.lines, Contains(HasSubstr("is not signed by the signing_key")));
 }
 
+// Whoever sends asks for the signature, too.
+TEST_P(WatchForgeries, AReleaseThatTheKeyHasNotSignedIsNotSent) {
+  release("P");  // without the key
+  room_.pass(600s, 10s);
+  EXPECT_EQ(room_.sender.attempts().empty(), GetParam());
+  if (GetParam()) EXPECT_THAT(room_.sending.lines, Contains(HasSubstr("is not signed by the signing_key")));
+}
+
 INSTANTIATE_TEST_SUITE_P(Keys, WatchForgeries, testing::Bool(),
                          [](const auto& one) { return one.param ? "WithKey" : "WithoutKey"; });
 
