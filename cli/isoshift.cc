@@ -124,11 +124,25 @@ std::string command_like(const CLI::App& app, std::string_view word) {
     names.push_back(command.get_name());
     paths.push_back(path_of(command));
   });
+  names.emplace_back("help");
+  paths.emplace_back("help");
   const std::string name = suggestion(word, names);
   return name.empty() ? "" : paths[static_cast<std::size_t>(std::ranges::find(names, name) - names.begin())];
 }
 
 std::string did_you_mean(const std::string& what) { return what.empty() ? "" : "; did you mean " + what + "?"; }
+
+// How a command is called in a shell.
+std::string called(const CLI::App& command) {
+  const std::string path = path_of(command);
+  return path.empty() ? "isoshift" : "isoshift " + path;
+}
+
+// The command whose flags and arguments were being read.
+const CLI::App& command_read(const CLI::App& app) {
+  const std::vector<CLI::App*> below = app.get_subcommands();
+  return below.empty() ? app : command_read(*below.back());
+}
 
 // CLI11 would say only that a command is missing, or of what stands before it that the command lacks it.
 void check_command(const CLI::App& app, std::span<const std::string> words) {
@@ -136,10 +150,9 @@ void check_command(const CLI::App& app, std::span<const std::string> words) {
   std::vector<std::string> names;
   for (const CLI::App* command : app.get_subcommands({})) names.push_back(command->get_name());
   const auto command = std::ranges::find_first_of(words, names);
-  const std::string &first = words.front(), path = path_of(app);
+  const std::string &first = words.front(), program = called(app);
   if (command == words.begin()) return check_command(*app.get_subcommand(first), words.subspan(1));
   if (names.empty()) return;
-  const std::string program = path.empty() ? "isoshift" : "isoshift " + path;
   if (!first.starts_with('-')) {
     const std::string meant = command_like(app, first);
     throw UsageError(
@@ -152,19 +165,30 @@ void check_command(const CLI::App& app, std::span<const std::string> words) {
 
 // What CLI11 did not expect, each with what it probably was to be.
 std::string unexpected_words(const CLI::App& app) {
-  const CLI::App* command = &app;
-  while (!command->get_subcommands().empty()) command = command->get_subcommands().back();
+  const CLI::App& command = command_read(app);
   std::vector<std::string> flags, complaints;
-  for (const CLI::Option* option : command->get_options())
+  for (const CLI::Option* option : command.get_options())
     for (const std::string& name : option->get_lnames()) flags.push_back("--" + name);
   for (const std::string& word : app.remaining(true)) {
     const std::string name = word.substr(0, word.find('='));
-    complaints.push_back(word.starts_with('-')
-                             ? fmt::format("isoshift {} has no flag {}{}", path_of(*command), name,
-                                           did_you_mean(suggestion(name, flags)))
-                             : fmt::format("isoshift {} does not expect {}", path_of(*command), word));
+    complaints.push_back(word.starts_with('-') ? fmt::format("{} has no flag {}{}", called(command), name,
+                                                             did_you_mean(suggestion(name, flags)))
+                                               : fmt::format("{} does not expect {}", called(command), word));
   }
   return fmt::format("{}", fmt::join(complaints, "\n       "));
+}
+
+// What was wrong with the words. A flag that was mistyped is named before what is then missing.
+std::string usage_error(const CLI::App& app, const CLI::ParseError& error) {
+  const bool is_missing = error.get_exit_code() == static_cast<int>(CLI::ExitCodes::RequiredError);
+  if (error.get_exit_code() == static_cast<int>(CLI::ExitCodes::ExtrasError) ||
+      (is_missing && !app.remaining(true).empty()))
+    return unexpected_words(app);
+  const CLI::App& command = command_read(app);
+  std::vector<std::string> below;
+  for (const CLI::App* one : command.get_subcommands({})) below.push_back(one->get_name());
+  if (!is_missing || below.empty()) return error.what();
+  return fmt::format("{} needs a command: {}", called(command), fmt::join(below, ", "));
 }
 
 // "--site: " for the value of a flag.
@@ -231,17 +255,14 @@ int run_isoshift(int argc, const char* const* argv, Console& console) {
     check_words(words);
     std::ranges::reverse(words);  // as CLI11 takes them
     app.parse(words);
-  } catch (const CLI::ExtrasError&) {
-    console.err << "error: " << printable_lines(unexpected_words(app))
-                << "\n       isoshift COMMAND --help explains the flags\n";
-    return kExitUsage;
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() == 0) {  // the help, or the version
       app.exit(error, console.out, console.err);
       return after_printing(kExitAccepted, console);
     }
-    console.err << "error: " << printable_lines(error.what())
-                << "\n       isoshift COMMAND --help explains the flags\n";
+    const CLI::App& command = command_read(app);
+    console.err << "error: " << printable_lines(usage_error(app, error)) << "\n       " << called(command)
+                << " --help explains the " << (command.get_subcommands({}).empty() ? "flags" : "commands") << "\n";
     return kExitUsage;
   } catch (const UsageError& error) {
     return say(console, error, kExitUsage);
