@@ -17,7 +17,7 @@ namespace {
 using Columns = std::array<std::optional<StatedColumn>, 6>;
 
 constexpr double kMmPerCm = 10.0, kMmPerInch = 25.4, kMmPerM = 1000.0, kDegPerRad = 180.0 / std::numbers::pi,
-                 kMradPerDeg = 1000.0 / kDegPerRad, kMinutesPerDeg = 60.0;
+                 kMradPerDeg = 1000.0 / kDegPerRad;
 constexpr std::size_t kAxesOfKind = 3;  // of a length or an angle
 
 struct Unit {
@@ -32,8 +32,7 @@ bool is_length(std::size_t axis) { return axis < kAxesOfKind; }
 std::span<const double> factors_of(std::size_t axis) {
   static constexpr std::array kOfLengths = {kMmPerCm,         1.0 / kMmPerCm, kMmPerInch,
                                             1.0 / kMmPerInch, kMmPerM,        1.0 / kMmPerM};
-  static constexpr std::array kOfAngles = {kDegPerRad, 1.0 / kDegPerRad,    1.0 / kMradPerDeg, 10.0,
-                                           0.1,        1.0 / kMinutesPerDeg};
+  static constexpr std::array kOfAngles = {kDegPerRad, 1.0 / kDegPerRad, 1.0 / kMradPerDeg, 10.0, 0.1};
   return is_length(axis) ? std::span<const double>(kOfLengths) : std::span<const double>(kOfAngles);
 }
 

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "tests/support/audited_archive.h"
+#include "workflow/audit_setup/audit_words.h"
 
 namespace isoshift::setup_audit_test {
 namespace {
