@@ -50,6 +50,15 @@ std::string example(std::string_view line, std::size_t width, std::size_t indent
          filled(words.substr(words.find_first_not_of(' ', end)), width, indent + margin + 4, " \\");
 }
 
+// " TEXT:{setup,fast}=setup" as " {setup, fast}=setup", and " FLOAT:FLOAT in [0 - 1]" as " FLOAT in [0 - 1]".
+std::string readable(std::string type) {
+  for (const std::string_view named_twice : {"TEXT:{", "FLOAT:FLOAT", "INT:INT", "UINT:UINT"})
+    if (const std::size_t at = type.find(named_twice); at != type.npos) type.erase(at, named_twice.find(':') + 1);
+  for (std::size_t at = type.find('{'); at < type.size() && type[at] != '}'; ++at)
+    if (type[at] == ',') type.insert(at + 1, " ");
+  return type;
+}
+
 }  // namespace
 
 std::string wrapped(std::string_view text, std::size_t width, std::size_t indent) {
@@ -90,7 +99,7 @@ std::string HelpFormatter::make_subcommand(const CLI::App* command) const {
 }
 
 std::string HelpFormatter::make_option(const CLI::Option* option, bool is_positional) const {
-  return entry(make_option_name(option, is_positional) + make_option_opts(option), make_option_desc(option));
+  return entry(make_option_name(option, is_positional) + readable(make_option_opts(option)), make_option_desc(option));
 }
 
 std::string HelpFormatter::entry(const std::string& name, const std::string& description) const {

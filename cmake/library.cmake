@@ -1,8 +1,8 @@
 # isoshift_library(NAME SOURCE...): a static library isoshift_NAME, a box of ARCHITECTURE.md.
 #
 # Headers that most sources include are compiled once for all boxes, and the sources of a folder are compiled together
-# (CMAKE_UNITY_BUILD in the presets); bench/results/build-time.md has what that saves. So the anonymous
-# namespaces of a folder hold no name twice; drr/ and io/report/, where they do, say so. Each test file has a namespace of
+# (CMAKE_UNITY_BUILD in the presets); bench/results/build-time.md has what that saves. So the anonymous namespaces of a
+# folder hold no name twice; the few sources where they do are compiled by themselves. Each test file has a namespace of
 # its own. Sources include what they use all the same: ./dev lint reads each by itself, without either.
 option(ISOSHIFT_PCH "Precompile the headers that most sources include" ON)
 
