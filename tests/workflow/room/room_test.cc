@@ -62,7 +62,8 @@ TEST(Watch, FollowsAFolder) {
   std::ofstream(work / "watch.json") << R"({"watch_file": 1, "folder": "in", "results": "out", "site": "site.json"})";
   // Copies of a file count once, one that is no DICOM not at all; the watch ends when it is asked to.
   const CommandOutcome outcome = run_shell(fmt::format(
-      "cd {0} && ({1} room watch watch.json & watch=$!; cp -r {2} in/study; cp in/study/RTPLAN.dcm in/again.dcm; echo x > "
+      "cd {0} && ({1} room watch watch.json & watch=$!; cp -r {2} in/study; cp in/study/RTPLAN.dcm in/again.dcm; echo "
+      "x > "
       "in/x; "
       "for n in $(seq 120); do ls out/sessions/*/result.json >/dev/null 2>&1 && break; sleep 0.5; done; sleep 3; "
       "kill $watch; wait $watch)",
