@@ -11,12 +11,11 @@ namespace {
 
 constexpr std::size_t kDefaultColumns = 80, kFewestColumns = 60, kMostColumns = 120;
 
-// The first `columns` columns of a line, up to a space; of a first word that is longer, up to a comma, or all of it.
+// The first `columns` columns of a line, up to a space; the whole first word if that is longer.
 std::size_t words_within(std::string_view line, std::size_t columns) {
   if (line.size() <= columns) return line.size();
   const std::size_t before = line.rfind(' ', columns);
   if (before != line.npos && before > line.find_first_not_of(' ')) return before;
-  if (const std::size_t comma = line.rfind(',', columns - 1); comma != line.npos) return comma + 1;
   return std::min(line.find(' ', columns), line.size());
 }
 
@@ -49,6 +48,15 @@ std::string example(std::string_view line, std::size_t width, std::size_t indent
   if (end == words.size()) return std::string(indent, ' ') + std::string(line);
   return std::string(indent + margin, ' ') + std::string(words.substr(0, end)) + " \\\n" +
          filled(words.substr(words.find_first_not_of(' ', end)), width, indent + margin + 4, " \\");
+}
+
+// " TEXT:{setup,fast}=setup" as " {setup, fast}=setup", and " FLOAT:FLOAT in [0 - 1]" as " FLOAT in [0 - 1]".
+std::string readable(std::string type) {
+  for (const std::string_view named_twice : {"TEXT:{", "FLOAT:FLOAT", "INT:INT", "UINT:UINT"})
+    if (const std::size_t at = type.find(named_twice); at != type.npos) type.erase(at, named_twice.find(':') + 1);
+  for (std::size_t at = type.find('{'); at < type.size() && type[at] != '}'; ++at)
+    if (type[at] == ',') type.insert(at + 1, " ");
+  return type;
 }
 
 }  // namespace
@@ -91,7 +99,7 @@ std::string HelpFormatter::make_subcommand(const CLI::App* command) const {
 }
 
 std::string HelpFormatter::make_option(const CLI::Option* option, bool is_positional) const {
-  return entry(make_option_name(option, is_positional) + make_option_opts(option), make_option_desc(option));
+  return entry(make_option_name(option, is_positional) + readable(make_option_opts(option)), make_option_desc(option));
 }
 
 std::string HelpFormatter::entry(const std::string& name, const std::string& description) const {

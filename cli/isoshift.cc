@@ -132,63 +132,62 @@ std::string command_like(const CLI::App& app, std::string_view word) {
 
 std::string did_you_mean(const std::string& what) { return what.empty() ? "" : "; did you mean " + what + "?"; }
 
-// How a command is called in a shell.
-std::string called(const CLI::App& command) {
-  const std::string path = path_of(command);
-  return path.empty() ? "isoshift" : "isoshift " + path;
+std::vector<std::string> flags_of(const CLI::App& command) {
+  std::vector<std::string> flags;
+  for (const CLI::Option* option : command.get_options())
+    for (const std::string& name : option->get_lnames()) flags.push_back("--" + name);
+  return flags;
 }
 
-// The command whose flags and arguments were being read.
-const CLI::App& command_read(const CLI::App& app) {
-  const std::vector<CLI::App*> below = app.get_subcommands();
-  return below.empty() ? app : command_read(*below.back());
+std::string unknown_flag(const CLI::App& command, std::string_view flag) {
+  const std::string path = path_of(command), meant = suggestion(flag, flags_of(command));
+  return fmt::format("isoshift{}{} has no flag {}{}", path.empty() ? "" : " ", path, flag, did_you_mean(meant));
+}
+
+// A flag that is mistyped is named before one that is missing.
+void check_flags(const CLI::App& command, std::span<const std::string> words) {
+  for (const std::string& word : words) {
+    const std::string flag = word.substr(0, word.find('='));
+    if (flag == "--") return;
+    if (flag.starts_with("--") && command.get_option_no_throw(flag) == nullptr)
+      throw UsageError(unknown_flag(command, flag));
+  }
 }
 
 // CLI11 would say only that a command is missing, or of what stands before it that the command lacks it.
 void check_command(const CLI::App& app, std::span<const std::string> words) {
-  if (words.empty()) return;
   std::vector<std::string> names;
   for (const CLI::App* command : app.get_subcommands({})) names.push_back(command->get_name());
+  if (names.empty()) return check_flags(app, words);
+  const std::string path = path_of(app), program = path.empty() ? "isoshift" : "isoshift " + path;
+  if (words.empty())
+    throw UsageError(fmt::format("{} needs a command: {}\n       {} --help explains them", program,
+                                 fmt::join(names, ", "), program));
+  const std::string& first = words.front();
   const auto command = std::ranges::find_first_of(words, names);
-  const std::string &first = words.front(), program = called(app);
   if (command == words.begin()) return check_command(*app.get_subcommand(first), words.subspan(1));
-  if (names.empty()) return;
-  if (!first.starts_with('-')) {
-    const std::string meant = command_like(app, first);
-    throw UsageError(
-        meant.empty() ? fmt::format("{} has no command {}; its commands are {}", program, first, fmt::join(names, ", "))
-                      : fmt::format("{} has no command {}; did you mean isoshift {}?", program, first, meant));
+  if (first.starts_with('-')) {
+    if (app.get_option_no_throw(first) != nullptr) return;
+    throw UsageError(command == words.end()
+                         ? unknown_flag(app, first)
+                         : fmt::format("{} belongs behind the command: {} {} ... {}", first, program, *command, first));
   }
-  if (command != words.end() && app.get_option_no_throw(first) == nullptr)
-    throw UsageError(fmt::format("{} belongs behind the command: {} {} ... {}", first, program, *command, first));
+  const std::string meant = command_like(app, first);
+  throw UsageError(
+      meant.empty() ? fmt::format("{} has no command {}; its commands are {}", program, first, fmt::join(names, ", "))
+                    : fmt::format("{} has no command {}; did you mean isoshift {}?", program, first, meant));
 }
 
 // What CLI11 did not expect, each with what it probably was to be.
 std::string unexpected_words(const CLI::App& app) {
-  const CLI::App& command = command_read(app);
-  std::vector<std::string> flags, complaints;
-  for (const CLI::Option* option : command.get_options())
-    for (const std::string& name : option->get_lnames()) flags.push_back("--" + name);
-  for (const std::string& word : app.remaining(true)) {
-    const std::string name = word.substr(0, word.find('='));
-    complaints.push_back(word.starts_with('-') ? fmt::format("{} has no flag {}{}", called(command), name,
-                                                             did_you_mean(suggestion(name, flags)))
-                                               : fmt::format("{} does not expect {}", called(command), word));
-  }
+  const CLI::App* command = &app;
+  while (!command->get_subcommands().empty()) command = command->get_subcommands().back();
+  std::vector<std::string> complaints;
+  for (const std::string& word : app.remaining(true))
+    complaints.push_back(word.starts_with('-')
+                             ? unknown_flag(*command, word)
+                             : fmt::format("isoshift {} does not expect {}", path_of(*command), word));
   return fmt::format("{}", fmt::join(complaints, "\n       "));
-}
-
-// What was wrong with the words. A flag that was mistyped is named before what is then missing.
-std::string usage_error(const CLI::App& app, const CLI::ParseError& error) {
-  const bool is_missing = error.get_exit_code() == static_cast<int>(CLI::ExitCodes::RequiredError);
-  if (error.get_exit_code() == static_cast<int>(CLI::ExitCodes::ExtrasError) ||
-      (is_missing && !app.remaining(true).empty()))
-    return unexpected_words(app);
-  const CLI::App& command = command_read(app);
-  std::vector<std::string> below;
-  for (const CLI::App* one : command.get_subcommands({})) below.push_back(one->get_name());
-  if (!is_missing || below.empty()) return error.what();
-  return fmt::format("{} needs a command: {}", called(command), fmt::join(below, ", "));
 }
 
 // "--site: " for the value of a flag.
@@ -255,14 +254,17 @@ int run_isoshift(int argc, const char* const* argv, Console& console) {
     check_words(words);
     std::ranges::reverse(words);  // as CLI11 takes them
     app.parse(words);
+  } catch (const CLI::ExtrasError&) {
+    console.err << "error: " << printable_lines(unexpected_words(app))
+                << "\n       isoshift COMMAND --help explains the flags\n";
+    return kExitUsage;
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() == 0) {  // the help, or the version
       app.exit(error, console.out, console.err);
       return after_printing(kExitAccepted, console);
     }
-    const CLI::App& command = command_read(app);
-    console.err << "error: " << printable_lines(usage_error(app, error)) << "\n       " << called(command)
-                << " --help explains the " << (command.get_subcommands({}).empty() ? "flags" : "commands") << "\n";
+    console.err << "error: " << printable_lines(error.what())
+                << "\n       isoshift COMMAND --help explains the flags\n";
     return kExitUsage;
   } catch (const UsageError& error) {
     return say(console, error, kExitUsage);

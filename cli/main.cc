@@ -1,12 +1,15 @@
 #include <signal.h>
+#include <sys/resource.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
 #include <cstdlib>
 #include <exception>
 #include <iostream>
+#include <memory>
 #include <string_view>
 #include <thread>
+#include <vector>
 
 #include "base/graceful_end.h"
 #include "base/option_name.h"
@@ -44,11 +47,27 @@ void end_cleanly_on_signals() {
   }).detach();
 }
 
-// Where the system refuses a thread or memory at a place that cannot report it, nothing half written stays.
-void end_without_traces() {
-  std::cerr << "error: the program had to end, probably because memory or threads ran out\n";
+// Memory for what remains to be done where there is none left.
+std::unique_ptr<std::vector<char>> reserve = std::make_unique<std::vector<char>>(1 << 20);
+
+// Where a library ends the program (GLib and fontconfig do where memory runs out), or the system refuses a thread or
+// memory at a place that cannot report it, nothing half written stays. By rights a handler may do hardly anything: if
+// it hangs, an alarm ends it.
+void end_without_traces(int signal) {
+  ::signal(signal, SIG_DFL);
+  ::alarm(5);
+  reserve.reset();
+  constexpr std::string_view kWhy = "error: the program had to end, probably because memory or threads ran out\n";
+  (void)!::write(STDERR_FILENO, kWhy.data(), kWhy.size());
   isoshift::abandon_outputs();
-  std::abort();
+  ::raise(signal);
+}
+
+// With less, threads end without a word in the midst of their work.
+bool is_stack_too_small() {
+  constexpr rlim_t kLeastBytes = 1 << 20;
+  rlimit stack{};
+  return ::getrlimit(RLIMIT_STACK, &stack) == 0 && stack.rlim_cur < kLeastBytes;
 }
 
 // Whatever is written is of patients: at most its owner's group may read it, however it is written.
@@ -61,13 +80,17 @@ void keep_from_strangers() {
 
 int main(int argc, char** argv) {
   keep_from_strangers();
-  std::set_terminate(&end_without_traces);
+  ::signal(SIGABRT, &end_without_traces);
   ::unsetenv("DCMDICTPATH");  // no variable of a shell may change what DCMTK takes attributes for
   isoshift::name_options(isoshift::OptionStyle::kFlags);
   // Not commands for people: what this program runs as its child, and the manual that the build makes.
   const std::string_view hidden = argc == 3 ? argv[1] : "", role = argc == 3 ? argv[2] : "";
   if (hidden == "__manual") return isoshift::write_manual(argv[2]), 0;
   if (hidden == "__child" && role == "decode") return isoshift::run_decoder();
+  if (is_stack_too_small()) {
+    std::cerr << "error: the stack of a thread may have less than 1 MB here; 8 MB are usual (ulimit -s 8192)\n";
+    return isoshift::kExitFailed;
+  }
   isoshift::use_decoder("/proc/self/exe");
   end_cleanly_on_signals();
   if (hidden == "__child" && role == "register") {

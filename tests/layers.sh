@@ -64,7 +64,9 @@ only_in '(EGL|GL|epoxy|glm)/' drr registration/similarity/
 only_in 'CLI/' cli
 only_in 'curl/' io/network/
 only_in 'boost/(asio|beast)' serve/http_server.cc
-only_in 'boost/math' setup/agreement.cc workflow/audit_setup/
+only_in 'boost/math' base/distributions.cc
+# What takes long to compile is compiled once (bench/results/build-time.md).
+only_in 'Eigen/(Cholesky|Dense|Eigenvalues|QR|SVD)' geometry/linear_algebra.cc
 only_in 'security/' serve/pam.cc
 only_in '(cairo|pango)' io/report/ io/objects/image_files.cc
 

@@ -19,7 +19,7 @@ done
 
 # The user and the group that the units name are made.
 mkdir -p "$work/root/etc"
-systemd-sysusers --root="$work/root" packaging/isoshift.sysusers
+systemd-sysusers --root="$work/root" - <packaging/isoshift.sysusers >"$work/made" 2>&1
 for unit in packaging/isoshift-*.service; do
   grep -q "^$(sed -n 's/^User=//p' "$unit"):" "$work/root/etc/passwd" || { echo "$unit: nobody makes its user"; exit 1; }
   grep -q "^$(sed -n 's/^Group=//p' "$unit"):" "$work/root/etc/group" || { echo "$unit: nobody makes its group"; exit 1; }

@@ -16,7 +16,7 @@ std::string number(const Quantity& quantity) {
   return quantity.value.starts_with('+') ? quantity.value.substr(1) : quantity.value;
 }
 
-std::string joined(const std::vector<std::string>& texts) { return fmt::format("{}", fmt::join(texts, "; ")); }
+std::string list_of(const std::vector<std::string>& texts) { return fmt::format("{}", fmt::join(texts, "; ")); }
 
 }  // namespace
 
@@ -37,11 +37,11 @@ std::string csv_report(const SetupResult& report) {
   add("plan_uid", csv_cell(report.plan_uid));
   std::vector<std::string> views;
   for (const SetupResult::View& view : report.views) views.push_back(printable(view.label));
-  add("views", csv_cell(joined(views)));
+  add("views", csv_cell(list_of(views)));
   add("verdict", std::string(to_string(page.verdict)));
-  add("reasons", csv_cell(joined(page.reasons)));
+  add("reasons", csv_cell(list_of(page.reasons)));
   add("action", std::string(to_string(page.action)));
-  add("action_reasons", csv_cell(joined(page.action_reasons)));
+  add("action_reasons", csv_cell(list_of(page.action_reasons)));
   const auto add_numbers = [&](const std::vector<Quantity>& quantities, const std::vector<std::string>& columns) {
     for (std::size_t n = 0; n < columns.size(); ++n) {
       add(columns[n], n < quantities.size() ? number(quantities[n]) : "");

@@ -32,8 +32,6 @@ std::string strongest(const std::optional<Eigen::Vector3d>& unit_vector, const A
   return words[static_cast<std::size_t>(axis)][(*unit_vector)[axis] > 0.0 ? 0 : 1];
 }
 
-bool is_zero(const std::string& number) { return number.find_first_of("123456789") == std::string::npos; }
-
 std::string length_words(const Moved& body, LengthUnit unit) {
   return fmt::format("{} {}", unsigned_length(*body.mm, unit, body.two_sigma_mm), name_of(unit));
 }

@@ -48,9 +48,6 @@ std::optional<double> twice(const std::optional<double>& sigma) {
   return sigma ? std::optional(2.0 * *sigma) : std::nullopt;
 }
 
-// Whether a rounded number is 0: it then has no direction.
-bool is_zero(const std::string& number) { return number.find_first_of("123456789") == std::string::npos; }
-
 Quantity quantity(std::string name, const std::optional<double>& value, std::string unit, std::string text,
                   std::string plus_minus, const Sense& sense) {
   if (!value) return {.name = std::move(name), .value = kNotDetermined, .unit = std::move(unit), .is_number = false};

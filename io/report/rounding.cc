@@ -46,4 +46,6 @@ std::string rounded_up_length(double two_sigma_mm, LengthUnit unit) {
 
 const char* name_of(LengthUnit unit) { return unit == LengthUnit::kCm ? "cm" : "mm"; }
 
+bool is_zero(const std::string& rounded) { return rounded.find_first_of("123456789") == std::string::npos; }
+
 }  // namespace isoshift

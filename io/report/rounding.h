@@ -20,4 +20,7 @@ std::string unsigned_length(double mm, LengthUnit unit, std::optional<double> tw
 std::string rounded_up_length(double two_sigma_mm, LengthUnit unit);
 const char* name_of(LengthUnit unit);
 
+// Whether a rounded number is 0: it then has no direction.
+bool is_zero(const std::string& rounded);
+
 }  // namespace isoshift

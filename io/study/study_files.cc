@@ -456,7 +456,6 @@ std::vector<StudyFiles::Image> counting_images(const StudyFiles& files) {
 std::vector<fs::path> files_below(const std::vector<fs::path>& paths, const std::unordered_set<std::string>& but,
                                   std::set<fs::path>* unsearchable) {
   std::vector<fs::path> files;
-  std::set<fs::path> searched;  // links may lead to a folder more than once
   const auto add = [&](const fs::path& file) {
     if (!but.contains(file.native())) files.push_back(file);
   };
@@ -472,18 +471,19 @@ std::vector<fs::path> files_below(const std::vector<fs::path>& paths, const std:
       add(path);
       continue;
     }
-    searched.insert(fs::canonical(path));
-    constexpr auto kFollow = fs::directory_options::follow_directory_symlink;
-    for (auto entry = fs::recursive_directory_iterator(path, kFollow, error); !error && entry != fs::end(entry);
+    for (auto entry = fs::recursive_directory_iterator(path, error); !error && entry != fs::end(entry);
          entry.increment(error)) {
       const bool is_hidden = entry->path().filename().native().starts_with('.');
-      if (entry->is_directory()) {
-        const bool can_be_searched = ::access(entry->path().c_str(), R_OK | X_OK) == 0;
-        if (!can_be_searched) cannot_search(entry->path(), std::strerror(errno));
-        if (!can_be_searched || !searched.insert(fs::canonical(entry->path())).second)
-          entry.disable_recursion_pending();
-      } else if (entry->is_symlink() && !entry->exists() && !is_hidden) {
-        cannot_search(entry->path(), "a link to a file or folder that is not there");
+      if (entry->is_symlink()) {
+        if (is_hidden) continue;
+        if (!entry->exists()) cannot_search(entry->path(), "a link to a file or folder that is not there");
+        // What a link means is searched where it lies, or by its own name; no link leads round and round.
+        else if (unsearchable != nullptr)
+          unsearchable->insert(entry->path());
+      } else if (entry->is_directory()) {
+        if (::access(entry->path().c_str(), R_OK | X_OK) == 0) continue;
+        cannot_search(entry->path(), std::strerror(errno));
+        entry.disable_recursion_pending();
       } else if (!is_hidden && entry->is_regular_file()) {
         add(entry->path());
       }
@@ -600,9 +600,14 @@ StudyFiles scan_study(const std::vector<fs::path>& paths) {
     }
   });
   StudyFiles files;
-  for (const fs::path& path : unsearchable)
-    files.unreadable.push_back(
-        fmt::format("{}: cannot be searched: it may not be opened, or is a link to what is not there", path.string()));
+  for (const fs::path& path : unsearchable) {
+    if (fs::is_symlink(path) && fs::exists(path))
+      files.left_aside.push_back(fmt::format("{}: a link, which is not followed: name what it leads to, {}",
+                                             path.string(), fs::canonical(path).string()));
+    else
+      files.unreadable.push_back(fmt::format(
+          "{}: cannot be searched: it may not be opened, or is a link to what is not there", path.string()));
+  }
   for (StudyFiles& of_file : scanned) merge(std::move(of_file), files);
   return files;
 }

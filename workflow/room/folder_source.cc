@@ -17,7 +17,9 @@ namespace {
 
 constexpr std::chrono::seconds kLongestWait(60);
 
-std::string cannot_be_opened(const fs::path& path) { return fmt::format("{}: cannot be opened", path.string()); }
+std::string cannot_be_opened(const fs::path& path) {
+  return fmt::format("{}: cannot be opened, or is a link, which is not followed", path.string());
+}
 
 }  // namespace
 
