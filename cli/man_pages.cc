@@ -88,8 +88,8 @@ void write_pages(const CLI::App& command, const std::string& called, const std::
                  const std::filesystem::path& folder) {
   const std::string name = page_name(called);
   const auto commands = command.get_subcommands({});
-  std::string page = fmt::format(".TH {} 1 \"\" \"isoshift {}\"\n.SH NAME\n{} \\- {}\n", roff(name), kVersion,
-                                 roff(name), roff(summary));
+  std::string page = fmt::format(".TH {} 1 \"\" \"isoshift {}\"\n.ad l\n.nh\n.SH NAME\n{} \\- {}\n", roff(name),
+                                 kVersion, roff(name), roff(summary));
   page += fmt::format(".SH SYNOPSIS\n\\fB{}\\fR {}\n", roff(called), roff(arguments_of(command)));
   if (command.get_parent() == nullptr) page += ".SH DESCRIPTION\n" + preformatted(command.get_description());
   page += ".SH OPTIONS\n" + options_of(command);
