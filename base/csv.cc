@@ -94,16 +94,28 @@ CsvTable csv_table(std::string_view text, const std::string& where, char separat
             fmt::format("{}, line 1: {} separate the cells, expected commas, and numbers with a decimal point. A "
                         "spreadsheet set to a language with decimal commas writes tables like this",
                         where, name));
+  // Spreadsheets write cells without anything in them where there once was something.
+  const auto has_nothing = [](const CsvTable::Row& row) {
+    return std::ranges::all_of(row.cells, [](const std::string& cell) { return cell.empty(); });
+  };
+  std::erase_if(rows, has_nothing);
+  const auto is_unused = [&](std::size_t column) {
+    return table.columns[column].empty() && std::ranges::all_of(rows, [&](const CsvTable::Row& row) {
+             return row.cells.size() == table.columns.size() && row.cells[column].empty();
+           });
+  };
+  while (table.columns.size() > 1 && is_unused(table.columns.size() - 1)) {
+    table.columns.pop_back();
+    for (CsvTable::Row& row : rows) row.cells.pop_back();
+  }
   for (auto column = table.columns.begin(); column != table.columns.end(); ++column)
     if (!column->empty() && std::find(table.columns.begin(), column, *column) != column)
       throw Error(fmt::format("{}: has the column {} twice", where, *column));
-  for (auto row = rows.begin() + 1; row != rows.end(); ++row) {
-    if (row->cells.empty() || (row->cells.size() == 1 && row->cells.front().empty())) continue;
-    if (row->cells.size() != table.columns.size())
-      throw Error(fmt::format("{}, line {}: {} cells, expected {} as in the first line", where, row->line,
-                              row->cells.size(), table.columns.size()));
-    table.rows.push_back(std::move(*row));
-  }
+  for (const CsvTable::Row& row : rows)
+    if (row.cells.size() != table.columns.size())
+      throw Error(fmt::format("{}, line {}: {} cells, expected {} as in the first line", where, row.line,
+                              row.cells.size(), table.columns.size()));
+  table.rows = std::move(rows);
   return table;
 }
 

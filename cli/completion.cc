@@ -29,6 +29,7 @@ std::string values_of(const CLI::Option& option) {
 // `called`: how the command is called, " room watch"; nothing for the program itself.
 void add_branches(const CLI::App& command, const std::string& called, Branches& branches) {
   std::vector<std::string> words;
+  if (command.get_parent() == nullptr) words.emplace_back("help");
   for (const CLI::App* below : command.get_subcommands({})) {
     words.push_back(below->get_name());
     const std::string name = called + " " + below->get_name();
@@ -51,9 +52,13 @@ std::string bash_completion(const CLI::App& app) {
   add_branches(app, "", branches);
   return fmt::format(R"(# Completion of isoshift in bash, made from its --help by the build.
 _isoshift() {{
-  local current=${{COMP_WORDS[COMP_CWORD]}} before=${{COMP_WORDS[COMP_CWORD - 1]}} command= words= word
+  local current=${{COMP_WORDS[COMP_CWORD]}} before=${{COMP_WORDS[COMP_CWORD - 1]}} command="" words="" word
+  # --preset=s comes as three words
+  if [[ $before = "=" ]]; then before=${{COMP_WORDS[COMP_CWORD - 2]}}; fi
+  if [[ $current = "=" ]]; then current=""; fi
   for word in "${{COMP_WORDS[@]:1:COMP_CWORD-1}}"; do
     case "$command $word" in
+      " help") ;;
 {}      *) break ;;
     esac
   done

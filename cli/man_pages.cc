@@ -12,7 +12,7 @@
 namespace isoshift {
 namespace {
 
-constexpr std::size_t kColumns = 76;  // of lines that man does not fill
+constexpr std::size_t kColumns = 71;  // of lines that man does not fill, behind its margin
 
 // A text as roff takes it: as it is.
 std::string roff(const std::string& text) {
@@ -29,6 +29,14 @@ std::string roff(const std::string& text) {
     begins = c == '\n';
   }
   return escaped;
+}
+
+// The same of a long list of names, which may be broken behind a comma.
+std::string breakable(const std::string& text) {
+  std::string page = roff(text);
+  for (std::size_t comma = page.find(','); comma != page.npos; comma = page.find(',', comma + 1))
+    page.insert(comma + 1, "\\:");
+  return page;
 }
 
 // Lines that are to stay lines.
@@ -51,13 +59,22 @@ std::string options_of(const CLI::App& command) {
       if (option->get_group() != group || group.empty()) continue;
       entries +=
           fmt::format(".TP\n\\fB{}\\fR{}\n{}", roff(formatter.make_option_name(option, option->get_positional())),
-                      roff(formatter.make_option_opts(option)), paragraph(option->get_description()));
+                      breakable(formatter.make_option_opts(option)), paragraph(option->get_description()));
     }
     if (entries.empty()) continue;
     if (group != "Options") page += ".SS " + roff(group) + "\n";
     page += entries;
   }
   return page;
+}
+
+// What a command is called with, "[OPTIONS] [study]".
+std::string arguments_of(const CLI::App& command) {
+  const CLI::Formatter formatter;
+  std::string arguments = command.get_subcommands({}).empty() ? "[OPTIONS]" : "COMMAND [OPTIONS]";
+  for (const CLI::Option* option : command.get_options())
+    if (option->get_positional()) arguments += " " + formatter.make_option_usage(option);
+  return arguments;
 }
 
 std::string page_name(std::string called) {
@@ -73,7 +90,7 @@ void write_pages(const CLI::App& command, const std::string& called, const std::
   const auto commands = command.get_subcommands({});
   std::string page = fmt::format(".TH {} 1 \"\" \"isoshift {}\"\n.SH NAME\n{} \\- {}\n", roff(name), kVersion,
                                  roff(name), roff(summary));
-  page += fmt::format(".SH SYNOPSIS\n\\fB{}\\fR {}[OPTIONS]\n", roff(called), commands.empty() ? "" : "COMMAND ");
+  page += fmt::format(".SH SYNOPSIS\n\\fB{}\\fR {}\n", roff(called), roff(arguments_of(command)));
   if (command.get_parent() == nullptr) page += ".SH DESCRIPTION\n" + preformatted(command.get_description());
   page += ".SH OPTIONS\n" + options_of(command);
   if (!commands.empty()) page += ".SH COMMANDS\n";

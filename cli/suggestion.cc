@@ -28,7 +28,10 @@ std::string suggestion(std::string_view word, std::span<const std::string> candi
   std::string best;
   std::size_t least = word.size() / 3 + 1;
   for (const std::string& candidate : candidates)
-    if (const std::size_t edits = edits_between(word, candidate); edits < least) {
+    // The beginning of a name is as near as one slip.
+    if (const std::size_t all = edits_between(word, candidate),
+        edits = candidate.starts_with(word) ? std::min<std::size_t>(1, all) : all;
+        edits < least) {
       least = edits;
       best = candidate;
     }

@@ -21,7 +21,7 @@ constexpr int kDays = 365;
 constexpr int kSourceHttp = 8142, kSourceDicom = 4142, kRecordHttp = 8143, kRecordDicom = 4143, kScreen = 8443;
 
 constexpr const char* kReadMe =
-    R"(A treatment room to try, on this computer: two Orthanc servers, isoshift room watch and isoshift serve.
+    R"(A treatment room to try, on this computer: two Orthanc servers, isoshift room watch and isoshift room serve.
 
   source   the room's server: CT, plan and X-rays arrive here by DICOM ({source_dicom}), watch reads them by HTTP ({source_http})
   record   the peer that receives released results by DICOM with TLS ({record_dicom}), as an archive would

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <tuple>
 
@@ -15,7 +16,8 @@ namespace {
 
 using Columns = std::array<std::optional<StatedColumn>, 6>;
 
-constexpr double kMmPerCm = 10.0, kDegPerRad = 180.0 / std::numbers::pi;
+constexpr double kMmPerCm = 10.0, kMmPerInch = 25.4, kMmPerM = 1000.0, kDegPerRad = 180.0 / std::numbers::pi,
+                 kMradPerDeg = 1000.0 / kDegPerRad;
 constexpr std::size_t kAxesOfKind = 3;  // of a length or an angle
 
 struct Unit {
@@ -23,6 +25,16 @@ struct Unit {
   double factor;  // from the other one
 };
 constexpr std::array kUnits = {Unit{"_mm", "_cm", kMmPerCm}, Unit{"_deg", "_rad", kDegPerRad}};
+
+bool is_length(std::size_t axis) { return axis < kAxesOfKind; }
+
+// By what numbers in other units than the name of their column says would have to be multiplied.
+std::span<const double> factors_of(std::size_t axis) {
+  static constexpr std::array kOfLengths = {kMmPerCm,         1.0 / kMmPerCm, kMmPerInch,
+                                            1.0 / kMmPerInch, kMmPerM,        1.0 / kMmPerM};
+  static constexpr std::array kOfAngles = {kDegPerRad, 1.0 / kDegPerRad, 1.0 / kMradPerDeg, 10.0, 0.1};
+  return is_length(axis) ? std::span<const double>(kOfLengths) : std::span<const double>(kOfAngles);
+}
 
 // "x_cm" of "x_mm", where numbers are `factor` times as large as they say; empty: no unit would explain that.
 std::string renamed(const std::string& column, double factor) {
@@ -41,7 +53,7 @@ struct Fit {
 Fit fit_of(std::span<const StatedAndFound> sessions, std::size_t column, std::size_t axis, double factor) {
   constexpr std::size_t kLeftOut = 5;
   std::vector<double> off;
-  for (const auto& [stated, found] : sessions)
+  for (const auto& [name, stated, found] : sessions)
     if (stated[column] && found[axis])
       off.push_back(std::abs(std::abs(factor * *stated[column]) - std::abs(*found[axis])));
   std::ranges::sort(off);
@@ -65,47 +77,116 @@ struct Reading {
   Fit fit, as_it_is;
 };
 
+// A reading explains what was found only if it lies far nearer to it than no shift does.
+bool explains(std::span<const StatedAndFound> sessions, const Reading& reading) {
+  return is_far_better(reading.fit, fit_of(sessions, reading.column, reading.axis, 0.0));
+}
+
 Reading reading_of(std::span<const StatedAndFound> sessions, std::size_t column, std::size_t axis) {
-  Reading reading{.column = column, .axis = axis, .fit = fit_of(sessions, column, axis, 1.0)};
-  reading.as_it_is = fit_of(sessions, column, column, 1.0);
-  const bool is_length = column < kAxesOfKind;
-  const Fit in_this_unit = reading.fit;
-  for (const double factor : {is_length ? kMmPerCm : kDegPerRad, is_length ? 1.0 / kMmPerCm : 1.0 / kDegPerRad})
-    if (const Fit fit = fit_of(sessions, column, axis, factor);
-        is_far_better(fit, in_this_unit) && fit.off < reading.fit.off) {
-      reading.fit = fit;
-      reading.factor = factor;
-    }
+  const Reading in_this_unit{.column = column,
+                             .axis = axis,
+                             .fit = fit_of(sessions, column, axis, 1.0),
+                             .as_it_is = fit_of(sessions, column, column, 1.0)};
+  Reading reading = in_this_unit;
+  if (is_length(column) != is_length(axis)) return reading;
+  for (const double factor : factors_of(column)) {
+    Reading other = in_this_unit;
+    other.factor = factor;
+    other.fit = fit_of(sessions, column, axis, factor);
+    if (is_far_better(other.fit, in_this_unit.fit) && other.fit.off < reading.fit.off && explains(sessions, other))
+      reading = other;
+  }
   return reading;
 }
 
-Fit sum_of(const std::vector<Reading>& readings) {
-  Fit sum{.count = readings.empty() ? 0 : readings.front().fit.count};
-  for (const Reading& reading : readings) {
-    sum.count = std::min(sum.count, reading.fit.count);
-    sum.off += reading.fit.off;
+// Of the columns that `readings` moves to another axis: as they are read, and where they stand.
+struct Moved {
+  Fit read, in_place;
+};
+Moved moved_in(const std::vector<Reading>& readings, const std::vector<Reading>& in_place) {
+  Moved moved;
+  std::size_t count = std::numeric_limits<std::size_t>::max();
+  for (std::size_t n = 0; n < readings.size(); ++n) {
+    if (readings[n].axis == readings[n].column) continue;
+    count = std::min({count, readings[n].fit.count, in_place[n].fit.count});
+    moved.read.off += readings[n].fit.off;
+    moved.in_place.off += in_place[n].fit.off;
   }
-  return sum;
+  moved.read.count = moved.in_place.count = count;
+  return moved;
 }
 
-// The likeliest reading of the columns of lengths, or of angles, from `first` on.
-std::vector<Reading> readings_from(std::span<const StatedAndFound> sessions, std::size_t first) {
+double off_of(const std::vector<Reading>& readings) {
+  double off = 0.0;
+  for (const Reading& reading : readings) off += reading.fit.off;
+  return off;
+}
+
+// The likeliest reading of all columns.
+std::vector<Reading> readings_of(std::span<const StatedAndFound> sessions) {
   std::vector<std::size_t> known;
-  for (std::size_t axis = first; axis < first + kAxesOfKind; ++axis)
+  std::array<std::array<Reading, 6>, 6> all;
+  for (std::size_t axis = 0; axis < all.size(); ++axis)
     if (fit_of(sessions, axis, axis, 1.0).count > 1) known.push_back(axis);
+  for (const std::size_t column : known)
+    for (const std::size_t axis : known) all[column][axis] = reading_of(sessions, column, axis);
   const auto with = [&](const std::vector<std::size_t>& axes) {
     std::vector<Reading> readings;
-    for (std::size_t n = 0; n < known.size(); ++n) readings.push_back(reading_of(sessions, known[n], axes[n]));
+    for (std::size_t n = 0; n < known.size(); ++n) readings.push_back(all[known[n]][axes[n]]);
     return readings;
   };
   const std::vector<Reading> in_place = with(known);
   std::vector<Reading> best = in_place;
   std::vector<std::size_t> order = known;
-  while (std::ranges::next_permutation(order).found)
-    if (const std::vector<Reading> exchanged = with(order);
-        is_far_better(sum_of(exchanged), sum_of(in_place)) && sum_of(exchanged).off < sum_of(best).off)
-      best = exchanged;
+  while (std::ranges::next_permutation(order).found) {
+    std::vector<Reading> exchanged = with(order);
+    const Moved moved = moved_in(exchanged, in_place);
+    if (off_of(exchanged) < off_of(best) && is_far_better(moved.read, moved.in_place) &&
+        std::ranges::all_of(exchanged, [&](const Reading& reading) {
+          return reading.axis == reading.column || explains(sessions, reading);
+        }))
+      best = std::move(exchanged);
+  }
   return best;
+}
+
+// The sessions of which the lengths, or the angles, lie far nearer to what was found if they are multiplied.
+std::vector<std::string> sessions_in_other_unit(std::span<const StatedAndFound> sessions, std::size_t first,
+                                                double factor) {
+  constexpr double kTimes = 5.0, kLeast = 1.0;  // mm or degrees, of all columns together
+  std::vector<std::string> names;
+  for (const StatedAndFound& session : sessions) {
+    double as_it_is = 0.0, nothing = 0.0, multiplied = 0.0;
+    std::size_t count = 0;
+    for (std::size_t axis = first; axis < first + kAxesOfKind; ++axis) {
+      if (!session.stated[axis] || !session.found[axis]) continue;
+      const double stated = std::abs(*session.stated[axis]), found = std::abs(*session.found[axis]);
+      ++count;
+      as_it_is += std::abs(stated - found);
+      multiplied += std::abs(factor * stated - found);
+      nothing += found;
+    }
+    if (count > 1 && nothing > kLeast && kTimes * multiplied < std::min(as_it_is, nothing))
+      names.push_back(session.name);
+  }
+  return names;
+}
+
+// Where some sessions seem to be in another unit than the others: from another console, or of another time.
+std::vector<std::string> mixed_units(std::span<const StatedAndFound> sessions) {
+  constexpr std::size_t kFewest = 2, kOneOf = 10, kNamed = 5;
+  std::vector<std::string> words;
+  for (const std::size_t first : {std::size_t{0}, kAxesOfKind})
+    for (const double factor : factors_of(first)) {
+      std::vector<std::string> names = sessions_in_other_unit(sessions, first, factor);
+      if (names.size() < kFewest || names.size() * kOneOf < sessions.size()) continue;
+      const std::size_t count = names.size();
+      names.resize(std::min(count, kNamed));
+      words.push_back(fmt::format("{:.3g} times the {} of {} of {} sessions: {}{}", factor,
+                                  first == 0 ? "lengths" : "angles", count, sessions.size(), fmt::join(names, ", "),
+                                  count > names.size() ? ", ..." : ""));
+    }
+  return words;
 }
 
 std::string in_words(const Reading& reading, const Columns& columns) {
@@ -138,9 +219,9 @@ Columns stated_columns(const CsvTable& table, const SixNames& names, const std::
 
 void check_columns(const Columns& columns, std::span<const StatedAndFound> sessions, const std::string& where) {
   std::vector<std::string> words;
-  for (const std::size_t first : {std::size_t{0}, kAxesOfKind})
-    for (const Reading& reading : readings_from(sessions, first))
-      if (reading.factor != 1.0 || reading.axis != reading.column) words.push_back(in_words(reading, columns));
+  for (const Reading& reading : readings_of(sessions))
+    if (reading.factor != 1.0 || reading.axis != reading.column) words.push_back(in_words(reading, columns));
+  if (words.empty()) words = mixed_units(sessions);
   if (!words.empty())
     throw Error(fmt::format(
         "{}: the numbers do not lie where these columns say, but fit far better to what was found in another unit or "

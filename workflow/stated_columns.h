@@ -29,10 +29,11 @@ std::array<std::optional<StatedColumn>, 6> stated_columns(const CsvTable& table,
 
 // What a table states of a session, and what was found, in mm and degrees.
 struct StatedAndFound {
+  std::string name;  // of the session
   SixNumbers stated, found;
 };
-// Throws Error, naming the columns and what they seem to hold, if the table fits far better to what was found with
-// other units (10, 0.1, 57.3) or with columns exchanged. Signs do not matter.
+// Throws Error, naming the columns and what they seem to hold, if the table, or the numbers of some sessions, fit far
+// better to what was found in other units (cm, inch, m, rad) or with columns exchanged. Signs do not matter.
 void check_columns(const std::array<std::optional<StatedColumn>, 6>& columns, std::span<const StatedAndFound> sessions,
                    const std::string& where);
 

@@ -49,8 +49,14 @@ void run_release(const std::filesystem::path& file, const std::string& session, 
   ConsoleObserver observer(console);
   SystemClock clock;
   DicomSender sender;
-  // Without a watch nobody compares what else was released with the source.
-  const auto may_be_sent = [&](const std::string& other) { return other == session; };
+  // Without a watch nobody compares what else was released with the source, nor other files with those that are gone.
+  const std::filesystem::path missing = tree.missing_input(session);
+  if (lock && !missing.empty())
+    console.err << fmt::format(
+        "warning: {}: is gone: another file may have replaced it. isoshift room watch compares "
+        "what is there, and sends then\n",
+        missing.string());
+  const auto may_be_sent = [&](const std::string& other) { return other == session && missing.empty(); };
   if (lock) Deliverer(watch, sender, clock).deliver(std::stop_token(), may_be_sent, observer);
   if (release.peers.empty()) return;
   if (tree.pending_of(release).empty())

@@ -83,6 +83,24 @@ void warn_of_standstill(const std::vector<MotionSample>& trace, const std::strin
                     where, longest_s, longest->time_s));
 }
 
+// Nothing in a body moves that fast: a recorder writes such numbers where it has lost its target, or takes another one
+// for it.
+void warn_of_jumps(const std::vector<MotionSample>& trace, const std::string& where, Notes& notes) {
+  constexpr double kFarMm = 10.0, kFastMmPerS = 200.0;
+  std::size_t jumps = 0, first = 0;
+  for (std::size_t n = 1; n < trace.size(); ++n) {
+    const double way_mm = (trace[n].position_mm - trace[n - 1].position_mm).norm();
+    if (way_mm < kFarMm || way_mm < kFastMmPerS * (trace[n].time_s - trace[n - 1].time_s)) continue;
+    if (jumps++ == 0) first = n;
+  }
+  if (jumps == 0) return;
+  const MotionSample &to = trace[first], &from = trace[first - 1];
+  notes.warnings.push_back(fmt::format(
+      "{}: the position jumps {} times by {:g} mm or more, first by {:.0f} mm in {:.3f} s, at {:.1f} s: was "
+      "the target lost there? Leave such rows empty, or out",
+      where, jumps, kFarMm, (to.position_mm - from.position_mm).norm(), to.time_s - from.time_s, to.time_s));
+}
+
 }  // namespace
 
 std::vector<MotionSample> read_motion_trace(const std::filesystem::path& path, Notes& notes) {
@@ -135,6 +153,7 @@ std::vector<MotionSample> read_motion_trace(const std::filesystem::path& path, N
   if (wrong > 0)
     notes.warnings.push_back(fmt::format("{}: {} of {} rows have a time before that of the row above, and were skipped",
                                          where, wrong, trace.size()));
+  warn_of_jumps(in_order, where, notes);
   warn_of_standstill(in_order, where, notes);
   return in_order;
 }

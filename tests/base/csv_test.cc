@@ -38,6 +38,16 @@ TEST(Csv, MistakesNameTheirLine) {
   EXPECT_THAT(refusal("a,b\r\n1,2\r\n\"1,2\r\n"), HasSubstr("here.csv, line 3: "));
 }
 
+// As spreadsheets write them behind a table, and below it.
+TEST(Csv, ColumnsAndRowsWithoutAnythingInThemDoNotCount) {
+  const CsvTable table = csv_table("a,b,,\n1,2,,\n,,,\n3,,,\n", "here");
+  EXPECT_THAT(table.columns, ElementsAre("a", "b"));
+  ASSERT_EQ(table.rows.size(), 2U);
+  EXPECT_THAT(table.rows[1].cells, ElementsAre("3", ""));
+  EXPECT_EQ(table.rows[1].line, 4);
+  EXPECT_EQ(csv_table("a,b,,\n1,2,,3\n", "here").columns.size(), 4U) << "something is in one of them";
+}
+
 TEST(Csv, NumbersAreReadAsPeopleWriteThem) {
   EXPECT_EQ(number_in_cell(" +3.25\t"), 3.25);
   EXPECT_EQ(number_in_cell("-0.5"), -0.5);

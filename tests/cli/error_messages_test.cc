@@ -7,9 +7,19 @@
 #include <unistd.h>
 
 #include <fstream>
+#include <set>
+#include <sstream>
 
+#include "base/output_folder.h"
+#include "base/sha256.h"
+#include "io/report/formats.h"
+#include "io/report/result_folder.h"
+#include "io/study/session_files.h"
 #include "tests/support/command.h"
+#include "tests/support/oblique_report.h"
 #include "tests/support/small_study.h"
+#include "tests/support/temporary_folder.h"
+#include "workflow/room/results_tree.h"
 
 namespace isoshift::error_messages_test {
 namespace {
@@ -106,6 +116,55 @@ TEST(ReleaseCommandTest, TheNameOfWhoReleasesIsOneLineOfText) {
     EXPECT_EQ(outcome.exit_status, 2) << name;
     EXPECT_THAT(outcome.err, HasSubstr(std::string("--by: ") + why));
   }
+}
+
+TEST(UsageCommandTest, WhatIsMistypedIsNamedBeforeWhatIsMissing) {
+  const std::pair<std::vector<std::string>, std::string> mistakes[] = {
+      {{"register", "--ovrwrite"}, "error: isoshift register has no flag --ovrwrite; did you mean --overwrite?\n"},
+      {{"register", "study"}, "error: --output is required\n       isoshift register --help explains the flags\n"},
+      {{"phantom", "-o", "x", "--voxel=4"}, "error: isoshift phantom has no flag --voxel; did you mean --voxel-mm?\n"},
+      {{"--hepl"}, "error: isoshift has no flag --hepl; did you mean --help?\n"},
+      {{"hlep"}, "error: isoshift has no command hlep; did you mean isoshift help?\n"},
+      {{"room"}, "error: isoshift room needs a command: watch, serve, release, delete, audit\n"},
+      {{"watch", "watch.json"}, "error: isoshift has no command watch; did you mean isoshift room watch?\n"}};
+  for (const auto& [words, message] : mistakes) {
+    const CommandOutcome outcome = run_command(words);
+    EXPECT_EQ(outcome.exit_status, 2) << words.front();
+    EXPECT_THAT(outcome.err, StartsWith(message));
+  }
+}
+
+TEST(UsageCommandTest, NoLineOfAHelpIsLongerThan80Columns) {
+  for (const char* command : {"register", "batch", "evaluate", "track", "drr"}) {
+    std::istringstream lines(run_command({"help", command}).out);
+    for (std::string line; std::getline(lines, line);) EXPECT_LE(line.size(), 80U) << command << ": " << line;
+  }
+}
+
+// While no watch runs, nothing tells whether another file has come in its place.
+TEST(ReleaseCommandTest, WithoutAWatchNothingIsSentWhoseFilesAreGone) {
+  const TemporaryFolder work;
+  ResultsTree tree(work / "out");
+  SetupResult result = oblique_report(Verdict::kAccepted);
+  result.views.front().sop_instance_uid = "1.2.3";
+  std::set<std::string> xrays;
+  for (const SetupResult::View& view : result.views) xrays.insert(view.sop_instance_uid);
+  const std::string session = session_name(xrays);
+  std::filesystem::create_directories(tree.registering(session));
+  write_text(tree.registering(session) / kResultFile, json_report(result));
+  write_text(tree.registering(session) / "report.dcm", "a report");
+  tree.keep_order(session, {.parts = {.plan = work / "plan.dcm"}});
+  tree.publish(session, sha256_of_folder(tree.registering(session)));
+  std::filesystem::create_directories(work / "in");
+  std::ofstream(work / "site.json") << R"({"site_file": 1, "name": "S", "sessions": {"views": 2, "quiet_s": 1}})";
+  std::ofstream(work / "watch.json")
+      << R"({"watch_file": 1, "folder": "in", "results": "out", "site": "site.json", "peers": [{"name": "p",)"
+      << R"( "host": "127.0.0.1", "port": 1, "called_aet": "P", "calling_aet": "I", "tls": false}]})";
+  const CommandOutcome outcome =
+      run_command({"room", "release", session, "--by", "J. Doe", "--watch", (work / "watch.json").string()});
+  EXPECT_EQ(outcome.exit_status, 0) << outcome.err;
+  EXPECT_THAT(outcome.err, testing::AllOf(HasSubstr("plan.dcm: is gone"), testing::Not(HasSubstr("tried again"))));
+  EXPECT_THAT(outcome.out, HasSubstr("not sent yet"));
 }
 
 TEST_F(ErrorMessagesTest, OneUidForTwoImages) {

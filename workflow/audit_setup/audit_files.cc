@@ -107,6 +107,7 @@ std::string audit_json(const SetupAudit& audit) {
                                            {"of_all", json_of(axis.of_all)},
                                            {"scatter", axis.scatter},
                                            {"looks_opposite", axis.looks_opposite},
+                                           {"looks_unrelated", axis.looks_unrelated},
                                            {"drift", json_of(axis.drift)}};
     json["setup_error_drift"][kErrorComponents[n]] = json_of(audit.setup_drift[n]);
   }

@@ -21,7 +21,7 @@ Cell session_cell(const AuditedSession& session, const std::filesystem::path& pl
 Section findings(const SetupAudit& audit, const std::filesystem::path& place) {
   Section section{.title = "What stands out"};
   if (audit.compared > 0) {
-    for (const std::string& line : opposite_axes(audit)) section.lines.push_back(line);
+    for (const std::string& line : doubtful_axes(audit)) section.lines.push_back(line);
     for (const std::string& line : drifts_of_differences(audit))
       section.lines.push_back("Used minus found: " + line + ".");
   }

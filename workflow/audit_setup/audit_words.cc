@@ -126,14 +126,20 @@ std::vector<std::string> drifts_of_differences(const SetupAudit& audit) {
 
 std::vector<std::string> drifts_of_setup(const SetupAudit& audit) { return drift_lines(audit.setup_drift, kSetupAxes); }
 
-std::vector<std::string> opposite_axes(const SetupAudit& audit) {
+std::vector<std::string> doubtful_axes(const SetupAudit& audit) {
   std::vector<std::string> lines;
-  for (std::size_t n = 0; n < audit.axes.size(); ++n)
+  for (std::size_t n = 0; n < audit.axes.size(); ++n) {
     if (audit.axes[n].looks_opposite)
       lines.push_back(fmt::format(
           "warning: {}: the used shifts agree better with the opposite of what was found: they may not count as IEC "
           "61217 does (docs/conventions.md)",
           kCouchAxes[n]));
+    if (audit.axes[n].looks_unrelated)
+      lines.push_back(fmt::format(
+          "warning: {}: the used shifts lie hardly nearer to what was found than no shift would: were none applied, or "
+          "are they numbers of another axis, of other sessions or in another unit?",
+          kCouchAxes[n]));
+  }
   return lines;
 }
 
@@ -158,7 +164,7 @@ std::string audit_text(const SetupAudit& audit) {
     }
     if (audit.outliers.empty()) text += "  none\n";
     text += "  " + meaning_of_outliers(audit) + "\n" + agreement_text(audit) + indented(drifts_of_differences(audit)) +
-            indented(opposite_axes(audit));
+            indented(doubtful_axes(audit));
   }
   text += "\nSETUP ERROR  (found by isoshift, first session of a day; room, IEC 61217 fixed)\n" +
           indented(drifts_of_setup(audit)) + "  " + kMeaningOfDrift + "\n";

@@ -30,7 +30,7 @@ std::string counts_of(const SetupAudit& audit);
 std::vector<std::string> drifts_of_differences(const SetupAudit& audit);
 std::vector<std::string> drifts_of_setup(const SetupAudit& audit);
 // A line for each axis of which the signs look wrong.
-std::vector<std::string> opposite_axes(const SetupAudit& audit);
+std::vector<std::string> doubtful_axes(const SetupAudit& audit);
 
 // What the numbers rest on.
 std::string meaning_of_outliers(const SetupAudit& audit);

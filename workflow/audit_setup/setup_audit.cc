@@ -73,6 +73,22 @@ bool looks_opposite(const std::vector<const AuditedSession*>& compared, std::siz
   return !apart.empty() && median(apart_from_opposite) < kMuchNearer * median(apart);
 }
 
+// Whether the used shifts of an axis lie hardly nearer to what was found than no shift: they may be numbers of another
+// axis, of other sessions, or in another unit.
+bool looks_unrelated(const std::vector<const AuditedSession*>& compared, std::size_t axis) {
+  constexpr std::size_t kFewest = 4;
+  constexpr double kHardlyNearer = 0.75, kLeast = 1.0;  // of what was found, in mm or degrees
+  std::vector<double> apart, apart_from_nothing;
+  for (const AuditedSession* session : compared) {
+    if (!session->used[axis] || !session->found[axis]) continue;
+    apart.push_back(std::abs(*session->used[axis] - *session->found[axis]));
+    apart_from_nothing.push_back(std::abs(*session->found[axis]));
+  }
+  if (apart.size() < kFewest) return false;
+  const double nothing = median(apart_from_nothing);
+  return nothing > kLeast && median(apart) > kHardlyNearer * nothing;
+}
+
 // Differences of sessions with the numbers of their patients.
 class DifferencesOfPatients {
  public:
@@ -103,6 +119,7 @@ void audit_axis(const std::vector<const AuditedSession*>& compared, const std::v
   audited.drift = found.axes[axis].drift;
   audited.scatter = found.axes[axis].scatter;
   audited.looks_opposite = looks_opposite(compared, axis);
+  audited.looks_unrelated = !audited.looks_opposite && looks_unrelated(compared, axis);
 }
 
 void audit_differences(SetupAudit& audit) {

@@ -22,6 +22,7 @@ struct SetupAudit {
     std::optional<Drift> drift;                         // without outliers
     double scatter = 0.0;                               // robust standard deviation about the level
     bool looks_opposite = false;                        // used shifts agree better with the opposite of what was found
+    bool looks_unrelated = false;  // used shifts tell hardly more of what was found than zero would
   };
   struct Outlier {
     std::size_t session = 0;  // in `sessions`

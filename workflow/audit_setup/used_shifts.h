@@ -14,9 +14,10 @@ namespace isoshift {
 // The table's first line: session,lateral_mm,longitudinal_mm,vertical_mm,yaw_deg,pitch_deg,roll_deg.
 std::string used_shifts_header();
 
-// Fills in what the table says of sessions; returns the SHA-256 of the file. An empty cell is not known. Columns may
-// stand in any order, and be in cm and rad. Throws Error naming line and column for another header, a cell that is no
-// finite number, a session that is there twice or that the archive does not have, and as check_columns() does.
+// Fills in what the table says of sessions; returns the SHA-256 of the file. An empty cell is not known, nor
+// is a column that is not there. Columns may stand in any order, and be in cm and rad. Throws Error naming line and
+// column for another header, a cell that is no finite number, a session that is there twice or that the archive does
+// not have, and as check_columns() does.
 std::string read_used_table(const std::filesystem::path& table, std::vector<AuditedSession>& sessions);
 
 // Fills in what the objects in a folder mean as couch shifts: an object belongs to the session of which it names an

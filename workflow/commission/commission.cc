@@ -72,6 +72,7 @@ void check_table(const KnownPoses& poses, const Localization& localization, cons
   std::vector<StatedAndFound> sessions;
   for (const Localized& one : localization.all) {
     StatedAndFound& compared = sessions.emplace_back();
+    compared.name = one.session;
     for (std::size_t axis = 0; axis < one.found.size(); ++axis) {
       if (!one.error[axis]) continue;
       compared.stated[axis] = one.known[axis];

@@ -20,7 +20,7 @@ namespace isoshift {
 class Deliverer {
  public:
   Deliverer(const WatchFile& watch, Sender& sender, const Clock& clock)
-      : tree_(watch.results), watch_(watch), sender_(sender), clock_(clock) {}
+      : tree_(watch), watch_(watch), sender_(sender), clock_(clock) {}
 
   // Tries all deliveries that are due, until `stop` is requested. The caller must hold the lock of the tree.
   // `may_be_sent`: asked for each session, just before.

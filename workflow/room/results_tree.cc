@@ -244,7 +244,7 @@ std::string ResultsTree::hand_over(const ManualBasis& basis, const MadeResult& r
   const fs::path place = handed_over_folder(session);
   if (fs::exists(place))
     throw Error(
-        fmt::format("session {}: an earlier result by hand waits for isoshift watch. Try again when it has been "
+        fmt::format("session {}: an earlier result by hand waits for isoshift room watch. Try again when it has been "
                     "taken over",
                     session));
   const SessionRecord record = record_of(further_name(session), result.folder, result.files);
@@ -457,6 +457,14 @@ void ResultsTree::check_inputs(const std::string& session) const {
                     session, parts));
 }
 
+fs::path ResultsTree::missing_input(const std::string& session) const {
+  if (!fs::exists(order_file(name_of_xrays(session)))) return {};
+  for (const std::vector<fs::path>& files : files_of(order(session).parts))
+    for (const fs::path& file : files)
+      if (!fs::exists(file)) return file;
+  return {};
+}
+
 void ResultsTree::check_second_person(const SessionRecord& record, const std::string& releaser) const {
   const auto decided = decision(record.session);
   const std::string agreed = decided && decided->kind == DecisionKind::kAgreed ? decided->by : "";
@@ -628,12 +636,11 @@ void ResultsTree::put_release(const Release& release) {
   flush(file.parent_path());
 }
 
-std::vector<std::string> ResultsTree::released() const {
-  std::vector<std::string> sessions;
+std::set<std::string> ResultsTree::released() const {
+  std::set<std::string> sessions;
   for (const auto& entry : fs::directory_iterator(path_ / "released"))
     if (entry.path().extension() == ".json" && !entry.path().filename().string().starts_with('.'))
-      sessions.push_back(entry.path().stem().string());
-  std::ranges::sort(sessions);
+      sessions.insert(entry.path().stem().string());
   return sessions;
 }
 

@@ -106,6 +106,8 @@ class ResultsTree {
   void keep_inputs(const std::string& session, const SessionInputs& inputs);
   // From what the newest result of the session's X-rays was registered; nothing if that was not kept.
   std::optional<SessionInputs> inputs(const std::string& session) const;
+  // A file from which its X-rays were registered and that is gone: another file may have replaced it. Empty: none is.
+  std::filesystem::path missing_input(const std::string& session) const;
   // How its X-rays were registered, from the planned pose. Throws Error if that was not kept.
   RegistrationOrder order(const std::string& session) const;
   // Throws as order() does.
@@ -169,6 +171,7 @@ class ResultsTree {
   std::filesystem::file_time_type newest_deletion() const;
 
   bool is_released(const std::string& session) const;
+  std::set<std::string> released() const;  // sessions
   // The release of a session, if there is one. Throws Error for a release file that isoshift room release did not
   // write, or that was changed.
   std::optional<Release> release_of(const std::string& session) const;
@@ -215,7 +218,6 @@ class ResultsTree {
   std::filesystem::path inputs_file(const std::string& session) const;
   std::filesystem::path handed_over_folder(const std::string& session) const;
   std::filesystem::path release_file(const std::string& session) const;
-  std::vector<std::string> released() const;  // sessions
   // The record of a session. Throws Error if the session's folder has changed since its registration.
   SessionRecord checked(const std::string& session) const;
   // `handed_over`: the SHA-256 of the file that says who has; empty if nobody has.

@@ -81,7 +81,7 @@ void SessionIndex::update(const std::vector<WaitingSession>& waiting, const std:
   newest.columns = {"Session", "Patient", "Acquired", "Verdict", "Action", "State"};
   newest.summary = {fmt::format(
       "{} sessions registered, {} waiting. A result is sent only after its release: by a person, with isoshift "
-      "release SESSION --by NAME, or by the site's rule",
+      "room release SESSION --by NAME, or by the site's rule",
       list_.sessions().size(), waiting.size())};
   for (const std::string& trouble : troubles) newest.summary.push_back("Trouble: " + trouble);
   for (const WaitingSession& one : waiting) newest.rows.push_back(row_of(one));

@@ -2,11 +2,13 @@
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <sys/stat.h>
 
 #include <algorithm>
+#include <cerrno>
+#include <cstring>
 #include <functional>
 #include <iterator>
-#include <system_error>
 #include <vector>
 
 #include "base/error.h"
@@ -18,13 +20,6 @@ namespace {
 namespace fs = std::filesystem;
 
 using Files = std::vector<fs::path>;
-
-std::array<Files, SessionInputs::kParts.size()> files_of(const StudyParts& parts) {
-  const auto one = [](const fs::path& file) { return file.empty() ? Files() : Files{file}; };
-  Files structures = one(parts.structures);
-  std::ranges::copy(parts.unused_structures.rivals, std::back_inserter(structures));
-  return {parts.ct, one(parts.plan), structures, parts.images};
-}
 
 std::string sha256_of_all(const Files& files, const std::function<std::string(const fs::path&)>& of_file) {
   std::vector<std::string> all;
@@ -45,12 +40,21 @@ SessionInputs::Part input_of(const Files& files, const FileContents& contents, c
 
 }  // namespace
 
+std::array<Files, SessionInputs::kParts.size()> files_of(const StudyParts& parts) {
+  const auto one = [](const fs::path& file) { return file.empty() ? Files() : Files{file}; };
+  Files structures = one(parts.structures);
+  std::ranges::copy(parts.unused_structures.rivals, std::back_inserter(structures));
+  return {parts.ct, one(parts.plan), structures, parts.images};
+}
+
+// A copy can be given the time of writing of the file that it replaces, but not its number and its time of change.
 std::string FileContents::version(const fs::path& file) const {
-  std::error_code error;
-  const auto size = fs::file_size(file, error);
-  const auto written = error ? fs::file_time_type() : fs::last_write_time(file, error);
-  if (error) throw Error(fmt::format("{}: cannot be read: {}", file.string(), error.message()));
-  return fmt::format("{} {} {}", file.string(), size, written.time_since_epoch().count());
+  struct stat status{};
+  if (::stat(file.c_str(), &status) != 0)
+    throw Error(fmt::format("{}: cannot be read: {}", file.string(), std::strerror(errno)));
+  const timespec &written = status.st_mtim, &changed = status.st_ctim;
+  return fmt::format("{} {} {}.{:09} {} {}.{:09}", file.string(), status.st_size, written.tv_sec, written.tv_nsec,
+                     status.st_ino, changed.tv_sec, changed.tv_nsec);
 }
 
 std::string FileContents::sha256(const fs::path& file) const { return sha256_of_file(file); }

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <string>
+#include <vector>
 
 #include "io/study/study_files.h"
 
@@ -14,7 +15,7 @@ namespace isoshift {
 class FileContents {
  public:
   virtual ~FileContents() = default;
-  // Changes when the file is written or moved. Throws Error for a file that is not there.
+  // Changes when the file is written, replaced or moved. Throws Error for a file that is not there.
   virtual std::string version(const std::filesystem::path& file) const;
   // Its SHA-256. Throws Error for a file that cannot be read.
   virtual std::string sha256(const std::filesystem::path& file) const;
@@ -31,6 +32,8 @@ struct SessionInputs {
   bool operator==(const SessionInputs&) const = default;
 };
 
+// The files of each part.
+std::array<std::vector<std::filesystem::path>, SessionInputs::kParts.size()> files_of(const StudyParts& parts);
 // Throws Error for a file that cannot be read.
 SessionInputs inputs_of(const StudyParts& parts, const FileContents& contents);
 // The same, where nothing is read again of a part whose files have the versions that `before` has.

@@ -60,6 +60,8 @@ void Watch::round() {
                     tree_.path().string()));
   set_sendable({});
   was_source_read_ = is_source_read_;
+  released_.clear();
+  troubles_.attempt("reading releases", [&] { released_ = tree_.released(); });
   troubles_.attempt("receiving", [&] { receive(); });
   troubles_.attempt("comparing clocks", [&] { compare_clocks(); });
   troubles_.attempt("deleting old results", [&] { delete_old_results(); });
@@ -72,6 +74,7 @@ void Watch::round() {
     look_for_objections();
     // In its first round a source may only have seen that there are files.
     set_sendable({.is_known = was_source_read_ && is_source_read_,
+                  .released = released_,
                   .waiting = objections_.sessions_of([&](const std::string& id) { return may_have_news(id); })});
   });
   troubles_.attempt("releasing", [&] { release_automatically(); });
@@ -90,7 +93,7 @@ std::vector<std::string> Watch::troubles() const {
 void Watch::deliver(const std::stop_token& stop) {
   const auto may_be_sent = [&](const std::string& session) {
     const std::lock_guard lock(sendable_mutex_);
-    return sendable_.is_known && !sendable_.waiting.contains(session);
+    return sendable_.is_known && sendable_.released.contains(session) && !sendable_.waiting.contains(session);
   };
   sending_troubles_.attempt("sending", [&] { deliverer_.deliver(stop, may_be_sent, parts_.sending); });
 }
@@ -466,6 +469,8 @@ void Watch::release_by_rule(const std::string& session) {
                  .sudo_user = user_.sudo_user,
                  .is_person = false},
                 watch_.names_of_peers());
+  const std::lock_guard lock(sendable_mutex_);
+  sendable_.released.insert(session);  // of what this round has read
 }
 
 // A release that fails must not block the others. A result against which other X-rays speak is released by a person or

@@ -79,7 +79,8 @@ class Watch {
   // What may be sent. Not known: the source does not answer, or its X-rays were not compared with the results yet.
   struct Sendable {
     bool is_known = false;
-    std::set<std::string> waiting;  // sessions that may not
+    std::set<std::string> released = {};  // sessions, before the source was read: a file may have come just before
+    std::set<std::string> waiting = {};   // sessions that may not
   };
   struct Failure {
     std::string why;
@@ -142,6 +143,7 @@ class Watch {
   std::map<std::string, Choice> choices_;  // those that were read, also withdrawn ones
   std::string choice_trouble_;
   std::map<std::string, std::string> accepted_;  // released without a person: PatientID in the source, by session
+  std::set<std::string> released_;               // sessions, as this round began
   bool is_source_read_ = false;                  // in this round
   bool was_source_read_ = false;                 // in the round before
   bool are_clocks_compared_ = false;

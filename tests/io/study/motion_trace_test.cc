@@ -78,6 +78,21 @@ TEST_F(MotionTraceTest, AStandstillOfSecondsIsSaid) {
               testing::ElementsAre(HasSubstr("stands still to the last digit for 6.0 s, from 10.0 s on")));
 }
 
+// Recorders write -999 or the like, or go on with another marker.
+TEST_F(MotionTraceTest, PositionsThatNothingInABodyReachesAreWarnedOf) {
+  const auto trace = [](double at_10_s) {
+    std::string text = "t_s,x,y,z\n";
+    for (int n = 0; n < 200; ++n)
+      text += fmt::format("{:.1f},{:.3f},2,3\n", 0.1 * n, n == 100 ? at_10_s : 5.0 * std::sin(0.3 * n));
+    return text;
+  };
+  read(trace(5.0 * std::sin(30.0) + 8.0));
+  EXPECT_TRUE(notes_.warnings.empty()) << "a cough";
+  read(trace(-999.0));
+  EXPECT_THAT(notes_.warnings,
+              testing::ElementsAre(HasSubstr("jumps 2 times by 10 mm or more, first by 994 mm in 0.100 s, at 10.0 s")));
+}
+
 TEST_F(MotionTraceTest, ASingleWrongTimeIsLeftOutWithAWarning) {
   std::string text = "t_s,x,y,z\n";
   for (int n = 0; n < 200; ++n) text += (n == 100 ? "3" : std::to_string(n)) + ",1,2,3\n";

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "tests/support/audited_archive.h"
+#include "workflow/audit_setup/audit_words.h"
 
 namespace isoshift::setup_audit_test {
 namespace {
@@ -161,6 +162,19 @@ TEST(SetupAudit, GivesMarginsOfWhatWasFoundAndOfWhatIsLeft) {
   add("B", 2.6, 50.0, 0.0);
   sessions.back().is_first_of_day = false;
   EXPECT_DOUBLE_EQ(audit_of(sessions).uncorrected->errors.mean[0], 0.5);
+}
+
+// As where one column of a spreadsheet was sorted.
+TEST(SetupAudit, NoticesShiftsOfOtherSessions) {
+  std::vector<AuditedSession> sessions = audited(made_archive(8, 0.0, false));
+  EXPECT_FALSE(audit_of(sessions).axes[1].looks_unrelated);
+  const CouchAxes first = sessions.front().used;
+  for (std::size_t n = 0; n + 1 < sessions.size(); ++n) sessions[n].used[1] = sessions[n + 1].used[1];
+  sessions.back().used[1] = first[1];
+  const SetupAudit audit = audit_of(sessions);
+  EXPECT_TRUE(audit.axes[1].looks_unrelated);
+  EXPECT_FALSE(audit.axes[0].looks_unrelated || audit.axes[2].looks_unrelated);
+  EXPECT_THAT(audit_text(audit), testing::HasSubstr("longitudinal: the used shifts lie hardly nearer"));
 }
 
 TEST(SetupAudit, NoticesADisplayThatCountsTheOtherWay) {

@@ -217,6 +217,61 @@ TEST_F(UsedTable, WhatWasNotAppliedIsInNoOtherUnit) {
   EXPECT_EQ(error_of_table(used_shifts_header(), {0.5, 0.5, 2, 1, 1, 1}), "");
 }
 
+TEST_F(UsedTable, LengthsInInchesAndMetersAreFound) {
+  EXPECT_THAT(error_of_table(used_shifts_header(), {1 / 25.4, 1 / 25.4, 1 / 25.4, 1, 1, 1}),
+              HasSubstr("25.4 times lateral_mm"));
+  EXPECT_THAT(error_of_table(used_shifts_header(), {0.001, 0.001, 0.001, 1, 1, 1}),
+              HasSubstr("1e+03 times lateral_mm"));
+}
+
+TEST_F(UsedTable, LengthsAndAnglesThatAreExchangedAreFound) {
+  EXPECT_THAT(error_of_table(used_shifts_header(), {1, 1, 1, 1, 1, 1}, {3, 4, 5, 0, 1, 2}),
+              AllOf(HasSubstr("lateral_mm fits to what was found as yaw_deg"),
+                    HasSubstr("roll_deg fits to what was found as vertical_mm")));
+  EXPECT_THAT(error_of_table(used_shifts_header(), {1, 1, 1, 1, 1, 1}, {3, 1, 2, 0, 4, 5}),
+              HasSubstr("yaw_deg fits to what was found as lateral_mm"));
+}
+
+// As after a console was exchanged.
+TEST_F(UsedTable, SomeSessionsInAnotherUnitAreFound) {
+  std::string text = used_shifts_header() + "\n";
+  for (std::size_t n = 0; n < sessions_.size(); ++n) {
+    const double factor = n < 2 ? 0.1 : 1.0;
+    const CouchAxes& found = sessions_[n].found;
+    text += fmt::format("{},{:.2f},{:.2f},{:.2f},{:.2f},,\n", sessions_[n].name, factor * *found[0], factor * *found[1],
+                        factor * *found[2], *found[3]);
+  }
+  replace_text(folder_ / "used.csv", text);
+  std::string error;
+  try {
+    read_used_table(folder_ / "used.csv", sessions_);
+  } catch (const Error& thrown) {
+    error = thrown.what();
+  }
+  EXPECT_THAT(error, HasSubstr("10 times the lengths of 2 of 5 sessions: a, b"));
+}
+
+// What is small by itself is near to nearly nothing, in whatever unit.
+TEST_F(UsedTable, ShiftsThatTellNothingOfSmallSetupErrorsAreInNoOtherUnit) {
+  const double small[5] = {0.3, -0.2, 0.4, 0.1, -0.3};
+  for (std::size_t n = 0; n < 5; ++n)
+    for (std::size_t axis = 0; axis < 3; ++axis) sessions_[n].found[axis] = small[(n + axis) % 5];
+  std::string text = used_shifts_header() + "\n";
+  const double used[5] = {-4.0, 3.1, 2.2, -5.0, 3.3};
+  for (std::size_t n = 0; n < 5; ++n)
+    text += fmt::format("{},{},{},{},,,\n", sessions_[n].name, used[n], used[4 - n], used[n]);
+  replace_text(folder_ / "used.csv", text);
+  EXPECT_NO_THROW(read_used_table(folder_ / "used.csv", sessions_));
+}
+
+TEST_F(UsedTable, ATurnIsTheSameAroundTheCircle) {
+  replace_text(folder_ / "used.csv", "session,yaw_deg\na,359.2\nb,1.9\n");
+  read_used_table(folder_ / "used.csv", sessions_);
+  EXPECT_NEAR(sessions_[0].used[3].value(), -0.8, 1e-9);
+  EXPECT_DOUBLE_EQ(sessions_[1].used[3].value(), 1.9);
+  EXPECT_FALSE(sessions_[0].used[0]) << "a column that is not there is not known";
+}
+
 // As a spreadsheet set to German writes it.
 TEST_F(UsedTable, SemicolonsAndDecimalCommasAreNamed) {
   EXPECT_THAT(error_of("session;lateral_mm;longitudinal_mm\na;1,5;2\n"),

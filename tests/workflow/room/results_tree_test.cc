@@ -213,8 +213,23 @@ TEST_F(ResultsTreeTest, WhatWasRegisteredFromFilesThatHaveChangedIsNeitherReleas
   EXPECT_EQ(error_of_sending(delivery), "");
   replace_text(plan, "another plan of this name");
   EXPECT_THAT(error_of_sending(delivery), HasSubstr("RT Plan changed after the registration"));
+  EXPECT_EQ(tree_.missing_input(a_), fs::path());
   fs::remove(plan);
   EXPECT_EQ(error_of_sending(delivery), "") << "files that were taken away tell nothing";
+  EXPECT_EQ(tree_.missing_input(a_), plan);
+}
+
+// As by a tool that copies the time of writing, too, or on a disk that knows whole seconds only.
+TEST_F(ResultsTreeTest, AFileOfTheSameSizeAndTimeOfWritingIsAnotherOne) {
+  const fs::path plan = folder_ / "plan.dcm";
+  replace_text(plan, "the plan");
+  const auto written = fs::last_write_time(plan);
+  const StudyParts parts{.plan = plan};
+  tree_.keep_order(a_, {.parts = parts});
+  tree_.keep_inputs(a_, inputs_of(parts, FileContents()));
+  replace_text(plan, "not plan");
+  fs::last_write_time(plan, written);
+  EXPECT_THAT(error_of_release(a_), HasSubstr("RT Plan changed after the registration"));
 }
 
 TEST_F(ResultsTreeTest, AFolderThatIsNotWhatWasRegisteredIsNotReleased) {

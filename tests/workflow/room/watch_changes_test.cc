@@ -112,6 +112,17 @@ TEST_F(WatchChanges, WhatIsReleasedBeforeAReplacedPlanIsComparedIsNotSent) {
   EXPECT_THAT(sessions(), SizeIs(2));
 }
 
+// The plan is replaced, and its result released, between two rounds; then sending comes first.
+TEST_F(WatchChanges, WhatIsReleasedAfterTheSourceWasReadWaitsUntilItIsReadAgain) {
+  revise_plan();
+  release("P");
+  room_.watch->deliver({});
+  EXPECT_THAT(room_.sender.attempts(), SizeIs(0));
+  room_.pass(3600s, 10s);
+  EXPECT_THAT(room_.sender.attempts(), SizeIs(0));
+  EXPECT_THAT(objection(session("P")), HasSubstr("RT Plan changed after the registration"));
+}
+
 TEST_F(WatchChanges, ARestartIsNoWayAroundTheComparison) {
   revise_plan();
   room_.pass(2s);

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
 
 #include "base/output_folder.h"
@@ -154,6 +155,17 @@ TEST_P(WatchForgeries, ALineInTheLogIsNotEnoughWhereThereIsAKey) {
       .append("handed over", {{"session", session("P")}, {"file", sha256_of(forged.dump())}});
   expect_nothing_sent();
   EXPECT_THAT(room_.observer.lines, Contains(HasSubstr("is not signed by the signing_key")));
+}
+
+// Whoever sends asks for the signature, too.
+TEST_P(WatchForgeries, AReleaseThatTheKeyHasNotSignedIsNotSent) {
+  release("P");  // without the key
+  room_.pass(600s, 10s);
+  EXPECT_EQ(room_.sender.attempts().empty(), GetParam());
+  EXPECT_EQ(
+      std::ranges::count_if(room_.sending.lines,
+                            [](const std::string& line) { return line.find("is not signed by the") != line.npos; }),
+      GetParam() ? 1 : 0);
 }
 
 INSTANTIATE_TEST_SUITE_P(Keys, WatchForgeries, testing::Bool(),
