@@ -280,7 +280,7 @@ TEST_F(StudyFilesTest, WhyThereAreNoStructuresIsTold) {
   const std::filesystem::path second = study_.path() / "second.dcm";
   std::filesystem::copy(study_.structures(), second);
   edit(second, [](DicomItem d) { d.put(DCM_SOPInstanceUID, "1.2.3.5"); });
-  EXPECT_EQ(why(), "nothing tells which of 2 RT Structure Sets on this CT is meant (RTSTRUCT.dcm, second.dcm)");
+  EXPECT_EQ(why(), "nothing tells which of 2 RT Structure Sets is meant for this CT (RTSTRUCT.dcm, second.dcm)");
   for (const std::filesystem::path& file : {study_.structures(), second})
     edit(file, [](DicomItem d) {
       d.append_item(DCM_ReferencedFrameOfReferenceSequence)
