@@ -112,6 +112,9 @@ TEST_F(StudyFilesTest, PlanningDrrsAndFluencesAreLeftAsideWhereThereAreXrays) {
   EXPECT_THAT(find().images, ElementsAre(study_.image(0), study_.image(1)));
   for (const fs::path& file : computed)
     EXPECT_THAT(notes_.left_aside, Contains(AllOf(HasSubstr(file.string()), HasSubstr("says that it was computed"))));
+  // A DRR that is called a radiograph.
+  edit(computed[0], [](DicomItem d) { d.put(DCM_ImageType, "DERIVED\\SECONDARY\\RADIOGRAPH"); });
+  EXPECT_THAT(find().images, ElementsAre(study_.image(0), study_.image(1)));
   const StudyParts one_is_named = {.images = {study_.image(1), computed[0]}};
   EXPECT_THAT(find(one_is_named).images, ElementsAre(study_.image(1), computed[0])) << "that is a matter for checks";
   std::vector<SessionFiles> sessions = sessions_of(scan_study({study_.path()}), false);
@@ -251,6 +254,36 @@ TEST_F(StudyFilesTest, OfSeveralStructureSetsThePlanOrAPersonDecides) {
   EXPECT_THAT(notes_.left_aside,
               Contains(study_.structures().string() + ": an RT Structure Set that the plan does not refer to"));
   EXPECT_THAT(notes_.left_aside, Contains(copy.string() + ": the same RT Structure Set as " + second.string()));
+}
+
+// Drawn again under the same UID: the name of a file must not decide.
+TEST_F(StudyFilesTest, StructureSetsOfOneUidWithOtherContentsAreRivals) {
+  draw(study_, {{"PTV", {rectangle({0, 40, -400}, 20, 20)}}});
+  const fs::path again = study_.path() / "RS_again.dcm";
+  fs::copy(study_.structures(), again);
+  EXPECT_TRUE(find().unused_structures.rivals.empty());
+  edit(again, [](DicomItem d) { d.put(DCM_StructureSetLabel, "LATER"); });
+  const StudyParts parts = find();
+  EXPECT_EQ(parts.structures, fs::path());
+  EXPECT_THAT(parts.unused_structures.rivals, UnorderedElementsAre(study_.structures(), again));
+}
+
+// Where UIDs were replaced in some files only, references lead nowhere.
+TEST_F(StudyFilesTest, AStructureSetOfACtThatIsNotHereMayHoldTheTarget) {
+  draw(study_, {{"PTV", {rectangle({0, 40, -400}, 20, 20)}}});
+  edit(study_.structures(), [](DicomItem d) {
+    d.append_item(DCM_ReferencedFrameOfReferenceSequence)
+        .append_item(DCM_RTReferencedStudySequence)
+        .append_item(DCM_RTReferencedSeriesSequence)
+        .put(DCM_SeriesInstanceUID, "1.2.3");
+  });
+  const StudyParts parts = find();
+  EXPECT_EQ(parts.structures, fs::path());
+  EXPECT_THAT(parts.unused_structures.rivals, ElementsAre(study_.structures()));
+  EXPECT_EQ(why_no_structures(parts.unused_structures),
+            "nothing tells whether RTSTRUCT.dcm was drawn on this CT: it names another one, which is not here");
+  EXPECT_THAT(notes_.left_aside,
+              Contains(study_.structures().string() + ": an RT Structure Set of another CT, which is not here"));
 }
 
 // As treatment planning systems export them: a set that holds a setup isocenter, drawn on the same CT.
