@@ -314,14 +314,15 @@ TEST_F(StudyFilesTest, WhyThereAreNoStructuresIsTold) {
   std::filesystem::copy(study_.structures(), second);
   edit(second, [](DicomItem d) { d.put(DCM_SOPInstanceUID, "1.2.3.5"); });
   EXPECT_EQ(why(), "nothing tells which of 2 RT Structure Sets is meant for this CT (RTSTRUCT.dcm, second.dcm)");
-  for (const std::filesystem::path& file : {study_.structures(), second})
-    edit(file, [](DicomItem d) {
-      d.append_item(DCM_ReferencedFrameOfReferenceSequence)
-          .append_item(DCM_RTReferencedStudySequence)
-          .append_item(DCM_RTReferencedSeriesSequence)
-          .put(DCM_SeriesInstanceUID, "1.2.3");
-    });
-  EXPECT_EQ(why(), "no RT Structure Set of the study has a closed contour on this CT (RTSTRUCT.dcm, second.dcm)");
+  std::filesystem::remove(second);
+  draw(study_, {{"Isocenter", {{{1, 2, 3}}}, "POINT"}});
+  edit(study_.structures(), [](DicomItem d) {
+    d.append_item(DCM_ReferencedFrameOfReferenceSequence)
+        .append_item(DCM_RTReferencedStudySequence)
+        .append_item(DCM_RTReferencedSeriesSequence)
+        .put(DCM_SeriesInstanceUID, "1.2.3");
+  });
+  EXPECT_EQ(why(), "no RT Structure Set of the study has a closed contour on this CT (RTSTRUCT.dcm)");
 }
 
 TEST_F(StudyFilesTest, ACtInNoPlansFrameIsRefused) {
