@@ -11,11 +11,12 @@ namespace {
 
 constexpr std::size_t kDefaultColumns = 80, kFewestColumns = 60, kMostColumns = 120;
 
-// The first `columns` columns of a line, up to a space; the whole first word if that is longer.
+// The first `columns` columns of a line, up to a space; of a first word that is longer, up to a comma, or all of it.
 std::size_t words_within(std::string_view line, std::size_t columns) {
   if (line.size() <= columns) return line.size();
   const std::size_t before = line.rfind(' ', columns);
   if (before != line.npos && before > line.find_first_not_of(' ')) return before;
+  if (const std::size_t comma = line.rfind(',', columns - 1); comma != line.npos) return comma + 1;
   return std::min(line.find(' ', columns), line.size());
 }
 

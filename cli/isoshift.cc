@@ -132,6 +132,12 @@ std::string command_like(const CLI::App& app, std::string_view word) {
 
 std::string did_you_mean(const std::string& what) { return what.empty() ? "" : "; did you mean " + what + "?"; }
 
+// How a command is called in a shell.
+std::string called(const CLI::App& command) {
+  const std::string path = path_of(command);
+  return path.empty() ? "isoshift" : "isoshift " + path;
+}
+
 std::vector<std::string> flags_of(const CLI::App& command) {
   std::vector<std::string> flags;
   for (const CLI::Option* option : command.get_options())
@@ -140,8 +146,7 @@ std::vector<std::string> flags_of(const CLI::App& command) {
 }
 
 std::string unknown_flag(const CLI::App& command, std::string_view flag) {
-  const std::string path = path_of(command), meant = suggestion(flag, flags_of(command));
-  return fmt::format("isoshift{}{} has no flag {}{}", path.empty() ? "" : " ", path, flag, did_you_mean(meant));
+  return fmt::format("{} has no flag {}{}", called(command), flag, did_you_mean(suggestion(flag, flags_of(command))));
 }
 
 // A flag that is mistyped is named before one that is missing.
@@ -154,12 +159,18 @@ void check_flags(const CLI::App& command, std::span<const std::string> words) {
   }
 }
 
+// The command whose flags and arguments were being read.
+const CLI::App& command_read(const CLI::App& app) {
+  const std::vector<CLI::App*> below = app.get_subcommands();
+  return below.empty() ? app : command_read(*below.back());
+}
+
 // CLI11 would say only that a command is missing, or of what stands before it that the command lacks it.
 void check_command(const CLI::App& app, std::span<const std::string> words) {
   std::vector<std::string> names;
   for (const CLI::App* command : app.get_subcommands({})) names.push_back(command->get_name());
   if (names.empty()) return check_flags(app, words);
-  const std::string path = path_of(app), program = path.empty() ? "isoshift" : "isoshift " + path;
+  const std::string program = called(app);
   if (words.empty())
     throw UsageError(fmt::format("{} needs a command: {}\n       {} --help explains them", program,
                                  fmt::join(names, ", "), program));
@@ -180,14 +191,25 @@ void check_command(const CLI::App& app, std::span<const std::string> words) {
 
 // What CLI11 did not expect, each with what it probably was to be.
 std::string unexpected_words(const CLI::App& app) {
-  const CLI::App* command = &app;
-  while (!command->get_subcommands().empty()) command = command->get_subcommands().back();
+  const CLI::App& command = command_read(app);
   std::vector<std::string> complaints;
   for (const std::string& word : app.remaining(true))
-    complaints.push_back(word.starts_with('-')
-                             ? unknown_flag(*command, word)
-                             : fmt::format("isoshift {} does not expect {}", path_of(*command), word));
+    complaints.push_back(word.starts_with('-') ? unknown_flag(command, word.substr(0, word.find('=')))
+                                               : fmt::format("{} does not expect {}", called(command), word));
   return fmt::format("{}", fmt::join(complaints, "\n       "));
+}
+
+// What was wrong with the words. A flag that was mistyped is named before what is then missing.
+std::string usage_error(const CLI::App& app, const CLI::ParseError& error) {
+  const bool is_missing = error.get_exit_code() == static_cast<int>(CLI::ExitCodes::RequiredError);
+  if (error.get_exit_code() == static_cast<int>(CLI::ExitCodes::ExtrasError) ||
+      (is_missing && !app.remaining(true).empty()))
+    return unexpected_words(app);
+  const CLI::App& command = command_read(app);
+  std::vector<std::string> below;
+  for (const CLI::App* one : command.get_subcommands({})) below.push_back(one->get_name());
+  if (!is_missing || below.empty()) return error.what();
+  return fmt::format("{} needs a command: {}", called(command), fmt::join(below, ", "));
 }
 
 // "--site: " for the value of a flag.
@@ -254,17 +276,14 @@ int run_isoshift(int argc, const char* const* argv, Console& console) {
     check_words(words);
     std::ranges::reverse(words);  // as CLI11 takes them
     app.parse(words);
-  } catch (const CLI::ExtrasError&) {
-    console.err << "error: " << printable_lines(unexpected_words(app))
-                << "\n       isoshift COMMAND --help explains the flags\n";
-    return kExitUsage;
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() == 0) {  // the help, or the version
       app.exit(error, console.out, console.err);
       return after_printing(kExitAccepted, console);
     }
-    console.err << "error: " << printable_lines(error.what())
-                << "\n       isoshift COMMAND --help explains the flags\n";
+    const CLI::App& command = command_read(app);
+    console.err << "error: " << printable_lines(usage_error(app, error)) << "\n       " << called(command)
+                << " --help explains the " << (command.get_subcommands({}).empty() ? "flags" : "commands") << "\n";
     return kExitUsage;
   } catch (const UsageError& error) {
     return say(console, error, kExitUsage);

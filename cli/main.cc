@@ -80,7 +80,7 @@ void keep_from_strangers() {
 
 int main(int argc, char** argv) {
   keep_from_strangers();
-  ::signal(SIGABRT, &end_without_traces);
+  for (const int signal : {SIGABRT, SIGTRAP}) ::signal(signal, &end_without_traces);  // GLib traps
   ::unsetenv("DCMDICTPATH");  // no variable of a shell may change what DCMTK takes attributes for
   isoshift::name_options(isoshift::OptionStyle::kFlags);
   // Not commands for people: what this program runs as its child, and the manual that the build makes.

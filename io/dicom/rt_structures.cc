@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <set>
+#include <utility>
 
 #include "base/error.h"
 
@@ -91,6 +92,14 @@ bool equal_but_for_case(std::string_view one, std::string_view other) {
 }
 
 }  // namespace
+
+std::string_view target_type_by_name(const Structure& structure) {
+  if (!structure.interpreted_type.empty() && structure.interpreted_type != "ORGAN") return "";
+  for (const auto& [beginning, type] :
+       {std::pair("PTV", "PTV"), std::pair("CTV", "CTV"), std::pair("ITV", "CTV"), std::pair("GTV", "GTV")})
+    if (equal_but_for_case(std::string_view(structure.name).substr(0, 3), beginning)) return type;
+  return "";
+}
 
 bool holds_closed_contour(const DicomItem& dataset) {
   for (const DicomItem& roi : dataset.items(DCM_ROIContourSequence))

@@ -37,6 +37,10 @@ struct RtStructures {
   std::vector<Structure> structures;
 };
 
+// What a structure is a volume of by the beginning of its name, as TG-263 names them: "PTV", "CTV" (an ITV, too),
+// "GTV", or empty. Programs that know no types write none, or ORGAN for all.
+std::string_view target_type_by_name(const Structure& structure);
+
 // Whether a dataset of a structure set holds a closed contour: one of points alone, such as a setup isocenter, does
 // not.
 bool holds_closed_contour(const DicomItem& dataset);

@@ -56,10 +56,16 @@ SessionFiles chosen_session(const SessionChoice& choice, const std::vector<Sessi
   };
   std::vector<SessionFiles> fitting;
   std::string unnumbered;  // an X-ray of a session that may be of any fraction
+  const auto has_fraction = [&](const StudyFiles::Image& image) { return image.fraction == choice.fraction; };
   for (const SessionFiles& session : sessions) {
     if (!session.name.starts_with(choice.name)) continue;
     if (!choice.date.empty() && !is_of_day(session, choice.date)) continue;
     if (choice.fraction && !fraction_of(session)) unnumbered = session.images.front().file.string();
+    if (choice.fraction && !fraction_of(session) && std::ranges::any_of(session.images, has_fraction))
+      fail(
+          fmt::format("{}: is of a session in which only some X-rays are of fraction {}, so that it is not known which "
+                      "session is meant. Name it: {}",
+                      unnumbered, *choice.fraction, option("session", "NAME")));
     if (choice.fraction && fraction_of(session) != choice.fraction) continue;
     fitting.push_back(session);
   }

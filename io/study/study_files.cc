@@ -97,9 +97,11 @@ StudyFiles::Image xray(const fs::path& path, const DicomItem& dataset) {
                                         dataset.text(DCM_ReportedValuesOrigin))};
 }
 
-// Whether an RT Image says that it was computed: a plan is exported with its DRRs, fluences and dose images.
+// Whether an RT Image says that it was computed: a plan is exported with its DRRs, fluences and dose images. Some
+// planning systems call a DRR a radiograph; it is derived, and its angles are those of the plan.
 bool is_computed(const DicomItem& dataset) {
   const auto type = dataset.texts(DCM_ImageType);
+  if (!type.empty() && type[0] == "DERIVED" && dataset.text(DCM_ReportedValuesOrigin) == "PLAN") return true;
   return type.size() > 2 && (type[2] == "DRR" || type[2] == "FLUENCE" || type[2] == "BLANK");
 }
 
@@ -238,6 +240,10 @@ bool is_drawn_on(const StudyFiles::Ct& ct, const StudyFiles::Structures& structu
                                            : structures.ct_series_uids.contains(ct.series_instance_uid);
 }
 
+bool are_copies(const StudyFiles::Structures& one, const StudyFiles::Structures& other) {
+  return one.sop_instance_uid == other.sop_instance_uid && sha256_of_file(one.file) == sha256_of_file(other.file);
+}
+
 // The structure set that the plan refers to, else all drawn on the CT; copies of one count once. Those without closed
 // contours compete with none that has some.
 std::vector<const StudyFiles::Structures*> candidates_of(const std::vector<StudyFiles::Structures>& all,
@@ -245,9 +251,8 @@ std::vector<const StudyFiles::Structures*> candidates_of(const std::vector<Study
   std::vector<const StudyFiles::Structures*> candidates;
   const auto add_where = [&](auto&& is_candidate) {
     for (const StudyFiles::Structures& structures : all)
-      if (is_candidate(structures) && std::ranges::none_of(candidates, [&](const auto* earlier) {
-            return earlier->sop_instance_uid == structures.sop_instance_uid;
-          }))
+      if (is_candidate(structures) &&
+          std::ranges::none_of(candidates, [&](const auto* earlier) { return are_copies(*earlier, structures); }))
         candidates.push_back(&structures);
   };
   for (const bool has_contours : {true, false}) {
@@ -263,11 +268,20 @@ std::vector<const StudyFiles::Structures*> candidates_of(const std::vector<Study
   return candidates;
 }
 
-void choose_structures(const std::vector<StudyFiles::Structures>& all, const StudyFiles::Plan* plan,
-                       const StudyFiles::Ct& ct, StudyParts& parts, Notes& notes) {
+// Whether no CT of the study is the one that a structure set of the patient says it was drawn on. References are lost
+// where UIDs are replaced in some files and not in others: then it may have been drawn on this CT all the same.
+bool is_of_absent_ct(const StudyFiles& files, const StudyFiles::Ct& ct, const StudyFiles::Structures& structures) {
+  return structures.has_contours && patient_id_of(structures.patient) == patient_id_of(ct.patient) &&
+         std::ranges::none_of(files.cts, [&](const auto& one) { return is_drawn_on(one, structures); });
+}
+
+void choose_structures(const StudyFiles& files, const StudyFiles::Plan* plan, const StudyFiles::Ct& ct,
+                       StudyParts& parts, Notes& notes) {
+  const std::vector<StudyFiles::Structures>& all = files.structures;
   const auto candidates = candidates_of(all, plan, ct);
   if (candidates.size() == 1) parts.structures = candidates.front()->file;
   const bool are_rivals = candidates.size() > 1 && candidates.front()->has_contours;
+  const bool may_hold_target = candidates.size() == 1 && candidates.front()->has_contours;
   const bool is_planned = plan != nullptr && !plan->structure_set_uid.empty() && !candidates.empty();
   if (is_planned && candidates.front()->sop_instance_uid != plan->structure_set_uid)
     notes.warnings.push_back(fmt::format(
@@ -284,9 +298,13 @@ void choose_structures(const std::vector<StudyFiles::Structures>& all, const Stu
   for (const StudyFiles::Structures& structures : all) {
     if (structures.file == parts.structures) continue;
     const bool is_rival = are_rivals && structures.has_contours && is_drawn_on(ct, structures);
-    if (parts.structures.empty())
-      (is_rival ? parts.unused_structures.rivals : parts.unused_structures.unusable).push_back(structures.file);
-    std::string reason = "an RT Structure Set that was not drawn on the CT";
+    const bool is_astray =
+        candidates.empty() || !candidates.front()->has_contours ? is_of_absent_ct(files, ct, structures) : false;
+    if (!may_hold_target)
+      (is_rival || is_astray ? parts.unused_structures.rivals : parts.unused_structures.unusable)
+          .push_back(structures.file);
+    std::string reason = is_astray ? "an RT Structure Set of another CT, which is not here"
+                                   : "an RT Structure Set that was not drawn on the CT";
     if (candidates.size() == 1 && structures.sop_instance_uid == candidates.front()->sop_instance_uid)
       reason = fmt::format("the same RT Structure Set as {}", parts.structures.string());
     else if (is_drawn_on(ct, structures) && !structures.has_contours)
@@ -398,7 +416,7 @@ StudyParts chosen(StudyFiles files, std::vector<StudyFiles::Plan> other_plans, c
   else if (files.structures.empty())
     parts.unused_structures = named.unused_structures;
   else
-    choose_structures(files.structures, plan, ct, parts, notes);
+    choose_structures(files, plan, ct, parts, notes);
   choose_images(files.images, plan, other_plans, !named.images.empty(), parts, notes);
   if (parts.images.empty())
     throw Error(
@@ -440,8 +458,8 @@ std::vector<std::string> drrs_left_aside(const StudyFiles& files) {
   std::vector<std::string> lines;
   for (const StudyFiles::Image& drr : files.drrs)
     if (patients.contains(patient_id_of(drr.patient)))
-      lines.push_back(fmt::format("{}: {} says that it was computed (a DRR, or a fluence): it is no X-ray",
-                                  drr.file.string(), described(DCM_ImageType)));
+      lines.push_back(fmt::format("{}: {} or {} says that it was computed (a DRR, or a fluence): it is no X-ray",
+                                  drr.file.string(), described(DCM_ImageType), described(DCM_ReportedValuesOrigin)));
   return lines;
 }
 
@@ -501,8 +519,11 @@ std::string why_no_structures(const UnusedStructures& unused) {
     for (const fs::path& file : files) list += (list.empty() ? "" : ", ") + file.filename().string();
     return list;
   };
+  if (unused.rivals.size() == 1)
+    return fmt::format("nothing tells whether {} was drawn on this CT: it names another one, which is not here",
+                       names(unused.rivals));
   if (!unused.rivals.empty())
-    return fmt::format("nothing tells which of {} RT Structure Sets on this CT is meant ({})", unused.rivals.size(),
+    return fmt::format("nothing tells which of {} RT Structure Sets is meant for this CT ({})", unused.rivals.size(),
                        names(unused.rivals));
   if (!unused.unusable.empty())
     return fmt::format("no RT Structure Set of the study has a closed contour on this CT ({})", names(unused.unusable));

@@ -109,9 +109,10 @@ struct SessionChoice {
   bool operator==(const SessionChoice&) const = default;
 };
 
-// The structure sets that are there, where none of them is used.
+// The structure sets that are there, where none with contours is used.
 struct UnusedStructures {
-  std::vector<std::filesystem::path> rivals;    // with contours on the CT, and nothing tells which one is meant
+  // With contours, and nothing tells which one is meant; or, where none is on the CT, of CTs that are not here.
+  std::vector<std::filesystem::path> rivals;
   std::vector<std::filesystem::path> unusable;  // drawn on another CT, or without closed contours
 
   bool operator==(const UnusedStructures&) const = default;
@@ -127,7 +128,7 @@ struct StudyParts {
   SessionChoice session;        // among the X-rays of that folder
   std::vector<std::filesystem::path> ct, images;
   std::filesystem::path plan, structures;
-  UnusedStructures unused_structures;  // where `structures` is empty
+  UnusedStructures unused_structures;  // where `structures` is empty, or has no contours
   std::vector<std::string> doubts;     // why the images may not show one setup: then the result needs a person's review
 
   std::vector<std::filesystem::path> paths() const;  // all that are named

@@ -14,6 +14,7 @@
 namespace isoshift {
 namespace {
 
+constexpr std::ptrdiff_t kFewestPixels = 150;  // 12 x 12, as few as a nearly closed collimator leaves
 constexpr double kRimMm = 2.0;  // left out at the panel's rim and along the collimator's penumbra, at the isocenter
 
 bool is_convex(const std::vector<Eigen::Vector2d>& polygon) {
@@ -109,6 +110,17 @@ std::vector<Eigen::Vector2d> receptor_corners(const XrayView& view) {
   return {{-0.5, -0.5}, {right, -0.5}, {right, bottom}, {-0.5, bottom}};
 }
 
+// A watch, a plate or a marker with straight edges, as bright as nothing else, looks like a field. What it encloses is
+// saturated, or next to nothing: then all of the receptor is compared, and a person must look.
+void doubt_empty_field(FixedImage& image) {
+  if (std::ranges::count(image.field.pixels, 1) >= kFewestPixels) return;
+  image.irradiated = {.corners_px = receptor_corners(image.view),
+                      .doubt =
+                          "what the edges that were found enclose is saturated, or next to nothing: they may be an "
+                          "object's (a watch, a plate)"};
+  put_field(image);
+}
+
 }  // namespace
 
 double pixels_per_mm(const XrayView& view) {
@@ -196,6 +208,7 @@ FixedImage prepare(const XrayImage& xray) {
   image.irradiated = xray.view.is_line_scan() ? IrradiatedField{.corners_px = receptor_corners(xray.view)}
                                               : find_irradiated_field(xray, pixels_per_mm(xray.view));
   put_field(image);
+  if (image.irradiated.origin != IrradiatedField::Origin::kWholeReceptor) doubt_empty_field(image);
   return image;
 }
 

@@ -224,20 +224,24 @@ TEST_F(ContradictionsCommandTest, APlanForAnotherTableIsWarnedOf) {
 }
 
 // A couch angle on another scale turns the answer by twice its value. A site decides by its own action level.
-TEST_F(ContradictionsCommandTest, ARotationAboveFiveDegreesNeedsAReviewWithoutASiteFile) {
-  const auto reasons = [&](double rz_deg, bool has_site) {
+TEST_F(ContradictionsCommandTest, ARotationAboveFiveDegreesNeedsAReviewUnlessTheSiteHasALimit) {
+  const auto reasons = [&](double rz_deg, const std::string& action_levels) {
     PhantomOptions phantom = small_phantom();
     phantom.placement.rotation_deg = Eigen::Vector3d(0.5, -0.5, rz_deg);
     const SmallStudy study(phantom);
     const std::filesystem::path site = study.path().parent_path() / "site.json";
-    std::ofstream(site) << R"({"site_file": 1, "name": "S"})";
-    register_study(study, has_site ? std::vector<std::string>{"--site", site.string()} : std::vector<std::string>());
+    std::ofstream(site) << R"({"site_file": 1, "name": "S")" << action_levels << "}";
+    register_study(study, action_levels == "no site" ? std::vector<std::string>()
+                                                     : std::vector<std::string>{"--site", site.string()});
     return result_of(study)["reasons"].dump();
   };
-  EXPECT_THAT(reasons(5.6, false),
+  EXPECT_THAT(reasons(5.6, "no site"),
               HasSubstr("the couch would have to turn by -5.6 degrees (yaw), more than 5 degrees"));
-  EXPECT_THAT(reasons(5.6, true), testing::Not(HasSubstr("the couch would have to turn")));
-  EXPECT_THAT(reasons(-4.6, false), testing::Not(HasSubstr("the couch would have to turn")));
+  for (const char* without_rotation : {"", R"(, "action_levels": {"default": {"vector_mm": 4}})"})
+    EXPECT_THAT(reasons(5.6, without_rotation), HasSubstr("the couch would have to turn by -5.6 degrees (yaw)"));
+  EXPECT_THAT(reasons(5.6, R"(, "action_levels": {"default": {"rotation_deg": 2}})"),
+              testing::Not(HasSubstr("the couch would have to turn")));
+  EXPECT_THAT(reasons(-4.6, "no site"), testing::Not(HasSubstr("the couch would have to turn")));
 }
 
 TEST_F(ContradictionsCommandTest, ATruthAboutAnotherSetupIsRefusedBeforeAnythingIsWritten) {

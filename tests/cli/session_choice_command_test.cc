@@ -102,6 +102,14 @@ TEST_F(SessionChoiceCommandTest, SessionsWithoutANumberDoNotHideTheFractionThatI
   EXPECT_THAT(register_with({"--fraction", "1"}).err, HasSubstr("FractionNumber (3002,0029) is missing or differs"));
 }
 
+TEST_F(SessionChoiceCommandTest, ASessionOfWhichOnlySomeXraysHaveTheFractionIsNotPassedOver) {
+  number_fractions();
+  edit(study_ / "RTIMAGE/KV_G090.dcm", [](DicomItem d) { d.put(DCM_FractionNumber, 2.0); });
+  const CommandOutcome outcome = register_with({"--fraction", "2"});
+  EXPECT_EQ(outcome.exit_status, 1);
+  EXPECT_THAT(outcome.err, HasSubstr("only some X-rays are of fraction 2"));
+}
+
 // The clock of an imager that is a century ahead.
 TEST_F(SessionChoiceCommandTest, XraysFromTheFutureAreNotTheLatest) {
   for (const char* name : {"KV_G000.dcm", "KV_G090.dcm"})

@@ -93,6 +93,18 @@ TEST(Preprocess, WhatIsCutOffIsLeftOutOfTheField) {
   EXPECT_EQ(prepare(windowed).field.at(100, 100), 0);
 }
 
+// A plate as bright as nothing else has four straight edges, as a field has. It ended in "only 0 pixels".
+TEST(Preprocess, ASaturatedPlateIsNotTheField) {
+  XrayImage xray = collimated([](int, int) { return true; });
+  for (int row = 120; row < 150; ++row)
+    for (int column = 40; column < 76; ++column) xray.values.at(column, row) = 65535.0F;
+  const FixedImage image = prepare(xray);
+  EXPECT_FALSE(image.irradiated.is_sure());
+  EXPECT_EQ(image.field.at(100, 100), 1);
+  EXPECT_EQ(image.field.at(150, 60), 1);
+  EXPECT_EQ(image.field.at(60, 135), 0);
+}
+
 TEST(Preprocess, SinglePixelsAtTheEndOfTheRangeAreNoise) {
   XrayImage xray = collimated([](int, int) { return true; });
   for (int row = 40; row < 160; row += 3)

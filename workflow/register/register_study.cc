@@ -44,7 +44,7 @@ SpatialRegistrationOptions registration_options(RegistrationSource source, const
 }
 
 // A patient turned by more than a couch corrects may lie right, but an angle in a file on a wrong scale looks the same
-// (couch 354 for 6 turns the answer by 12 degrees). A site that has a file decides by its own action level.
+// (couch 354 for 6 turns the answer by 12 degrees). A site whose action level has a rotation decides by that.
 void doubt_large_rotation(SetupResult& result) {
   constexpr double kMostDeg = 5.0;
   const ZxyAngles turn = couch_shift_for(result.setup_error, result.table).change;
@@ -54,7 +54,9 @@ void doubt_large_rotation(SetupResult& result) {
           Verdict::kReview,
           fmt::format("the couch would have to turn by {:.1f} degrees ({}), more than {:.0f} degrees about one "
                       "axis: the patient may lie otherwise than planned, or an angle in a file may be on "
-                      "another scale. Look at both; a site file ({}) says from which rotation to act",
+                      "another scale. Look at both; an action level with rotation_deg in a site file ({}) says from "
+                      "which rotation "
+                      "to act",
                       deg_from_rad(angle_rad), name, kMostDeg, option("site", "FILE")));
 }
 
@@ -79,7 +81,7 @@ SetupResult register_loaded(const Study& study, const RegisterOptions& options, 
   RegistrationResult found = registration.from(setup_error * study.planned_room_from_patient, images, observer);
 
   SetupResult result = setup_result_of(study, images, options.registration, setup, choice.target, std::move(found));
-  if (!site) doubt_large_rotation(result);
+  if (!site || !site->level || !site->level->rotation_deg) doubt_large_rotation(result);
   result.site = site;
   result.start = std::move(start);
   return result;

@@ -178,26 +178,56 @@ void doubt_lost_rois(const Study& study, TargetChoice& choice) {
   }
 }
 
-std::vector<Candidate> around_isocenter(const Study& study, std::string_view type) {
+constexpr std::array kTargetTypes = {"PTV", "CTV", "GTV"};
+
+bool is_target_by_type(const Structure& structure) {
+  return std::ranges::find(kTargetTypes, structure.interpreted_type) != kTargetTypes.end();
+}
+
+// Where a structure set tells of no structure that it is a target volume, their names do.
+bool are_targets_told_by_type(const Study& study) {
+  return std::ranges::any_of(study.structures->structures, is_target_by_type);
+}
+
+std::string_view target_type(const Structure& structure, bool is_told_by_type) {
+  if (!is_told_by_type) return target_type_by_name(structure);
+  return is_target_by_type(structure) ? std::string_view(structure.interpreted_type) : "";
+}
+
+std::vector<Candidate> around_isocenter(const Study& study, std::string_view type, bool is_told_by_type) {
   std::vector<Candidate> candidates;
-  if (!study.structures) return candidates;
   for (const Structure& structure : study.structures->structures) {
-    if (structure.interpreted_type != type || structure.contours.empty()) continue;
+    if (target_type(structure, is_told_by_type) != type || structure.contours.empty()) continue;
     Candidate candidate = candidate_of(structure, study);
     if (candidate.holds_isocenter) candidates.push_back(std::move(candidate));
   }
   return candidates;
 }
 
+// A target volume whose contours enclose nothing may be the target all the same. One that was never drawn is none.
+void doubt_open_targets(const Study& study, bool is_told_by_type, TargetChoice& choice) {
+  for (const Structure& structure : study.structures->structures)
+    if (!target_type(structure, is_told_by_type).empty() && structure.contours.empty() &&
+        structure.ignored_contours > 0)
+      choice.doubts.push_back(fmt::format(
+          "the target volume {} is drawn, but none of its contours is closed ({} CLOSED_PLANAR): it may be the target. "
+          "Export it as closed contours, or name the target: {} or isocenter",
+          structure.name, described(DCM_ContourGeometricType), option("target", "NAME")));
+}
+
 TargetChoice chosen_by_plan(const Study& study) {
   if (std::vector<Candidate> candidates = prescribed(study); !candidates.empty())
     return chosen_among(std::move(candidates), study, "dose reference of the plan");
-  for (const char* type : {"PTV", "CTV", "GTV"})
-    if (std::vector<Candidate> candidates = around_isocenter(study, type); !candidates.empty())
-      return chosen_among(std::move(candidates), study, fmt::format("the {} that holds the isocenter", type));
-  return {.target = surroundings(study.structures ? "no target volume holds the isocenter"
-                                                  : why_no_structures(study.unused_structures)),
-          .doubts = {}};
+  if (!study.structures) return {.target = surroundings(why_no_structures(study.unused_structures)), .doubts = {}};
+  const bool is_told_by_type = are_targets_told_by_type(study);
+  for (const char* type : kTargetTypes)
+    if (std::vector<Candidate> candidates = around_isocenter(study, type, is_told_by_type); !candidates.empty())
+      return chosen_among(std::move(candidates), study,
+                          fmt::format("the {} that holds the isocenter{}", type,
+                                      is_told_by_type ? "" : ", by its name: its type is not told"));
+  TargetChoice choice{.target = surroundings("no target volume holds the isocenter"), .doubts = {}};
+  doubt_open_targets(study, is_told_by_type, choice);
+  return choice;
 }
 
 // How far from a point a CT ends although the body goes on there: at most kNearEndMm.
@@ -237,8 +267,10 @@ TargetChoice chosen(const Study& study, const TargetWish& wish) {
   TargetChoice choice = chosen_by_plan(study);
   doubt_lost_rois(study, choice);
   if (!study.unused_structures.rivals.empty())
-    choice.doubts.push_back(fmt::format("{}: the target may be drawn in one of them. Name it: {}, or {}",
-                                        why_no_structures(study.unused_structures), option("structures", "FILE"),
+    choice.doubts.push_back(fmt::format("{}: the target may be drawn in {}. Name it: {}, or {}",
+                                        why_no_structures(study.unused_structures),
+                                        study.unused_structures.rivals.size() == 1 ? "it" : "one of them",
+                                        option("structures", "FILE"),
                                         option("target", "isocenter")));
   return choice;
 }

@@ -112,6 +112,9 @@ TEST_F(StudyFilesTest, PlanningDrrsAndFluencesAreLeftAsideWhereThereAreXrays) {
   EXPECT_THAT(find().images, ElementsAre(study_.image(0), study_.image(1)));
   for (const fs::path& file : computed)
     EXPECT_THAT(notes_.left_aside, Contains(AllOf(HasSubstr(file.string()), HasSubstr("says that it was computed"))));
+  // A DRR that is called a radiograph.
+  edit(computed[0], [](DicomItem d) { d.put(DCM_ImageType, "DERIVED\\SECONDARY\\RADIOGRAPH"); });
+  EXPECT_THAT(find().images, ElementsAre(study_.image(0), study_.image(1)));
   const StudyParts one_is_named = {.images = {study_.image(1), computed[0]}};
   EXPECT_THAT(find(one_is_named).images, ElementsAre(study_.image(1), computed[0])) << "that is a matter for checks";
   std::vector<SessionFiles> sessions = sessions_of(scan_study({study_.path()}), false);
@@ -253,6 +256,36 @@ TEST_F(StudyFilesTest, OfSeveralStructureSetsThePlanOrAPersonDecides) {
   EXPECT_THAT(notes_.left_aside, Contains(copy.string() + ": the same RT Structure Set as " + second.string()));
 }
 
+// Drawn again under the same UID: the name of a file must not decide.
+TEST_F(StudyFilesTest, StructureSetsOfOneUidWithOtherContentsAreRivals) {
+  draw(study_, {{"PTV", {rectangle({0, 40, -400}, 20, 20)}}});
+  const fs::path again = study_.path() / "RS_again.dcm";
+  fs::copy(study_.structures(), again);
+  EXPECT_TRUE(find().unused_structures.rivals.empty());
+  edit(again, [](DicomItem d) { d.put(DCM_StructureSetLabel, "LATER"); });
+  const StudyParts parts = find();
+  EXPECT_EQ(parts.structures, fs::path());
+  EXPECT_THAT(parts.unused_structures.rivals, UnorderedElementsAre(study_.structures(), again));
+}
+
+// Where UIDs were replaced in some files only, references lead nowhere.
+TEST_F(StudyFilesTest, AStructureSetOfACtThatIsNotHereMayHoldTheTarget) {
+  draw(study_, {{"PTV", {rectangle({0, 40, -400}, 20, 20)}}});
+  edit(study_.structures(), [](DicomItem d) {
+    d.append_item(DCM_ReferencedFrameOfReferenceSequence)
+        .append_item(DCM_RTReferencedStudySequence)
+        .append_item(DCM_RTReferencedSeriesSequence)
+        .put(DCM_SeriesInstanceUID, "1.2.3");
+  });
+  const StudyParts parts = find();
+  EXPECT_EQ(parts.structures, fs::path());
+  EXPECT_THAT(parts.unused_structures.rivals, ElementsAre(study_.structures()));
+  EXPECT_EQ(why_no_structures(parts.unused_structures),
+            "nothing tells whether RTSTRUCT.dcm was drawn on this CT: it names another one, which is not here");
+  EXPECT_THAT(notes_.left_aside,
+              Contains(study_.structures().string() + ": an RT Structure Set of another CT, which is not here"));
+}
+
 // As treatment planning systems export them: a set that holds a setup isocenter, drawn on the same CT.
 TEST_F(StudyFilesTest, AStructureSetOfPointsDoesNotCompete) {
   draw(study_, {{"InitLaserIso", {{{1, 2, 3}}}, "POINT"}, {"AcqIsocenter", {{{1, 2, 3}}}, "CLOSED_PLANAR"}});
@@ -280,15 +313,16 @@ TEST_F(StudyFilesTest, WhyThereAreNoStructuresIsTold) {
   const std::filesystem::path second = study_.path() / "second.dcm";
   std::filesystem::copy(study_.structures(), second);
   edit(second, [](DicomItem d) { d.put(DCM_SOPInstanceUID, "1.2.3.5"); });
-  EXPECT_EQ(why(), "nothing tells which of 2 RT Structure Sets on this CT is meant (RTSTRUCT.dcm, second.dcm)");
-  for (const std::filesystem::path& file : {study_.structures(), second})
-    edit(file, [](DicomItem d) {
-      d.append_item(DCM_ReferencedFrameOfReferenceSequence)
-          .append_item(DCM_RTReferencedStudySequence)
-          .append_item(DCM_RTReferencedSeriesSequence)
-          .put(DCM_SeriesInstanceUID, "1.2.3");
-    });
-  EXPECT_EQ(why(), "no RT Structure Set of the study has a closed contour on this CT (RTSTRUCT.dcm, second.dcm)");
+  EXPECT_EQ(why(), "nothing tells which of 2 RT Structure Sets is meant for this CT (RTSTRUCT.dcm, second.dcm)");
+  std::filesystem::remove(second);
+  draw(study_, {{"Isocenter", {{{1, 2, 3}}}, "POINT"}});
+  edit(study_.structures(), [](DicomItem d) {
+    d.append_item(DCM_ReferencedFrameOfReferenceSequence)
+        .append_item(DCM_RTReferencedStudySequence)
+        .append_item(DCM_RTReferencedSeriesSequence)
+        .put(DCM_SeriesInstanceUID, "1.2.3");
+  });
+  EXPECT_EQ(why(), "no RT Structure Set of the study has a closed contour on this CT (RTSTRUCT.dcm)");
 }
 
 TEST_F(StudyFilesTest, ACtInNoPlansFrameIsRefused) {

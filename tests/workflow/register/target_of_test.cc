@@ -112,6 +112,32 @@ TEST(TargetOf, WithoutAVolumeAtTheIsocenterItIsTheSurroundings) {
   EXPECT_THAT(target_of(study, {}).doubts, IsEmpty());
 }
 
+// Programs that know no types write none, or ORGAN for all: TG-263 begins the names of target volumes with what they are.
+TEST(TargetOf, NamesTellTargetVolumesWhereNoTypeDoes) {
+  for (const char* type : {"", "ORGAN"}) {
+    Study study = study_with({box(1, "Cord", type, {10, 0, 0}, 20), box(2, "ptv_70", type, {10, 0, 0}, 40)});
+    EXPECT_EQ(target_of(study, {}).target.name, "ptv_70");
+    EXPECT_EQ(target_of(study, {}).target.chosen_by,
+              "the PTV that holds the isocenter, by its name: its type is not told");
+  }
+  // Rings and structures for optimization have such names, too, beside target volumes that have their type.
+  Study typed = study_with({box(1, "PTV_ring", "ORGAN", {10, 0, 0}, 60), box(2, "Boost", "PTV", {10, 0, 0}, 40)});
+  EXPECT_EQ(target_of(typed, {}).target.chosen_by, "the PTV that holds the isocenter");
+  EXPECT_THAT(target_of(typed, {}).doubts, IsEmpty());
+}
+
+TEST(TargetOf, ATargetVolumeOfOpenContoursIsADoubt) {
+  Study study = study_with({});
+  study.structures->structures.push_back(
+      {.number = 3, .name = "open PTV", .interpreted_type = "PTV", .ignored_contours = 12});
+  const TargetChoice choice = target_of(study, {});
+  EXPECT_EQ(choice.target.chosen_by, "no target volume holds the isocenter");
+  EXPECT_THAT(choice.doubts, ElementsAre(HasSubstr("the target volume open PTV is drawn, but none of its contours is "
+                                                   "closed (ContourGeometricType (3006,0042) CLOSED_PLANAR)")));
+  study.structures->structures.push_back(box(4, "GTV", "GTV", {10, 0, 0}, 20));
+  EXPECT_THAT(target_of(study, {}).doubts, IsEmpty()) << "the target is another";
+}
+
 // load_study() refuses structures of another frame of reference, unless a person allows them.
 TEST(TargetOf, AnAllowedFrameOfReferenceHoldsForTheDefaultToo) {
   Structure elsewhere = box(4, "PTV", "PTV", {10, 0, 0}, 30);
@@ -127,7 +153,7 @@ TEST(TargetOf, RivalStructureSetsAreADoubtUnlessThePersonNamesTheTarget) {
   Study study = study_with({});
   study.structures.reset();
   study.unused_structures.rivals = {"in/a.dcm", "in/b.dcm"};
-  const std::string why = "nothing tells which of 2 RT Structure Sets on this CT is meant (a.dcm, b.dcm)";
+  const std::string why = "nothing tells which of 2 RT Structure Sets is meant for this CT (a.dcm, b.dcm)";
   const TargetChoice choice = target_of(study, {});
   EXPECT_EQ(choice.target.chosen_by, why);
   EXPECT_THAT(choice.doubts,
