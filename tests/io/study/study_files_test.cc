@@ -314,7 +314,7 @@ TEST_F(StudyFilesTest, WhyThereAreNoStructuresIsTold) {
   std::filesystem::copy(study_.structures(), second);
   edit(second, [](DicomItem d) { d.put(DCM_SOPInstanceUID, "1.2.3.5"); });
   EXPECT_EQ(why(), "nothing tells which of 2 RT Structure Sets is meant for this CT (RTSTRUCT.dcm, second.dcm)");
-  std::filesystem::remove(second);
+  for (const std::filesystem::path& file : {study_.structures(), second}) std::filesystem::remove(file);
   draw(study_, {{"Isocenter", {{{1, 2, 3}}}, "POINT"}});
   edit(study_.structures(), [](DicomItem d) {
     d.append_item(DCM_ReferencedFrameOfReferenceSequence)
