@@ -89,7 +89,9 @@ def main(program, work):
         truth = json.loads((study / "truth.json").read_text())["setup_error_room"]
         off = max(abs(a - b) for a, b in zip(found["setup_error"]["translation_mm"], truth["translation_mm"]))
         expect(off < 0.2, f"{off} mm off")
-        expect(found["verdict"] == "accepted", f"{found['verdict']}: {found['reasons']}")
+        # Nothing but its size speaks against a rotation of 12 degrees.
+        expect(found["verdict"] == "review" and len(found["reasons"]) == 1 and "more than 5 degrees" in found["reasons"][0],
+               f"{found['verdict']}: {found['reasons']}")
         expect(found["start"]["set_by"] and found["searched"], "the result does not say who set its start")
         wait_for(lambda: abs(float(one("#x").get_attribute("value")) - 15) < 0.2, 10, "the pose that was found")
         browser.save_screenshot(str(work / "found.png"))
