@@ -65,7 +65,7 @@ def make_pictures(result, to):
     (to / "demo-view1.png").write_bytes((result / "view1.png").read_bytes())
     subprocess.run(["pdftoppm", "-png", "-r", "75", "-f", "1", "-l", "1", "-singlefile", result / "report.pdf", to / "report-pdf"], check=True)
     subprocess.run(["chromium", "--headless", "--no-sandbox", "--disable-gpu", "--hide-scrollbars", "--disable-background-networking",
-                    f"--user-data-dir={to / 'chromium'}", f"--screenshot={to / 'report-html.png'}", "--window-size=800,987",
+                    f"--user-data-dir={to / 'chromium'}", f"--screenshot={to / 'report-html.png'}", "--window-size=1100,1357", "--force-device-scale-factor=0.72727",
                     (result / "report.html").resolve().as_uri()], check=True, capture_output=True, timeout=120)
 
 

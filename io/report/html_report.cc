@@ -38,7 +38,7 @@ std::string quantities(const std::vector<Quantity>& list_of_quantities, const st
   for (std::size_t n = 0; n < list_of_quantities.size(); ++n) {
     const Quantity& quantity = list_of_quantities[n];
     html += fmt::format(
-        "<tr{}><th>{}</th><td class=\"value\">{}</td><td>{}{}</td><td class=\"words\">{}</td></tr>",
+        "<tr{}><th>{}</th><td class=\"value\">{}</td><td class=\"unit\">{}{}</td><td class=\"words\">{}</td></tr>",
         is_couch && n < 3 ? " class=\"translation\"" : "", html_escaped(quantity.name), html_escaped(quantity.value),
         quantity.is_number && !quantity.plus_minus.empty() && !is_couch ? "± " + quantity.plus_minus + " " : "",
         quantity.is_number ? quantity.unit : "", html_escaped(quantity.words));
