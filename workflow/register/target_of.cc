@@ -270,8 +270,7 @@ TargetChoice chosen(const Study& study, const TargetWish& wish) {
     choice.doubts.push_back(fmt::format("{}: the target may be drawn in {}. Name it: {}, or {}",
                                         why_no_structures(study.unused_structures),
                                         study.unused_structures.rivals.size() == 1 ? "it" : "one of them",
-                                        option("structures", "FILE"),
-                                        option("target", "isocenter")));
+                                        option("structures", "FILE"), option("target", "isocenter")));
   return choice;
 }
 

@@ -112,7 +112,8 @@ TEST(TargetOf, WithoutAVolumeAtTheIsocenterItIsTheSurroundings) {
   EXPECT_THAT(target_of(study, {}).doubts, IsEmpty());
 }
 
-// Programs that know no types write none, or ORGAN for all: TG-263 begins the names of target volumes with what they are.
+// Programs that know no types write none, or ORGAN for all: TG-263 begins the names of target volumes with what they
+// are.
 TEST(TargetOf, NamesTellTargetVolumesWhereNoTypeDoes) {
   for (const char* type : {"", "ORGAN"}) {
     Study study = study_with({box(1, "Cord", type, {10, 0, 0}, 20), box(2, "ptv_70", type, {10, 0, 0}, 40)});
