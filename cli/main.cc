@@ -15,8 +15,8 @@
 #include "base/option_name.h"
 #include "base/output_folder.h"
 #include "base/process.h"
-#include "cli/commands/commands.h"
 #include "cli/commands/register_command.h"
+#include "cli/isoshift.h"
 #include "io/dicom/decoder_process.h"
 #include "workflow/register/serve_registrations.h"
 

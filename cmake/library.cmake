@@ -1,22 +1,23 @@
 # isoshift_library(NAME SOURCE...): a static library isoshift_NAME, a box of ARCHITECTURE.md. isoshift_light_library() makes
 # one that visits no pixels and no voxels.
 #
-# Headers that most sources include are compiled once for all boxes, and the sources of a folder are compiled together
+# Headers that most sources include are compiled once for all boxes, and up to 26 sources of a box are compiled together
 # (CMAKE_UNITY_BUILD in the presets); bench/results/build-time.md has what that saves. So the anonymous namespaces of a
-# folder hold no name twice; the few sources where they do are compiled by themselves. Each test file has a namespace of
-# its own. Sources include what they use all the same: ./dev lint reads each by itself, without either.
+# box hold no name twice; the few sources where they do are compiled by themselves. Each test file has a namespace of its
+# own. Sources include what they use all the same: ./dev lint reads each by itself, without either.
 option(ISOSHIFT_PCH "Precompile the headers that most sources include" ON)
+set(CMAKE_UNITY_BUILD_BATCH_SIZE 26)
 
 set(isoshift_common_headers
     <algorithm> <array> <chrono> <cmath> <filesystem> <fstream> <functional> <map> <memory> <optional> <set> <span> <string>
     <string_view> <utility> <vector> <Eigen/Geometry> <fmt/format.h> <fmt/ranges.h> <nlohmann/json.hpp>)
 
 # isoshift_precompiled: for what computes, with the flags of the build. isoshift_precompiled_light: for what reads, decides
-# and writes, with -O1, which compiles a third faster and whose time to run nobody notices. GCC takes a header only with
-# the flags that it was precompiled with.
+# and writes, with -Og, which compiles in half of the time of -O2 and whose time to run nobody notices. GCC takes a header
+# only with the flags that it was precompiled with.
 file(WRITE ${PROJECT_BINARY_DIR}/precompiled.cc "")
 add_library(isoshift_light INTERFACE)
-target_compile_options(isoshift_light INTERFACE $<$<CONFIG:Release,RelWithDebInfo>:-O1>)
+target_compile_options(isoshift_light INTERFACE $<$<CONFIG:Release,RelWithDebInfo>:-Og>)
 if(ISOSHIFT_PCH)
   foreach(kind "" _light)
     add_library(isoshift_precompiled${kind} OBJECT ${PROJECT_BINARY_DIR}/precompiled.cc)
@@ -26,18 +27,8 @@ if(ISOSHIFT_PCH)
   target_link_libraries(isoshift_precompiled_light PRIVATE isoshift_light)
 endif()
 
-function(isoshift_compile_folders_together target)
-  set_target_properties(${target} PROPERTIES UNITY_BUILD_MODE GROUP)
-  foreach(source ${ARGN})
-    get_filename_component(folder ${source} DIRECTORY)
-    string(MAKE_C_IDENTIFIER "of_${folder}" group)
-    set_source_files_properties(${source} PROPERTIES UNITY_GROUP ${group})
-  endforeach()
-endfunction()
-
 function(isoshift_library_with precompiled name)
   add_library(isoshift_${name} STATIC ${ARGN})
-  isoshift_compile_folders_together(isoshift_${name} ${ARGN})
   target_link_libraries(isoshift_${name} PUBLIC isoshift_common $<BUILD_INTERFACE:isoshift_flags>)
   if(ISOSHIFT_PCH)
     target_precompile_headers(isoshift_${name} REUSE_FROM ${precompiled})

@@ -11,7 +11,7 @@ namespace isoshift {
 namespace {
 
 constexpr double kRays = 500.0;
-constexpr std::uint64_t kSeed = 1;
+constexpr std::uint64_t kSeedOfPixels = 1;
 // On the phantoms of testdata/ 16 bits leave 0.0002 and 8 bits 0.006; volumes half a voxel beside leave 0.0125 and more
 // (docs/renderers.md, "Before a GPU is trusted").
 constexpr double kMostRms = 0.01;
@@ -26,7 +26,7 @@ SpotCheck check_rays(Renderer& renderer, const Volume<float>& ct_hu, const Atten
                      std::span<const XrayView> views, const Eigen::Isometry3d& room_from_patient) {
   double all_pixels = 0.0;
   for (const XrayView& view : views) all_pixels += static_cast<double>(view.columns) * view.rows;
-  const PixelSet pixels = PixelSet::random(views, kRays / all_pixels, kSeed);
+  const PixelSet pixels = PixelSet::random(views, kRays / all_pixels, kSeedOfPixels);
   const RenderResult drrs = renderer.render(views, std::span(&room_from_patient, 1), pixels);
   SpotCheck check;
   double squares = 0.0, squares_of_differences = 0.0;

@@ -21,7 +21,7 @@ std::optional<Eigen::Vector2d> XrayView::project(const Eigen::Vector3d& point_ro
 Ray XrayView::ray(double column, double row) const {
   // By its scaling, the matrix maps a receptor point to (column, row, 1) exactly; of a line scan, in its own row.
   const Eigen::Vector3d pixel_from_source =
-      pixel_from_room.leftCols<3>().partialPivLu().solve(Eigen::Vector3d(column, is_line_scan() ? 0.0 : row, 1.0));
+      pixel_from_room.leftCols<3>().inverse() * Eigen::Vector3d(column, is_line_scan() ? 0.0 : row, 1.0);
   const Eigen::Vector3d source = source_of_row_mm(row);
   return {.source_room_mm = source, .pixel_room_mm = source + pixel_from_source};
 }

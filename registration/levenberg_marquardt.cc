@@ -46,10 +46,10 @@ class Climb {
     const bool first = result_.evaluations == 1;
     const double gain = first ? 0.0 : model.value - model_.value;
     if (!first) {
-      constexpr double kPoor = 0.25, kGood = 0.75, kBetterThanPromised = 1.5, kLeastShare = 0.25;
+      constexpr double kPoor = 0.25, kGood = 0.75, kBetterThanPromised = 1.5, kLeastCurvature = 0.25;
       if (gain < kPoor * promised_) radius_ = kPoor * step_length_;
       if (gain > kGood * promised_ && step_length_ > 0.9 * radius_) radius_ *= 2.0;
-      if (gain > kBetterThanPromised * promised_) curvature_share_ = std::max(kLeastShare, 0.5 * curvature_share_);
+      if (gain > kBetterThanPromised * promised_) curvature_share_ = std::max(kLeastCurvature, 0.5 * curvature_share_);
       if (gain < kGood * promised_) curvature_share_ = std::min(1.0, 2.0 * curvature_share_);
     }
     if (first || gain > 0.0) {

@@ -2,7 +2,6 @@
 // One function per command: it adds flags to the command line and, when the command is chosen, runs it.
 
 #include <CLI/CLI.hpp>
-#include <filesystem>
 
 #include "cli/console.h"
 
@@ -31,12 +30,5 @@ void add_deidentify_command(CLI::App& app, Console& console, int& exit_status);
 void add_bundle_command(CLI::App& app, Console& console, int& exit_status);
 void add_evaluate_command(CLI::App& app, Console& console, int& exit_status);
 void add_bench_command(CLI::App& app, Console& console, int& exit_status);
-
-// Writes the manual pages of all commands into a folder, and isoshift.bash, which completes them.
-void write_manual(const std::filesystem::path& folder);
-
-// The whole program: parses the command line, runs the command, and turns every exception into a message and an exit
-// status.
-int run_isoshift(int argc, const char* const* argv, Console& console);
 
 }  // namespace isoshift

@@ -1,10 +1,12 @@
 #pragma once
 // Code that isoshift register shares with the other commands that write results.
 
-#include <CLI/CLI.hpp>
-
 #include "cli/console.h"
 #include "workflow/register/register_study.h"
+
+namespace CLI {
+class App;
+}
 
 namespace isoshift {
 

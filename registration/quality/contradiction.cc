@@ -18,7 +18,7 @@ namespace {
 // Of gradient correlation per mm^2 of a parameter: 0.001 at 10 mm. What a view sees holds it a hundred times as firmly.
 constexpr double kSpring = 1e-5;
 constexpr double kWeakSpring = 1e-7;  // 0.001 at 100 mm
-constexpr double kReachMm = 15.0, kFirstStepMm = 1.0;
+constexpr double kLargestMoveMm = 15.0, kFirstStepMm = 1.0;
 
 // Gradient correlation less the spring, on top of a pose.
 class HeldObjective {
@@ -57,8 +57,8 @@ std::vector<double> wanted_alone(Objective& objective, const Renderer& renderer,
   const OptimizerOptions options{
       .kind = possible_optimizer(OptimizerKind::kLevenbergMarquardt, renderer, SimilarityKind::kGradientCorrelation),
       .start = std::vector<double>(axes, 0.0),
-      .lower = std::vector<double>(axes, -kReachMm),
-      .upper = std::vector<double>(axes, kReachMm),
+      .lower = std::vector<double>(axes, -kLargestMoveMm),
+      .upper = std::vector<double>(axes, kLargestMoveMm),
       .initial_step = std::vector<double>(axes, kFirstStepMm),
       .relative_tolerance = 0.02,
       .max_evaluations = 100};

@@ -7,8 +7,8 @@
 #include <fstream>
 #include <sstream>
 
-#include "cli/commands/commands.h"
 #include "cli/help_formatter.h"
+#include "cli/isoshift.h"
 #include "cli/suggestion.h"
 #include "tests/support/command.h"
 #include "tests/support/temporary_folder.h"

@@ -6,7 +6,7 @@
 #include <cstdio>
 #include <sstream>
 
-#include "cli/commands/commands.h"
+#include "cli/isoshift.h"
 
 namespace isoshift {
 

@@ -66,10 +66,10 @@ class CommissionPdf {
 
   void table() {
     pages_.heading("Errors: found against known, IEC 61217 fixed");
-    constexpr std::array kColumns = {0.0, 150.0, 180.0, 250.0, 330.0, 370.0, 415.0, 470.0};
+    constexpr std::array kLeft = {0.0, 150.0, 180.0, 250.0, 330.0, 370.0, 415.0, 470.0};
     constexpr std::array kNames = {"axis", "n", "known from, to", "bias ± 95 %", "SD", "largest", "polarity", "limit"};
     const auto cell = [&](std::size_t column, const std::string& text, const TextStyle& style = {.size = kText}) {
-      canvas_.text(kMargin + kColumns[column], y_, text, style);
+      canvas_.text(kMargin + kLeft[column], y_, text, style);
     };
     for (std::size_t n = 0; n < kNames.size(); ++n) cell(n, kNames[n], {.size = 8.0, .color = color::kGray});
     y_ += 12.0;
@@ -88,8 +88,8 @@ class CommissionPdf {
       } else {
         cell(2, kNoErrors);
       }
-      outcome(kColumns[6], commission_.localization.polarity(n));
-      outcome(kColumns[7], axis.limit);
+      outcome(kLeft[6], commission_.localization.polarity(n));
+      outcome(kLeft[7], axis.limit);
       y_ += 12.0;
     }
   }

@@ -14,8 +14,6 @@
 namespace isoshift {
 namespace {
 
-using Json = nlohmann::json;
-
 constexpr double kRoundedIsocenterMm = 0.01;  // as results round it
 constexpr const char* kWhy = "a setup error is about the planned pose, so that both must have the same one";
 
@@ -25,10 +23,10 @@ void require_same_angle(double found_deg, double expected_rad, const char* angle
                             found_deg, deg_from_rad(expected_rad), kWhy));
 }
 
-void require_same_table(const Json& file, const std::string& name, const TableAngles& expected) {
+void require_same_table(const nlohmann::json& file, const std::string& name, const TableAngles& expected) {
   if (file.contains("couch_deg")) require_same_angle(file.at("couch_deg"), expected.yaw_rad(), "angle", name);
   if (!file.contains("table")) return;
-  const Json& table = file.at("table");
+  const nlohmann::json& table = file.at("table");
   require_same_angle(table.at("support_deg").get<double>() + table.at("eccentric_deg").get<double>(),
                      expected.yaw_rad(), "angle", name);
   require_same_angle(table.at("pitch_deg"), expected.pitch_rad, "pitch", name);
@@ -37,12 +35,13 @@ void require_same_table(const Json& file, const std::string& name, const TableAn
 
 }  // namespace
 
-void require_same_setup(const Json& file, const std::string& name, const Study& study) {
+void require_same_setup(const nlohmann::json& file, const std::string& name, const Study& study) {
   const std::string position(to_string(study.patient_position));
   try {
     if (file.contains("patient") && file.at("patient").at("id") != study.ct->identity.patient_id)
       throw Error(fmt::format("{}: is of another patient than the study (PatientID)", name));
-    if (const Json frame = file.value("references", Json::object()).value("ct_frame_of_reference", Json());
+    if (const nlohmann::json frame =
+            file.value("references", nlohmann::json::object()).value("ct_frame_of_reference", nlohmann::json());
         !frame.is_null() && frame != study.ct->frame_of_reference_uid)
       throw Error(fmt::format("{}: is about a CT in another frame of reference than the study's ({})", name,
                               described(DCM_FrameOfReferenceUID)));
@@ -56,7 +55,7 @@ void require_same_setup(const Json& file, const std::string& name, const Study& 
                                 fmt::join(mm, ", "), fmt::join(study.isocenter_patient_mm, ", "), kWhy));
     }
     require_same_table(file, name, study.table);
-  } catch (const Json::exception& error) {
+  } catch (const nlohmann::json::exception& error) {
     throw Error(fmt::format("{}: is no result.json, truth.json or pose set by hand: {}", name, reason_of(error)));
   }
 }

@@ -18,8 +18,6 @@
 namespace isoshift {
 namespace {
 
-using Json = nlohmann::json;
-
 // In the frame of the study's X-rays, where that is the object's source frame.
 std::optional<Eigen::Vector3d> isocenter_of_xrays(const Study& study, const std::string& frame_uid) {
   for (const RtImage& image : study.rt_images)
@@ -99,7 +97,7 @@ Start read_start(const std::filesystem::path& file, const Study& study, std::spa
         fmt::format("{}: is no registration object or ITK transform, and has no source frame: leave {} out", name,
                     option("source-isocenter")));
   const JsonFile read = read_json_file(file);
-  const Json& json = read.json;
+  const nlohmann::json& json = read.json;
   const Eigen::Isometry3d setup_error = setup_error_in(json, name);
   try {
     require_same_setup(json, name, study);
@@ -107,7 +105,7 @@ Start read_start(const std::filesystem::path& file, const Study& study, std::spa
             .file = file.filename().string(),
             .sha256 = read.sha256,
             .set_by = json.value("set_by", "")};
-  } catch (const Json::exception& error) {
+  } catch (const nlohmann::json::exception& error) {
     throw Error(fmt::format("{}: is no result.json, truth.json or pose set by hand: {}", name, reason_of(error)));
   }
 }

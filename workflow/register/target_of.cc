@@ -41,7 +41,7 @@ Target surroundings(std::string chosen_by) {
 }
 
 // A structure that may be the target, and its voxels.
-struct Candidate {
+struct PossibleTarget {
   const Structure* structure;
   Volume<std::uint8_t> mask;
   bool holds_isocenter = false;
@@ -61,9 +61,9 @@ bool reaches_beyond(const Volume<float>& ct, const Structure& structure) {
   });
 }
 
-Candidate candidate_of(const Structure& structure, const Study& study) {
+PossibleTarget candidate_of(const Structure& structure, const Study& study) {
   const Volume<float>& ct = study.ct->hu;
-  Candidate candidate{.structure = &structure, .mask = mask_of(structure, ct.size, ct.patient_from_voxel)};
+  PossibleTarget candidate{.structure = &structure, .mask = mask_of(structure, ct.size, ct.patient_from_voxel)};
   candidate.voxels = static_cast<std::size_t>(std::ranges::count(candidate.mask.voxels, 1));
   const Eigen::Vector3d voxel = ct.patient_from_voxel.inverse() * study.isocenter_patient_mm;
   const Eigen::Vector3i at = voxel.array().round().cast<int>();
@@ -73,7 +73,7 @@ Candidate candidate_of(const Structure& structure, const Study& study) {
   return candidate;
 }
 
-Target target_from(const Candidate& candidate, const Study& study, std::string chosen_by) {
+Target target_from(const PossibleTarget& candidate, const Study& study, std::string chosen_by) {
   const Eigen::Isometry3d& room_from_patient = study.planned_room_from_patient;
   Target target{.name = candidate.structure->name,
                 .chosen_by = std::move(chosen_by),
@@ -93,7 +93,7 @@ Target target_from(const Candidate& candidate, const Study& study, std::string c
   return target;
 }
 
-TargetChoice choice_of(const Candidate& candidate, const Study& study, const std::string& why) {
+TargetChoice choice_of(const PossibleTarget& candidate, const Study& study, const std::string& why) {
   TargetChoice choice{.target = target_from(candidate, study, why), .doubts = {}};
   if (!is_in_body(candidate.mask, study.ct->hu))
     choice.doubts.push_back(
@@ -117,13 +117,13 @@ TargetChoice named(const Study& study, const std::string& name, const std::strin
 }
 
 // Of several that fit, the smallest around the isocenter, or the smallest of all.
-TargetChoice chosen_among(std::vector<Candidate> candidates, const Study& study, const std::string& why) {
+TargetChoice chosen_among(std::vector<PossibleTarget> candidates, const Study& study, const std::string& why) {
   std::vector<std::string> names;
   names.reserve(candidates.size());
-  for (const Candidate& candidate : candidates) names.push_back(candidate.structure->name);
-  const bool any_holds = std::ranges::any_of(candidates, &Candidate::holds_isocenter);
-  if (any_holds) std::erase_if(candidates, [](const Candidate& candidate) { return !candidate.holds_isocenter; });
-  TargetChoice choice = choice_of(*std::ranges::min_element(candidates, {}, &Candidate::voxels), study, why);
+  for (const PossibleTarget& candidate : candidates) names.push_back(candidate.structure->name);
+  const bool any_holds = std::ranges::any_of(candidates, &PossibleTarget::holds_isocenter);
+  if (any_holds) std::erase_if(candidates, [](const PossibleTarget& candidate) { return !candidate.holds_isocenter; });
+  TargetChoice choice = choice_of(*std::ranges::min_element(candidates, {}, &PossibleTarget::voxels), study, why);
   if (names.size() == 1) return choice;
   choice.doubts.push_back(fmt::format("several structures may be the target ({}); {} was taken. Name it: {}",
                                       fmt::join(names, ", "), choice.target.name, option("target", "NAME")));
@@ -149,8 +149,8 @@ bool are_rois_of_plan(const Study& study) {
 }
 
 // Of those, the ones that are drawn on this CT.
-std::vector<Candidate> prescribed(const Study& study) {
-  std::vector<Candidate> candidates;
+std::vector<PossibleTarget> prescribed(const Study& study) {
+  std::vector<PossibleTarget> candidates;
   if (!study.plan || !are_rois_of_plan(study)) return candidates;
   for (const int number : prescribed_rois(study))
     for (const Structure& structure : study.structures->structures)
@@ -194,11 +194,11 @@ std::string_view target_type(const Structure& structure, bool is_told_by_type) {
   return is_target_by_type(structure) ? std::string_view(structure.interpreted_type) : "";
 }
 
-std::vector<Candidate> around_isocenter(const Study& study, std::string_view type, bool is_told_by_type) {
-  std::vector<Candidate> candidates;
+std::vector<PossibleTarget> around_isocenter(const Study& study, std::string_view type, bool is_told_by_type) {
+  std::vector<PossibleTarget> candidates;
   for (const Structure& structure : study.structures->structures) {
     if (target_type(structure, is_told_by_type) != type || structure.contours.empty()) continue;
-    Candidate candidate = candidate_of(structure, study);
+    PossibleTarget candidate = candidate_of(structure, study);
     if (candidate.holds_isocenter) candidates.push_back(std::move(candidate));
   }
   return candidates;
@@ -216,12 +216,12 @@ void doubt_open_targets(const Study& study, bool is_told_by_type, TargetChoice& 
 }
 
 TargetChoice chosen_by_plan(const Study& study) {
-  if (std::vector<Candidate> candidates = prescribed(study); !candidates.empty())
+  if (std::vector<PossibleTarget> candidates = prescribed(study); !candidates.empty())
     return chosen_among(std::move(candidates), study, "dose reference of the plan");
   if (!study.structures) return {.target = surroundings(why_no_structures(study.unused_structures)), .doubts = {}};
   const bool is_told_by_type = are_targets_told_by_type(study);
   for (const char* type : kTargetTypes)
-    if (std::vector<Candidate> candidates = around_isocenter(study, type, is_told_by_type); !candidates.empty())
+    if (std::vector<PossibleTarget> candidates = around_isocenter(study, type, is_told_by_type); !candidates.empty())
       return chosen_among(std::move(candidates), study,
                           fmt::format("the {} that holds the isocenter{}", type,
                                       is_told_by_type ? "" : ", by its name: its type is not told"));

@@ -57,9 +57,9 @@ class ScoutPdf {
   }
 
   void table() {
-    constexpr std::array kColumns = {0.0, 150.0, 300.0};
+    constexpr std::array kLeft = {0.0, 150.0, 300.0};
     const auto cell = [&](std::size_t column, const std::string& text, const TextStyle& style = {.size = kText}) {
-      canvas_.text(kMargin + kColumns[column], y_, text, style);
+      canvas_.text(kMargin + kLeft[column], y_, text, style);
     };
     const TextStyle names{.size = 8.0, .color = color::kGray};
     cell(0, "the patient's axis", names);
