@@ -273,7 +273,7 @@ void run(const Options& options) {
 
 int main(int argc, char** argv) try {
   // The program of the same build.
-  isoshift::use_decoder(std::filesystem::read_symlink("/proc/self/exe").parent_path().parent_path() / "cli/isoshift");
+  isoshift::use_decoder(isoshift::decoder_of("/proc/self/exe"));
   isoshift::Options options;
   std::vector<std::string> renderers(isoshift::kRendererKinds.size());
   std::ranges::transform(isoshift::kRendererKinds, renderers.begin(), [](auto kind) { return to_string(kind); });

@@ -86,12 +86,11 @@ int main(int argc, char** argv) {
   // Not commands for people: what this program runs as its child, and the manual that the build makes.
   const std::string_view hidden = argc == 3 ? argv[1] : "", role = argc == 3 ? argv[2] : "";
   if (hidden == "__manual") return isoshift::write_manual(argv[2]), 0;
-  if (hidden == "__child" && role == "decode") return isoshift::run_decoder();
   if (is_stack_too_small()) {
     std::cerr << "error: the stack of a thread may have less than 1 MB here; 8 MB are usual (ulimit -s 8192)\n";
     return isoshift::kExitFailed;
   }
-  isoshift::use_decoder("/proc/self/exe");
+  isoshift::use_decoder(isoshift::decoder_of("/proc/self/exe"));
   end_cleanly_on_signals();
   if (hidden == "__child" && role == "register") {
     isoshift::Channel parent(isoshift::parent_socket());

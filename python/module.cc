@@ -61,9 +61,10 @@ PYBIND11_MODULE(_isoshift, module) {
       [](const std::string& program) {
         const bool is_program = !std::filesystem::is_directory(program) && ::access(program.c_str(), X_OK) == 0;
         if (!program.empty() && !is_program) throw isoshift::Error(program + ": is no program");
-        isoshift::use_decoder(program);
+        isoshift::use_decoder(program.empty() ? std::filesystem::path() : isoshift::decoder_of(program));
       },
-      py::arg("program"), "Name the program isoshift, which decodes compressed pixels in a process of their own.");
+      py::arg("program"),
+      "Name the program isoshift, whose part isoshift-decode decodes compressed pixels in processes of their own.");
   isoshift::python::bind_geometry(module);
   isoshift::python::bind_study(module);
   isoshift::python::bind_drr(module);

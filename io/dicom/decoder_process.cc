@@ -42,7 +42,7 @@ std::filesystem::path& decoder_program() {
 class DecoderProcess {
  public:
   DecoderProcess()
-      : process_({"isoshift", "__child", "decode"},
+      : process_({"isoshift-decode"},
                  {.program = program(), .errors = ProcessOptions::Errors::kDropped, .end_signal = SIGKILL}) {}
 
   std::vector<std::uint8_t> frame(const DicomFile& file, int frame, std::size_t bytes) {
@@ -71,7 +71,7 @@ class DecoderProcess {
   static const std::filesystem::path& program() {
     if (decoder_program().empty())
       throw Error(
-          "compressed pixel data cannot be decoded: the program isoshift, which decodes it, was not found.\n"
+          "compressed pixel data cannot be decoded: the program isoshift, whose part decodes it, was not found.\n"
           "       Install it, or name it: ISOSHIFT_PROGRAM in the environment of Python, use_decoder() in C++.");
     return decoder_program();
   }
@@ -208,6 +208,10 @@ void end_like(pid_t child) {
 void use_decoder(std::filesystem::path program) {
   idle_decoders().end_all();
   decoder_program() = std::move(program);
+}
+
+std::filesystem::path decoder_of(const std::filesystem::path& isoshift) {
+  return std::filesystem::weakly_canonical(isoshift).parent_path().parent_path() / "libexec/isoshift-decode";
 }
 
 std::vector<std::uint8_t> frame_from_decoder(const DicomFile& file, int frame, std::size_t bytes) {

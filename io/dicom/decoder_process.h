@@ -12,14 +12,18 @@
 
 namespace isoshift {
 
-// The program that answers `PROGRAM __child decode`, isoshift itself. To be set before anything is decoded.
+// The program that decodes. To be set before anything is decoded.
 void use_decoder(std::filesystem::path program);
+
+// isoshift-decode, which was installed or built together with this program isoshift: a program of its own, since a
+// small one starts and makes processes in less time.
+std::filesystem::path decoder_of(const std::filesystem::path& isoshift);
 
 // One compressed frame of a file that was read whole, as `bytes` bytes. Throws Error naming the file where the child
 // refuses, dies, stalls, answers with another length, or finds another content in the file.
 std::vector<std::uint8_t> frame_from_decoder(const DicomFile& file, int frame, std::size_t bytes);
 
-// What `isoshift __child decode` does: answers its parent until there are no more requests. Returns the exit status.
+// What isoshift-decode does: answers its parent until there are no more requests. Returns the exit status.
 int run_decoder();
 
 }  // namespace isoshift

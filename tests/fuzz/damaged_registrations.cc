@@ -80,7 +80,7 @@ int run(std::uint64_t count, std::uint64_t first_seed) {
 }  // namespace isoshift
 
 int main(int argc, char** argv) {
-  isoshift::use_decoder(ISOSHIFT_PROGRAM);
+  isoshift::use_decoder(isoshift::decoder_of(ISOSHIFT_PROGRAM));
   return isoshift::run(argc > 1 ? std::strtoull(argv[1], nullptr, 10) : 100,
                        argc > 2 ? std::strtoull(argv[2], nullptr, 10) : 1);
 }

@@ -124,10 +124,10 @@ int read_kept(const std::filesystem::path& folder) {
 }  // namespace isoshift
 
 int main(int argc, char** argv) {
-  // Decodes as its own child, as the program does (cli/main.cc).
-  if (argc == 3 && argv[1] == std::string_view("__child")) return isoshift::run_decoder();
+  // It is its own decoder, which is started without arguments.
+  if (argc == 1) return isoshift::run_decoder();
   isoshift::use_decoder("/proc/self/exe");
   if (argc == 2 && std::filesystem::is_directory(argv[1])) return isoshift::read_kept(argv[1]);
-  return isoshift::read_mutations(argc > 1 ? std::strtoull(argv[1], nullptr, 10) : 12000,
+  return isoshift::read_mutations(std::strtoull(argv[1], nullptr, 10),
                                   argc > 2 ? std::strtoull(argv[2], nullptr, 10) : 1);
 }

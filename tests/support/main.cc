@@ -8,7 +8,7 @@
 
 int main(int argc, char** argv) {
   testing::InitGoogleMock(&argc, argv);
-  isoshift::use_decoder(ISOSHIFT_PROGRAM);
+  isoshift::use_decoder(isoshift::decoder_of(ISOSHIFT_PROGRAM));
   isoshift::name_options(isoshift::OptionStyle::kFlags);
   isoshift::use_program(ISOSHIFT_PROGRAM);
   return RUN_ALL_TESTS();

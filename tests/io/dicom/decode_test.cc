@@ -204,7 +204,7 @@ TEST_F(DecodeTest, NumbersOfColorsAreNoIntensities) {
 // Other programs in the decoder's place, as a hostile file may make of it.
 class DecoderThatFailsTest : public DecodeTest {
  protected:
-  ~DecoderThatFailsTest() override { use_decoder(ISOSHIFT_PROGRAM); }
+  ~DecoderThatFailsTest() override { use_decoder(decoder_of(ISOSHIFT_PROGRAM)); }
 
   std::string error_with_decoder(const std::string& script) {
     const std::filesystem::path program = study_.path() / "decoder";

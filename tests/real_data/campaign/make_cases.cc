@@ -58,7 +58,7 @@ int run(int argc, char** argv) {
 }  // namespace isoshift::campaign
 
 int main(int argc, char** argv) {
-  isoshift::use_decoder(ISOSHIFT_PROGRAM);
+  isoshift::use_decoder(isoshift::decoder_of(ISOSHIFT_PROGRAM));
   isoshift::use_program(ISOSHIFT_PROGRAM);
   try {
     return isoshift::campaign::run(argc, argv);
