@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-#include <regex>
+#include "base/pattern.h"
 
 namespace isoshift {
 namespace {
@@ -14,8 +14,8 @@ std::string allow_keys_help() {
 }
 
 std::string is_date(const std::string& text) {
-  const bool is_one = std::regex_match(text, std::regex("[0-9]{4}-[0-9]{2}-[0-9]{2}"));
-  return is_one ? "" : fmt::format("{} is no date, expected one as 2026-03-01", text);
+  static const Pattern date("[0-9]{4}-[0-9]{2}-[0-9]{2}");
+  return date.matches(text) ? "" : fmt::format("{} is no date, expected one as 2026-03-01", text);
 }
 
 }  // namespace

@@ -3,12 +3,12 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include <regex>
 #include <set>
 
 #include "base/error.h"
 #include "base/json_file.h"
 #include "base/option_name.h"
+#include "base/pattern.h"
 #include "io/config/config_folder.h"
 
 namespace isoshift {
@@ -16,9 +16,9 @@ namespace {
 
 std::string required_day(JsonSection& section, const char* key) {
   constexpr const char* kExpected = "a day as YYYY-MM-DD";
-  static const std::regex day("[0-9]{4}-(0[1-9]|1[0-2])-(0[1-9]|[12][0-9]|3[01])");
+  static const Pattern day("[0-9]{4}-(0[1-9]|1[0-2])-(0[1-9]|[12][0-9]|3[01])");
   std::string text = section.required<std::string>(key, kExpected);
-  if (!std::regex_match(text, day)) section.refuse(key, kExpected);
+  if (!day.matches(text)) section.refuse(key, kExpected);
   return text;
 }
 

@@ -5,12 +5,12 @@
 
 #include <algorithm>
 #include <array>
-#include <regex>
 #include <span>
 #include <string>
 #include <string_view>
 
 #include "base/error.h"
+#include "base/pattern.h"
 #include "base/version.h"
 #include "io/dicom/decode.h"
 #include "io/objects/object_header.h"
@@ -177,10 +177,9 @@ bool is_of_its_vr(const DicomItem& item, const DcmTagKey& tag, DcmEVR vr) {
   std::string_view allowed;
   if (vr == EVR_DS || vr == EVR_IS) allowed = "0123456789+-.eE ";
   if (vr == EVR_CS) allowed = "ABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_ ";
-  static const std::regex time("(([01][0-9]|2[0-3])(:?[0-5][0-9](:?([0-5][0-9]|60)(\\.[0-9]{1,6})?)?)?)?");
+  static const Pattern time("(([01][0-9]|2[0-3])(:?[0-5][0-9](:?([0-5][0-9]|60)(\\.[0-9]{1,6})?)?)?)?");
   if (vr == EVR_TM)
-    return std::ranges::all_of(item.texts(tag),
-                               [&](const std::string& value) { return std::regex_match(value, time); });
+    return std::ranges::all_of(item.texts(tag), [&](const std::string& value) { return time.matches(value); });
   return allowed.empty() || std::ranges::all_of(item.texts(tag), [&](const std::string& value) {
            return value.find_first_not_of(allowed) == std::string::npos;
          });

@@ -3,9 +3,9 @@
 #include <fmt/format.h>
 
 #include <functional>
-#include <regex>
 
 #include "base/output_folder.h"
+#include "base/pattern.h"
 #include "base/sha256.h"
 #include "io/report/results_page.h"
 
@@ -17,9 +17,9 @@ constexpr int kRefreshS = 10;
 
 // "2026-03" of "2026-03-01 10:15:00".
 std::string month_of(const std::string& acquired) {
-  static const std::regex pattern("[0-9]{4}-[0-9]{2}");
+  static const Pattern pattern("[0-9]{4}-[0-9]{2}");
   std::string month = acquired.substr(0, std::string_view("2026-03").size());
-  return std::regex_match(month, pattern) ? month : "undated";
+  return pattern.matches(month) ? month : "undated";
 }
 
 // A page's file, "sessions-2026-03.html".
@@ -57,11 +57,10 @@ void SessionIndex::write(const std::string& page, const std::string& html) {
 
 // Pages of months of which all results were deleted name patients.
 void SessionIndex::remove_pages_but(const std::set<std::string>& pages) {
-  static const std::regex pattern("sessions-.*[.]html");
+  static const Pattern pattern("sessions-.*[.]html");
   std::vector<std::filesystem::path> others;
   for (const auto& entry : std::filesystem::directory_iterator(tree_.path()))
-    if (const std::string page = entry.path().filename().string();
-        std::regex_match(page, pattern) && !pages.contains(page))
+    if (const std::string page = entry.path().filename().string(); pattern.matches(page) && !pages.contains(page))
       others.push_back(entry.path());
   for (const std::filesystem::path& page : others) {
     std::filesystem::remove(page);

@@ -5,11 +5,11 @@
 
 #include <algorithm>
 #include <iterator>
-#include <regex>
 #include <thread>
 #include <utility>
 
 #include "base/error.h"
+#include "base/pattern.h"
 #include "base/sha256.h"
 #include "io/report/result_folder.h"
 
@@ -429,8 +429,8 @@ void Watch::end_registration() {
 }
 
 void Watch::fail(const std::string& session, Clock::Time news, const Runner::Failure& failed) {
-  static const std::regex staging("[.]partial-[A-Za-z0-9]+");  // another name every time
-  const std::string why = std::regex_replace(failed.why, staging, "");
+  static const Pattern staging("[.]partial-[A-Za-z0-9]+");  // another name every time
+  const std::string why = staging.removed_from(failed.why);
   Failure& failure = failures_[session];
   const bool is_new = std::exchange(failure.why, why) != why;
   if (is_new || !failed.may_be_over_soon) failure.again.reset();
