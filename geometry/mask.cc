@@ -108,4 +108,15 @@ Eigen::Vector3d centroid_patient_mm(const Volume<std::uint8_t>& mask) {
   return mask.patient_from_voxel * (sum / count).eval();
 }
 
+double distance_mm(const Volume<std::uint8_t>& mask, const Eigen::Vector3d& point_patient_mm) {
+  double nearest_mm = INFINITY;
+  for (int k = 0; k < mask.size.z(); ++k)
+    for (int j = 0; j < mask.size.y(); ++j)
+      for (int i = 0; i < mask.size.x(); ++i)
+        if (mask.at(i, j, k) != 0)
+          nearest_mm =
+              std::min(nearest_mm, (mask.patient_from_voxel * Eigen::Vector3d(i, j, k) - point_patient_mm).norm());
+  return nearest_mm;
+}
+
 }  // namespace isoshift

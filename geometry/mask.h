@@ -14,4 +14,7 @@ Volume<std::uint8_t> dilated(const Volume<std::uint8_t>& mask, double margin_mm)
 // The mean position of the voxels that are 1. Precondition: there is one.
 Eigen::Vector3d centroid_patient_mm(const Volume<std::uint8_t>& mask);
 
+// How far a point lies from the nearest center of a voxel that is 1; infinite if there is none.
+double distance_mm(const Volume<std::uint8_t>& mask, const Eigen::Vector3d& point_patient_mm);
+
 }  // namespace isoshift

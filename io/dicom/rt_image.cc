@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cctype>
 #include <charconv>
 #include <chrono>
 #include <cmath>
@@ -152,7 +153,7 @@ RtImage read_frame(const std::filesystem::path& path, const DicomItem& d, const 
   image.label = d.text(DCM_RTImageLabel).value_or(path.stem().string());
   image.frame = frame;
   if (format.frames > 1) image.label += fmt::format("#{}", frame + 1);
-  if (const auto type = d.texts(DCM_ImageType); type.size() > 2) image.image_type = type[2];
+  image.image_type = rt_image_type(d);
   image.approval_status = d.text(DCM_ApprovalStatus).value_or("");
   image.reported_values_origin = d.text(DCM_ReportedValuesOrigin);
   image.fraction_number = d.number(DCM_FractionNumber);
@@ -234,6 +235,16 @@ void put_padding(const PixelPadding& padding, const std::vector<std::int32_t>& s
 }
 
 }  // namespace
+
+std::string rt_image_type(const DicomItem& dataset) {
+  constexpr const char* kDrr = "DRR";
+  std::vector<std::string> values = dataset.texts(DCM_ImageType);
+  if (values.size() < 3) return "";
+  values.erase(values.begin(), values.begin() + 2);
+  for (std::string& value : values)
+    std::ranges::transform(value, value.begin(), [](unsigned char c) { return std::toupper(c); });
+  return std::ranges::find(values, kDrr) == values.end() ? values.front() : kDrr;
+}
 
 const std::map<std::string, DcmTagKey, std::less<>> kEquipmentAttributes = {
     {"DetectorDescription", DCM_DetectorDescription},

@@ -45,7 +45,7 @@ struct RtImage {
   std::string series_instance_uid;
   std::optional<std::string> frame_of_reference_uid;
   std::string label;            // RTImageLabel, else the file's name without extension; of several frames with "#2"
-  std::string image_type;       // ImageType, third value
+  std::string image_type;       // rt_image_type()
   std::string approval_status;  // ApprovalStatus; may be empty
   std::optional<std::string> reported_values_origin;
   std::optional<double> fraction_number;
@@ -99,6 +99,10 @@ std::vector<RtImage> read_rt_images(const DicomFile& file, Notes& notes);
 inline std::vector<RtImage> read_rt_images(const std::filesystem::path& path, Notes& notes) {
   return read_rt_images(DicomFile::read(path, DicomFile::Extent::kHeader), notes);
 }
+
+// What an RT Image says that it is: the third value of ImageType (PS3.3 C.8.8.2), in capitals; DRR if that or a later
+// value is DRR. Empty: it does not say.
+std::string rt_image_type(const DicomItem& dataset);
 
 // A date as DICOM writes it, "20260301"; ACR-NEMA wrote dots (PS3.5 6.2). Nothing for what is no date.
 std::optional<std::string> date_digits(std::string_view written);

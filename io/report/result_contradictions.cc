@@ -8,10 +8,12 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <set>
 
 #include "base/error.h"
 #include "geometry/patient_setup.h"
 #include "geometry/rotation.h"
+#include "geometry/xray_view.h"
 #include "io/report/formats.h"
 #include "io/report/result_json.h"
 
@@ -97,6 +99,9 @@ void check_verdict(const SetupResult& result) {
     refuse(fmt::format("verdict is accepted, but reasons says \"{}\"", result.reasons.front()));
   if (!is_accepted && result.reasons.empty())
     refuse(fmt::format("verdict is {}, but reasons is empty", to_string(result.verdict)));
+  if (std::ranges::find(result.reasons, "") != result.reasons.end()) refuse("reasons holds an empty text");
+  if (!result.is_searched && !(result.stages.empty() && result.alternatives.empty()))
+    refuse("searched is false, but stages or alternatives tell of a search");
   if (result.verdict == Verdict::kRejected && !result.spatial_registration_uid.empty())
     refuse("verdict is rejected, but references/spatial_registration names an object that was written");
 }
@@ -117,16 +122,66 @@ std::optional<Eigen::Vector3d> source_of_matrix(const Eigen::Matrix<double, 3, 4
   return rows.solve(Eigen::Vector3d(-pixel_from_room.col(3)));
 }
 
+// What is not a number was not determined.
+void check_correlation(double value, const std::string& field) {
+  constexpr double kMost = 1.0 + 1e-6;
+  if (std::abs(value) > kMost) refuse(fmt::format("{} is {:g}, but is a correlation: between -1 and 1", field, value));
+}
+
+void check_correlations(const SetupResult& result) {
+  for (std::size_t n = 0; n < result.views.size(); ++n) {
+    const ViewMatch& match = result.views[n].match;
+    check_correlation(match.similarity_start, fmt::format("views/{}/similarity_start", n));
+    check_correlation(match.similarity_final, fmt::format("views/{}/similarity_final", n));
+  }
+  for (std::size_t n = 0; n < result.alternatives.size(); ++n) {
+    check_correlation(result.alternatives[n].similarity, fmt::format("alternatives/{}/similarity", n));
+    check_correlation(result.alternatives[n].as_is, fmt::format("alternatives/{}/as_is", n));
+  }
+}
+
+void check_views_differ(const std::vector<SetupResult::View>& views) {
+  std::set<std::pair<std::string, int>> seen;
+  for (std::size_t n = 0; n < views.size(); ++n)
+    if (!seen.emplace(views[n].sop_instance_uid, views[n].frame).second)
+      refuse(fmt::format("views/{}/sop_instance_uid is that of an earlier view, and so is its frame", n));
+}
+
+// The size of a pixel at the isocenter, and how far the receptor lies from the source along its normal.
+void check_pixels_and_sid(const SetupResult::View& view, const std::string& where) {
+  constexpr double kSameShare = 0.01;
+  // Nearer to the isocenter, the rays end behind the receptor (XrayView).
+  constexpr double kReceptorBehindMm = 250.0;
+  const XrayView camera{.pixel_from_room = *view.pixel_from_room, .source_room_mm = view.source_room_mm};
+  const Eigen::Vector3d across = camera.central_direction_room().unitOrthogonal();
+  const auto isocenter = camera.project(Eigen::Vector3d::Zero()), beside = camera.project(across);
+  if (!isocenter || !beside) refuse(fmt::format("{}/pixel_from_room puts the isocenter behind the source", where));
+  const double pixel_mm = 1.0 / (*beside - *isocenter).norm();
+  if (std::abs(view.pixel_mm - pixel_mm) > kSameShare * pixel_mm)
+    refuse(fmt::format("{}/pixel_mm is {:g}, but {}/pixel_from_room makes it {:.4f}", where, view.pixel_mm, where,
+                       pixel_mm));
+  // Along the normal of the receptor, or along the beam where the receptor is tilted.
+  const double sad_mm = view.source_room_mm.norm(),
+               along_normal_mm = 1.0 / camera.pixel_from_room.row(2).head<3>().norm(),
+               along_beam_mm = sad_mm / camera.pixel_from_room(2, 3);
+  const auto is_sid = [&](double mm) { return std::abs(*view.sid_mm - mm) <= kSameShare * mm; };
+  if (view.sid_mm && *view.sid_mm > sad_mm + kReceptorBehindMm && !is_sid(along_normal_mm) && !is_sid(along_beam_mm))
+    refuse(fmt::format("{}/sid_mm is {:g}, but {}/pixel_from_room makes it {:.1f}", where, *view.sid_mm, where,
+                       along_normal_mm));
+}
+
 void check_view(const SetupResult::View& view, const std::string& where) {
   constexpr double kSameMm = 0.1, kSameDeg = 1.0, kTurnDeg = 360.0;
   const Eigen::Vector3d& source = view.source_room_mm;
   if (view.pixel_from_room && !view.pixel_from_room->hasNaN())
-    if (const auto by_matrix = source_of_matrix(*view.pixel_from_room);
-        by_matrix && (*by_matrix - source).norm() > kSameMm)
-      refuse(fmt::format(
-          "{}/source_room_mm is ({:.3f}, {:.3f}, {:.3f}), but {}/pixel_from_room makes it ({:.3f}, "
-          "{:.3f}, {:.3f})",
-          where, source.x(), source.y(), source.z(), where, by_matrix->x(), by_matrix->y(), by_matrix->z()));
+    if (const auto by_matrix = source_of_matrix(*view.pixel_from_room)) {
+      if ((*by_matrix - source).norm() > kSameMm)
+        refuse(fmt::format(
+            "{}/source_room_mm is ({:.3f}, {:.3f}, {:.3f}), but {}/pixel_from_room makes it ({:.3f}, "
+            "{:.3f}, {:.3f})",
+            where, source.x(), source.y(), source.z(), where, by_matrix->x(), by_matrix->y(), by_matrix->z()));
+      check_pixels_and_sid(view, where);
+    }
   if (!view.gantry_deg || source.isZero()) return;
   const double by_source_deg = deg_from_rad(std::atan2(source.x(), source.z()));
   if (std::abs(std::remainder(*view.gantry_deg - by_source_deg, kTurnDeg)) > kSameDeg)
@@ -143,6 +198,8 @@ void check_is_consistent(const Json& file, const SetupResult& result) {
   check_verdict(result);
   check_covariance(result.uncertainty, "uncertainty/covariance");
   check_covariance(result.by_imagers, "uncertainty/by_imagers/covariance");
+  check_correlations(result);
+  check_views_differ(result.views);
   for (std::size_t n = 0; n < result.views.size(); ++n) check_view(result.views[n], fmt::format("views/{}", n));
 }
 

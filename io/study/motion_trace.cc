@@ -62,25 +62,46 @@ Columns columns_of(const std::vector<std::string>& titles, const std::string& wh
           .position = {*position[0], *position[1], *position[2]}};
 }
 
-// A recorder that has lost its target may repeat the last position; a target that is there moves by a little.
-void warn_of_standstill(const std::vector<MotionSample>& trace, const std::string& where, Notes& notes) {
-  constexpr double kLongS = 3.0;
-  const MotionSample* longest = nullptr;
-  double longest_s = 0.0;
+// The longest time for which what `value_of` takes of a position stays the same to the last digit.
+struct Standstill {
+  double length_s = 0.0, from_s = 0.0;
+  std::size_t steps = 0;    // of the standstill
+  std::size_t changes = 0;  // in the whole trace
+};
+template <typename ValueOf>
+Standstill longest_standstill(const std::vector<MotionSample>& trace, const ValueOf& value_of) {
+  Standstill longest;
   std::size_t first = 0;
   for (std::size_t n = 0; n < trace.size(); ++n) {
-    if (trace[n].position_mm != trace[first].position_mm) first = n;
-    if (const double length_s = trace[n].time_s - trace[first].time_s; length_s > longest_s) {
-      longest_s = length_s;
-      longest = &trace[first];
+    if (value_of(trace[n]) != value_of(trace[first])) first = n, ++longest.changes;
+    if (const double length_s = trace[n].time_s - trace[first].time_s; length_s > longest.length_s) {
+      longest.length_s = length_s;
+      longest.from_s = trace[first].time_s;
+      longest.steps = n - first;
     }
   }
-  const bool moves = first > 0;
-  if (moves && longest_s >= kLongS)
+  return longest;
+}
+
+// A recorder that has lost its target may repeat the last position, or one coordinate of it; a target that is there
+// moves by a little. A coordinate that changes in less than half of the other steps is a coarse one, which may rest.
+void warn_of_standstill(const std::vector<MotionSample>& trace, const std::string& where, Notes& notes) {
+  constexpr double kLongS = 3.0;
+  const auto warn = [&](const Standstill& still, std::string_view what) {
     notes.warnings.push_back(
-        fmt::format("{}: the position stands still to the last digit for {:.1f} s, from {:.1f} s on: was the target "
-                    "lost there? Leave such rows empty, or out",
-                    where, longest_s, longest->time_s));
+        fmt::format("{}: {} stands still to the last digit for {:.1f} s, from {:.1f} s on: was the target lost there? "
+                    "Leave such rows empty, or out",
+                    where, what, still.length_s, still.from_s));
+  };
+  const Standstill whole = longest_standstill(trace, [](const MotionSample& sample) { return sample.position_mm; });
+  if (whole.changes > 0 && whole.length_s >= kLongS) return warn(whole, "the position");
+  for (int axis = 0; axis < 3; ++axis) {
+    const Standstill one =
+        longest_standstill(trace, [&](const MotionSample& sample) { return sample.position_mm[axis]; });
+    const bool moves_else = one.changes > 0 && 2 * one.changes >= trace.size() - 1 - one.steps;
+    if (moves_else && one.length_s >= kLongS)
+      warn(one, fmt::format("{}, while the others move,", std::array{"x", "y", "z"}[static_cast<std::size_t>(axis)]));
+  }
 }
 
 // Nothing in a body moves that fast: a recorder writes such numbers where it has lost its target, or takes another one

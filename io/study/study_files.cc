@@ -98,11 +98,14 @@ StudyFiles::Image xray(const fs::path& path, const DicomItem& dataset) {
 }
 
 // Whether an RT Image says that it was computed: a plan is exported with its DRRs, fluences and dose images. Some
-// planning systems call a DRR a radiograph; it is derived, and its angles are those of the plan.
+// planning systems call a DRR a radiograph, and some do not say what it is; it is derived, and its angles are those of
+// the plan.
 bool is_computed(const DicomItem& dataset) {
-  const auto type = dataset.texts(DCM_ImageType);
-  if (!type.empty() && type[0] == "DERIVED" && dataset.text(DCM_ReportedValuesOrigin) == "PLAN") return true;
-  return type.size() > 2 && (type[2] == "DRR" || type[2] == "FLUENCE" || type[2] == "BLANK");
+  const auto values = dataset.texts(DCM_ImageType);
+  const std::string type = rt_image_type(dataset);
+  if (!values.empty() && values[0] == "DERIVED" && (type.empty() || dataset.text(DCM_ReportedValuesOrigin) == "PLAN"))
+    return true;
+  return type == "DRR" || type == "FLUENCE" || type == "BLANK";
 }
 
 // Of whom there are X-rays, by PatientID.

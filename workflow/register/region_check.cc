@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "bodies/body_map.h"
 #include "bodies/lattice.h"
@@ -47,7 +46,7 @@ Volume<std::uint8_t> body_of(const Volume<float>& ct_hu) {
 struct HeldBone {
   std::size_t voxels = 0, of_bone = 0;
   int slices = 0, slices_with_bone = 0;
-  double from_isocenter_mm = std::numeric_limits<double>::max();  // of the nearest voxel
+  double from_isocenter_mm = 0.0;  // of the nearest voxel
 
   std::string in_words() const {
     return fmt::format("bone is {:.1f} % of it, on {} of {} slices; {:.0f} mm from the isocenter",
@@ -58,7 +57,7 @@ struct HeldBone {
 
 HeldBone bone_held_by(const Volume<std::uint8_t>& mask, const Study& study) {
   const Volume<float>& ct = study.ct->hu;
-  HeldBone held;
+  HeldBone held{.from_isocenter_mm = distance_mm(mask, study.isocenter_patient_mm)};
   for (int k = 0; k < ct.size.z(); ++k) {
     const std::size_t voxels = held.voxels, of_bone = held.of_bone;
     for (int j = 0; j < ct.size.y(); ++j)
@@ -66,9 +65,6 @@ HeldBone bone_held_by(const Volume<std::uint8_t>& mask, const Study& study) {
         if (mask.at(i, j, k) == 0) continue;
         ++held.voxels;
         held.of_bone += is_bone(ct.at(i, j, k)) ? 1 : 0;
-        held.from_isocenter_mm =
-            std::min(held.from_isocenter_mm,
-                     (ct.patient_from_voxel * Eigen::Vector3d(i, j, k) - study.isocenter_patient_mm).norm());
       }
     held.slices += held.voxels > voxels ? 1 : 0;
     held.slices_with_bone += held.of_bone > of_bone ? 1 : 0;

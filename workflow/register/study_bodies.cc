@@ -12,13 +12,15 @@ namespace isoshift {
 
 std::vector<DrawnBone> drawn_bones(const RtStructures& structures, const CtSeries& ct) {
   // Names of people, of TG-263 (VB_L3, Bone_Mandible, Rib07_L) and of TotalSegmentator (vertebrae_L3, clavicula_left,
-  // rib_left_7). A margin about a bone (PRV) is none.
+  // rib_left_7). Lymph nodes, muscles, vessels and margins are named after bones, too: beside a bone's name there may
+  // be its side and which part of it is drawn, and nothing else.
   static const std::regex bone(
-      "(?!.*PRV)(bone[ _-])?("
+      "(bone([ _-]?marrow)?[ _-])?("
       "[CTL]0?(\\d|1[0-2])|(vert(ebrae?)?|VB)[ _-]?[CTLS]?\\d+|skull|cranium|mandible|jaw|sacrum|sternum|"
       "rib[ _-]?(left|right|l|r)?[ _-]?\\d+([ _-](left|right|l|r))?|"
-      "(femur|femoral[ _]?head|humerus|scapula|clavicle|clavicula|pelvis|pelvic|ilium|ischium|pubis|hip|tibia|fibula|"
-      "patella|ulna|radius)([ _-].*)?)",
+      "bone([ _-]?marrow)?[ _-]pelvic|pelvic[ _-](bones?|girdle)|"
+      "(femur|femoral[ _]?head|humerus|scapula|clavicle|clavicula|pelvis|ilium|ischium|pubis|hip|tibia|fibula|"
+      "patella|ulna|radius)([ _-](l|r|lt|rt|left|right|both|bones?|and|heads?|neck|shaft|prox(imal)?|dist(al)?))*)",
       std::regex::icase);
   std::vector<DrawnBone> result;
   for (const Structure& structure : structures.structures)

@@ -204,6 +204,23 @@ std::vector<PossibleTarget> around_isocenter(const Study& study, std::string_vie
   return candidates;
 }
 
+// Contours that are drawn elsewhere may be another CT's, and the target then is not where the isocenter is.
+void doubt_targets_off_isocenter(const Study& study, bool is_told_by_type, TargetChoice& choice) {
+  const Structure* nearest = nullptr;
+  double nearest_mm = INFINITY;
+  for (const Structure& structure : study.structures->structures) {
+    if (target_type(structure, is_told_by_type).empty() || structure.contours.empty()) continue;
+    const Volume<float>& ct = study.ct->hu;
+    const double away_mm = distance_mm(mask_of(structure, ct.size, ct.patient_from_voxel), study.isocenter_patient_mm);
+    if (away_mm < nearest_mm) nearest = &structure, nearest_mm = away_mm;
+  }
+  if (nearest != nullptr)
+    choice.doubts.push_back(fmt::format(
+        "no target volume holds the isocenter: {}, the nearest one, begins {:.0f} mm from it, and the setup was judged "
+        "at the isocenter. Name the target: {}, or {}",
+        nearest->name, nearest_mm, option("target", "NAME"), option("target", "isocenter")));
+}
+
 // A target volume whose contours enclose nothing may be the target all the same. One that was never drawn is none.
 void doubt_open_targets(const Study& study, bool is_told_by_type, TargetChoice& choice) {
   for (const Structure& structure : study.structures->structures)
@@ -226,6 +243,7 @@ TargetChoice chosen_by_plan(const Study& study) {
                           fmt::format("the {} that holds the isocenter{}", type,
                                       is_told_by_type ? "" : ", by its name: its type is not told"));
   TargetChoice choice{.target = surroundings("no target volume holds the isocenter"), .doubts = {}};
+  doubt_targets_off_isocenter(study, is_told_by_type, choice);
   doubt_open_targets(study, is_told_by_type, choice);
   return choice;
 }

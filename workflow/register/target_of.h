@@ -22,8 +22,9 @@ struct TargetChoice {
 
 // The structure that a person or else the site names; else the one to which the plan's dose references of type TARGET
 // refer; else the PTV, or else CTV or GTV, that holds the isocenter; else the isocenter's surroundings. If several fit,
-// the smallest that holds the isocenter is taken, and the choice is a doubt. It is also a doubt if the plan refers to
-// what is not there, or if the target reaches beyond the CT. Throws Error if a structure that is named
+// the smallest that holds the isocenter is taken, and the choice is a doubt. It is also a doubt if target
+// volumes are drawn and none holds the isocenter, if the plan refers to what is not there, or if the target reaches
+// beyond the CT. Throws Error if a structure that is named
 // is not there or has no closed contour in the CT.
 TargetChoice target_of(const Study& study, const TargetWish& wish);
 

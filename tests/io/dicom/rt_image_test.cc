@@ -258,6 +258,13 @@ TEST_F(RtImageTest, BeamQualityComesFromKvpElseFromTheImageType) {
                }).kvp);
 }
 
+TEST_F(RtImageTest, ADrrIsOneInAnyValueAndEitherCase) {
+  for (const auto& [written, type] :
+       {std::pair(R"(DERIVED\SECONDARY\PORTAL\drr)", "DRR"), std::pair(R"(ORIGINAL\PRIMARY\PORTAL\ACQUIRED)", "PORTAL"),
+        std::pair(R"(DERIVED\DRR)", "")})
+    EXPECT_EQ(changed([&](DicomItem d) { d.put(DCM_ImageType, written); }).image_type, type) << written;
+}
+
 TEST_F(RtImageTest, PlannedAnglesAndDrrsAreFindings) {
   RtImage image = read_rt_images(study_.image(0), notes_).front();
   image.image_type = "DRR";

@@ -121,12 +121,29 @@ TEST_F(RegistrationCheckTest, TheOrderOfTheItemsIsWorthKnowingAndNoError) {
   EXPECT_EQ(checked.registered_from_source->matrix(), moved);
 }
 
-TEST_F(RegistrationCheckTest, ARegisteredFrameWithoutAnExactIdentityIsFound) {
+TEST_F(RegistrationCheckTest, ARegisteredFrameWithoutAnIdentityIsFound) {
   edit(path_, [&](DicomItem d) { item(d, 0).put(DCM_FrameOfReferenceUID, "1.2.3.4"); });
   std::string errors;
   for (const RegistrationFinding& finding : check_registration(path_).findings)
     if (finding.is_error) errors += finding.text + "\n";
-  EXPECT_THAT(errors, HasSubstr("no item is the registered frame with an exact identity"));
+  EXPECT_THAT(errors, HasSubstr("no item is the registered frame with an identity"));
+}
+
+// A DS has 16 characters, and programs that multiply matrices round.
+TEST_F(RegistrationCheckTest, AnIdentityIsOneButForRounding) {
+  Eigen::Matrix4d identity = Eigen::Matrix4d::Identity();
+  identity(0, 3) = 1e-7;
+  identity(1, 0) = -1e-7;
+  const Eigen::Matrix4d moved = result();
+  edit(path_, [&](DicomItem d) { put_matrix(d, 0, identity); });
+  const CheckedRegistration checked = check_registration(path_);
+  EXPECT_FALSE(checked.has_errors());
+  ASSERT_EQ(checked.findings.size(), 1U);
+  EXPECT_THAT(checked.findings[0].text, HasSubstr("item 1: is the identity but for rounding"));
+  EXPECT_EQ(checked.registered_from_source->matrix(), moved);
+  identity(0, 3) = 0.01;
+  edit(path_, [&](DicomItem d) { put_matrix(d, 0, identity); });
+  EXPECT_THAT(check_registration(path_).findings.front().text, HasSubstr("item 1: moves the registered frame"));
 }
 
 TEST_F(RegistrationCheckTest, AFrameMovedAgainstItselfIsFound) {

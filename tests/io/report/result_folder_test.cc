@@ -63,6 +63,7 @@ TEST_F(ResultFolderTest, WhereItBeganIsReadBackAndSaidFirst) {
   report_.start = Start{.setup_error = set, .file = "pose.json", .sha256 = "ab", .set_by = "jdoe"};
   EXPECT_THAT(text_of(report_), HasSubstr("searched from a start set by hand by jdoe"));
   report_.is_searched = false;
+  report_.stages.clear();
   EXPECT_THAT(text_of(report_), HasSubstr("set by hand by jdoe, NOT SEARCHED"));
   const SetupResult read = report_from_json(json_report(report_), "result.json");
   EXPECT_EQ(json_report(read), json_report(report_));
@@ -171,11 +172,22 @@ TEST_F(ResultFolderTest, AResultThatContradictsItselfIsRefused) {
   view.gantry_deg = 0.0;
   view.source_room_mm = {0, 0, 1000};
   view.pixel_from_room.emplace() << 0.5, 0, -0.06, 60, 0, -0.5, -0.06, 60, 0, 0, -0.001, 1;
+  view.pixel_from_room.value() *= 2.0 / 3.0;
+  view.pixel_mm = 2.0;
+  view.sid_mm = 1500.0;
+  report.views.push_back(view);
+  report.views[1].sop_instance_uid = "1.2.3.5";
+  report.alternatives = {{.description = "KV_45 mirrored", .similarity = 0.6, .as_is = 0.9}};
   const auto json = nlohmann::json::parse(json_report(report));
   ASSERT_NO_THROW(report_from_json(json.dump(), "result.json"));
   const std::vector<std::tuple<const char*, nlohmann::json, const char*, const char*>> edits = {
       {"/reasons", {"the views disagree"}, "verdict", "reasons"},
       {"/verdict", "review", "verdict", "reasons"},
+      {"/searched", false, "searched", "stages"},
+      {"/views/0/pixel_mm", 0.5, "views/0/pixel_mm", "views/0/pixel_from_room"},
+      {"/views/0/sid_mm", 1800.0, "views/0/sid_mm", "views/0/pixel_from_room"},
+      {"/views/0/similarity_final", 7, "views/0/similarity_final is 7", "between -1 and 1"},
+      {"/alternatives/0/similarity", 7, "alternatives/0/similarity", "between -1 and 1"},
       {"/verdict", "rejected", "", "setup_error"},
       {"/uncertainty/translation_mm/1", 2.0, "uncertainty/translation_mm/1", "uncertainty/covariance"},
       {"/uncertainty/covariance/1/1", 0.0004, "target/sigma_mm", "uncertainty/covariance"},
@@ -202,6 +214,24 @@ TEST_F(ResultFolderTest, AResultThatContradictsItselfIsRefused) {
                                                     HasSubstr("the file was changed after it was made"))))
         << place;
   }
+}
+
+TEST_F(ResultFolderTest, OneXrayIsNoTwoViewsAndAReasonSaysSomething) {
+  const auto error_of = [](const SetupResult& report) -> std::string {
+    try {
+      report_from_json(json_report(report), "result.json");
+    } catch (const Error& error) {
+      return error.what();
+    }
+    return "";
+  };
+  SetupResult report = oblique_report(Verdict::kReview);
+  report.views.push_back(report.views.front());
+  EXPECT_THAT(error_of(report), HasSubstr("views/1/sop_instance_uid is that of an earlier view"));
+  report.views[1].frame = 2;
+  EXPECT_EQ(error_of(report), "");
+  report.reasons = {""};
+  EXPECT_THAT(error_of(report), HasSubstr("reasons holds an empty text"));
 }
 
 TEST_F(ResultFolderTest, ThePdfIsADicomObjectToo) {

@@ -78,6 +78,25 @@ TEST_F(MotionTraceTest, AStandstillOfSecondsIsSaid) {
               testing::ElementsAre(HasSubstr("stands still to the last digit for 6.0 s, from 10.0 s on")));
 }
 
+TEST_F(MotionTraceTest, AnAxisThatStandsStillWhileTheOthersMoveIsSaid) {
+  const auto trace = [](int from, int to, double digit) {
+    std::string text = "t_s,x,y,z\n";
+    for (int n = 0; n < 200; ++n) {
+      const double x = std::sin(0.1 * n), z = std::sin(0.1 * (n > from && n < to ? from : n));
+      text += fmt::format("{:.1f},{:.4f},7,{:.4f}\n", 0.1 * n, x, digit * std::round(z / digit));
+    }
+    return text;
+  };
+  read(trace(100, 121, 1e-4));
+  EXPECT_TRUE(notes_.warnings.empty()) << "2 s";
+  read(trace(0, 0, 2.0));
+  EXPECT_TRUE(notes_.warnings.empty()) << "a coarse axis rests now and then";
+  read(trace(100, 161, 1e-4));
+  EXPECT_THAT(notes_.warnings,
+              testing::ElementsAre(
+                  HasSubstr("z, while the others move, stands still to the last digit for 6.0 s, from 10.0 s on")));
+}
+
 // Recorders write -999 or the like, or go on with another marker.
 TEST_F(MotionTraceTest, PositionsThatNothingInABodyReachesAreWarnedOf) {
   const auto trace = [](double at_10_s) {

@@ -125,6 +125,24 @@ TEST_F(StudyFilesTest, PlanningDrrsAndFluencesAreLeftAsideWhereThereAreXrays) {
   EXPECT_FALSE(sessions_of(scan_study({study_.path()}), false).empty());
 }
 
+// However a planning system writes it (PS3.3 C.8.8.2).
+TEST_F(StudyFilesTest, PlanningDrrsAreKnownByAnyWayOfSayingIt) {
+  const fs::path drr = study_.path() / "drr.dcm";
+  fs::copy_file(study_.image(0), drr);
+  for (const char* type : {R"(DERIVED\SECONDARY\drr)", R"(DERIVED\SECONDARY\PORTAL\DRR)", R"(DERIVED\SECONDARY\\Drr)",
+                           R"(DERIVED\SECONDARY)", R"(DERIVED\SECONDARY\)"}) {
+    edit(drr, [&](DicomItem d) {
+      d.put(DCM_SOPInstanceUID, "1.2.3.9");
+      d.put(DCM_AcquisitionDate, "20270101");
+      d.put(DCM_ImageType, type);
+    });
+    EXPECT_THAT(find().images, ElementsAre(study_.image(0), study_.image(1))) << type;
+    EXPECT_THAT(notes_.left_aside, Contains(AllOf(HasSubstr(drr.string()), HasSubstr("says that it was computed"))));
+  }
+  edit(drr, [](DicomItem d) { d.put(DCM_ImageType, R"(DERIVED\SECONDARY\PORTAL\ENHANCED)"); });
+  EXPECT_EQ(find().images.size(), 3U) << "an X-ray that was processed";
+}
+
 TEST_F(StudyFilesTest, XraysOfFormatsThatAreNotReadAreNamed) {
   const std::string his("\x00\x70\x44\x00 and more", 13);
   for (const auto& [name, content, words] :

@@ -49,10 +49,27 @@ TEST(DrawnBones, AreKnownByTheNamesOfPeopleTg263AndTotalSegmentator) {
                            "sternum",
                            "sacrum",
                            "skull",
-                           "Bone_Ilium_L"})
+                           "Bone_Ilium_L",
+                           "Bone_Pelvic",
+                           "BoneMarrow_Pelvic",
+                           "Pelvic Bones",
+                           "Pelvis",
+                           "Femoral Head and Neck R"})
     EXPECT_TRUE(is_bone(name)) << name;
   for (const char* name : {"PTV", "Spine", "SpinalCord", "VB_L", "VBs", "Ribs", "heart", "lung_upper_lobe_left", "T13",
                            "Femur_L_PRV05", "costal_cartilages", "iliopsoas_left", "Hippocampus_L"})
+    EXPECT_FALSE(is_bone(name)) << name;
+}
+
+// Each would replace the bones that were found there, and move as one with soft tissue.
+TEST(DrawnBones, AreNotWhatIsNamedAfterThem) {
+  for (const char* name :
+       {"Pelvic LN",     "LN_Pelvic",    "Pelvis_LN",         "pelvic nodes",         "Nodes pelvis",
+        "Pelvic",        "Pelvis PRV",   "PTV_Pelvis",        "Pelvis PTV",           "Pelvic_Floor",
+        "Bowel pelvis",  "Hip muscle L", "Femur artery",      "Femoral_Artery_L",     "Musc_Iliopsoas",
+        "A_Iliac_Ext_R", "V_Iliac_L",    "iliac_artery_left", "gluteus_maximus_left", "Sacral plexus",
+        "SacralPlexus",  "Spinal Cord",  "SpinalCord_PRV05",  "Humerus_L_PRV03",      "Femur_L+5mm",
+        "Scapula_soft",  "Skull_skin",   "L3 nerve root",     "Radius 5 mm",          "Hip joint"})
     EXPECT_FALSE(is_bone(name)) << name;
 }
 

@@ -106,10 +106,25 @@ TEST(TargetOf, WithoutAVolumeAtTheIsocenterItIsTheSurroundings) {
   Study study = study_with({box(1, "far PTV", "PTV", {-50, 0, 0}, 30), box(2, "Body", "EXTERNAL", {0, 0, 0}, 140)});
   study.structures->structures.push_back({.number = 3, .name = "empty PTV", .interpreted_type = "PTV"});
   EXPECT_EQ(target_of(study, {}).target.chosen_by, "no target volume holds the isocenter");
+  study.structures = RtStructures{.structures = {box(2, "Body", "EXTERNAL", {0, 0, 0}, 140)}};
+  EXPECT_THAT(target_of(study, {}).doubts, IsEmpty());
   study.structures.reset();
   study.plan.reset();
   EXPECT_EQ(target_of(study, {}).target.chosen_by, "the study holds no RT Structure Set");
   EXPECT_THAT(target_of(study, {}).doubts, IsEmpty());
+}
+
+// The contours may be another CT's, or the plan another target's.
+TEST(TargetOf, TargetVolumesOfWhichNoneHoldsTheIsocenterAreADoubt) {
+  for (const auto& [ptv, gtv] : {std::pair("PTV", "GTV"), std::pair("", "")}) {
+    const Study study = study_with({box(1, "PTV_50", ptv, {-50, 0, 0}, 30), box(2, "GTV_L", gtv, {10, 40, 0}, 30)});
+    EXPECT_THAT(target_of(study, {}).doubts,
+                ElementsAre("no target volume holds the isocenter: GTV_L, the nearest one, begins 28 mm from it, and "
+                            "the setup was judged at the isocenter. Name the target: --target NAME, or --target "
+                            "isocenter"));
+    EXPECT_THAT(target_of(study, {.by_person = "isocenter"}).doubts, IsEmpty());
+    EXPECT_THAT(target_of(study, {.by_person = "GTV_L"}).doubts, IsEmpty());
+  }
 }
 
 // Programs that know no types write none, or ORGAN for all: TG-263 begins the names of target volumes with what they
