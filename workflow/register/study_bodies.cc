@@ -2,10 +2,9 @@
 
 #include <fmt/format.h>
 
-#include <regex>
-
 #include "base/error.h"
 #include "base/parallel.h"
+#include "base/pattern.h"
 #include "io/dicom/structure_mask.h"
 
 namespace isoshift {
@@ -14,17 +13,17 @@ std::vector<DrawnBone> drawn_bones(const RtStructures& structures, const CtSerie
   // Names of people, of TG-263 (VB_L3, Bone_Mandible, Rib07_L) and of TotalSegmentator (vertebrae_L3, clavicula_left,
   // rib_left_7). Lymph nodes, muscles, vessels and margins are named after bones, too: beside a bone's name there may
   // be its side and which part of it is drawn, and nothing else.
-  static const std::regex bone(
+  static const Pattern bone(
       "(bone([ _-]?marrow)?[ _-])?("
       "[CTL]0?(\\d|1[0-2])|(vert(ebrae?)?|VB)[ _-]?[CTLS]?\\d+|skull|cranium|mandible|jaw|sacrum|sternum|"
       "rib[ _-]?(left|right|l|r)?[ _-]?\\d+([ _-](left|right|l|r))?|"
       "bone([ _-]?marrow)?[ _-]pelvic|pelvic[ _-](bones?|girdle)|"
       "(femur|femoral[ _]?head|humerus|scapula|clavicle|clavicula|pelvis|ilium|ischium|pubis|hip|tibia|fibula|"
       "patella|ulna|radius)([ _-](l|r|lt|rt|left|right|both|bones?|and|heads?|neck|shaft|prox(imal)?|dist(al)?))*)",
-      std::regex::icase);
+      Pattern::Case::kAny);
   std::vector<DrawnBone> result;
   for (const Structure& structure : structures.structures)
-    if (!structure.contours.empty() && std::regex_match(structure.name, bone))
+    if (!structure.contours.empty() && bone.matches(structure.name))
       result.push_back({structure.name, mask_of(structure, ct.hu.size, ct.hu.patient_from_voxel)});
   return result;
 }
