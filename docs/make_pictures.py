@@ -23,9 +23,9 @@ DAYS, REJECTED = 5, 2
 
 
 def take_picture(browser, file, width, height, scale=1.0):
+    browser.execute_cdp_cmd("Emulation.setScrollbarsHidden", {"hidden": True})
     browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride",
                             {"width": width, "height": height, "deviceScaleFactor": scale, "mobile": False})
-    browser.execute_cdp_cmd("Emulation.setScrollbarsHidden", {"hidden": True})
     time.sleep(0.5)  # the page arranges itself
     file.write_bytes(base64.b64decode(browser.execute_cdp_cmd("Page.captureScreenshot", {})["data"]))
 
