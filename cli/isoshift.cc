@@ -152,13 +152,14 @@ std::string unknown_flag(const CLI::App& command, std::string_view flag) {
   return fmt::format("{} has no flag {}{}", called(command), flag, did_you_mean(suggestion(flag, flags_of(command))));
 }
 
-// A flag that is mistyped is named before one that is missing.
+// A flag that is mistyped is named before one that is missing. -1,2 and -.5 are numbers, and -ofolder is the flag -o.
 void check_flags(const CLI::App& command, std::span<const std::string> words) {
   for (const std::string& word : words) {
-    const std::string flag = word.substr(0, word.find('='));
-    if (flag == "--") return;
-    if (flag.starts_with("--") && command.get_option_no_throw(flag) == nullptr)
-      throw UsageError(unknown_flag(command, flag));
+    if (word == "--") return;
+    if (word.size() < 2 || word[0] != '-' || (word[1] != '-' && !std::isalpha(static_cast<unsigned char>(word[1]))))
+      continue;
+    const std::string flag = word[1] == '-' ? word.substr(0, word.find('=')) : word.substr(0, 2);
+    if (command.get_option_no_throw(flag) == nullptr) throw UsageError(unknown_flag(command, flag));
   }
 }
 
@@ -192,27 +193,10 @@ void check_command(const CLI::App& app, std::span<const std::string> words) {
                     : fmt::format("{} has no command {}; did you mean isoshift {}?", program, first, meant));
 }
 
-// What CLI11 did not expect, each with what it probably was to be.
-std::string unexpected_words(const CLI::App& app) {
-  const CLI::App& command = command_read(app);
-  std::vector<std::string> complaints;
-  for (const std::string& word : app.remaining(true))
-    complaints.push_back(word.starts_with('-') ? unknown_flag(command, word.substr(0, word.find('=')))
-                                               : fmt::format("{} does not expect {}", called(command), word));
-  return fmt::format("{}", fmt::join(complaints, "\n       "));
-}
-
-// What was wrong with the words. A flag that was mistyped is named before what is then missing.
+// What was wrong with the words behind a command whose flags are known.
 std::string usage_error(const CLI::App& app, const CLI::ParseError& error) {
-  const bool is_missing = error.get_exit_code() == static_cast<int>(CLI::ExitCodes::RequiredError);
-  if (error.get_exit_code() == static_cast<int>(CLI::ExitCodes::ExtrasError) ||
-      (is_missing && !app.remaining(true).empty()))
-    return unexpected_words(app);
-  const CLI::App& command = command_read(app);
-  std::vector<std::string> below;
-  for (const CLI::App* one : command.get_subcommands({})) below.push_back(one->get_name());
-  if (!is_missing || below.empty()) return error.what();
-  return fmt::format("{} needs a command: {}", called(command), fmt::join(below, ", "));
+  if (error.get_exit_code() != static_cast<int>(CLI::ExitCodes::ExtrasError)) return error.what();
+  return fmt::format("{} does not expect {}", called(command_read(app)), fmt::join(app.remaining(true), " "));
 }
 
 // "--site: " for the value of a flag.
@@ -275,8 +259,8 @@ int run_isoshift(int argc, const char* const* argv, Console& console) {
       words.erase(words.begin());
       words.push_back("--help");
     }
-    check_command(app, words);
     check_words(words);
+    check_command(app, words);
     std::ranges::reverse(words);  // as CLI11 takes them
     app.parse(words);
   } catch (const CLI::ParseError& error) {
@@ -284,9 +268,8 @@ int run_isoshift(int argc, const char* const* argv, Console& console) {
       app.exit(error, console.out, console.err);
       return after_printing(kExitAccepted, console);
     }
-    const CLI::App& command = command_read(app);
-    console.err << "error: " << printable_lines(usage_error(app, error)) << "\n       " << called(command)
-                << " --help explains the " << (command.get_subcommands({}).empty() ? "flags" : "commands") << "\n";
+    console.err << "error: " << printable_lines(usage_error(app, error)) << "\n       " << called(command_read(app))
+                << " --help explains the flags\n";
     return kExitUsage;
   } catch (const UsageError& error) {
     return say(console, error, kExitUsage);

@@ -1,10 +1,12 @@
-#!/usr/bin/env python3
-"""What README.md shows of the program: its example, and the pictures of the demo. Made, or compared with what is there.
+#!/usr/bin/python3
+"""What the documents show of the program: the README's example, and pictures. Made, or compared with what is there.
 
-  docs/make.py PROGRAM --check     # exits with 1 where the README says something that the program does not print
-  docs/make.py PROGRAM --write     # writes what the program prints, and docs/pictures/{demo-view1,report-pdf,report-html}.png
+  docs/make.py PROGRAM --check     # exits with 1 where the README says something that the program does not print, where a
+                                   # picture cannot be made or has another size, and where nobody knows what made one
+  docs/make.py PROGRAM --write     # writes what the program prints, and all pictures that show it
 
-Needs pdftoppm (poppler-utils) and chromium. Run --write with a program that was built from a clean commit: the report names it.
+PROGRAM lies where it was built, and the Python module beside it; --write needs a clean commit, which the report names.
+Needs pdftoppm (poppler-utils), chromium and what the tests of the screen need.
 """
 
 import pathlib
@@ -14,10 +16,20 @@ import struct
 import subprocess
 import sys
 import tempfile
+from concurrent.futures import ThreadPoolExecutor
+
+import make_pictures
 
 ROOT = pathlib.Path(__file__).resolve().parents[1]
 README = ROOT / "README.md"
 PICTURES = ROOT / "docs" / "pictures"
+# The pictures that are not made here.
+ORIGINS = {"bounding_structures.png": "isoshift bench figures, of a real CT (docs/renderers.md)",
+           "renderers.png": "isoshift bench figures, of a real CT",
+           "sparse_pixels.png": "isoshift bench figures, of a real CT",
+           "registration-frames.svg": "drawn by hand",
+           "scaling-cpu.svg": "bench/plot_scaling.py (bench/results/README.md)",
+           "scaling-raycast-llvmpipe.svg": "bench/plot_scaling.py"}
 NUMBER = re.compile(r"[+-]?\d+(?:\.\d+)?")
 # Processors round differently (AVX2, AVX-512), and a search then ends a few hundredths of a millimeter elsewhere.
 ROUNDING = 0.1
@@ -51,7 +63,7 @@ def run_examples(program, folder, write):
             found = printed.get(frame_of(line))
             if found is None:
                 wrong.append(f"README.md: {command} does not print\n  {line}")
-            elif any(abs(float(a) - float(b)) > ROUNDING for a, b in zip(NUMBER.findall(line), NUMBER.findall(found))):
+            elif not write and any(abs(float(a) - float(b)) > ROUNDING for a, b in zip(NUMBER.findall(line), NUMBER.findall(found))):
                 wrong.append(f"README.md: {command} prints\n  {found}\ninstead of\n  {line}")
             if write and found is not None:
                 text = text.replace(line + "\n", found + "\n", 1)
@@ -60,36 +72,56 @@ def run_examples(program, folder, write):
     return wrong
 
 
-def make_pictures(result, to):
-    """The pictures of the demo's result, from its folder."""
-    (to / "demo-view1.png").write_bytes((result / "view1.png").read_bytes())
-    subprocess.run(["pdftoppm", "-png", "-r", "75", "-f", "1", "-l", "1", "-singlefile", result / "report.pdf", to / "report-pdf"], check=True)
-    subprocess.run(["chromium", "--headless", "--no-sandbox", "--disable-gpu", "--hide-scrollbars", "--disable-background-networking",
-                    f"--user-data-dir={to / 'chromium'}", f"--screenshot={to / 'report-html.png'}", "--window-size=1100,1357", "--force-device-scale-factor=0.72727",
-                    (result / "report.html").resolve().as_uri()], check=True, capture_output=True, timeout=120)
-
-
 def size_of(png):
     return struct.unpack(">II", png.read_bytes()[16:24])
+
+
+def compare_pictures(made):
+    """What is wrong with the pictures of docs, beside those made now."""
+    committed = {path.name for path in PICTURES.iterdir()}
+    text = "".join(page.read_text() for page in [README, *(ROOT / "docs").rglob("*.md")])
+    shown = set(re.findall(r"pictures/([\w-]+\.\w+)", text))
+    sizes = {path.name: size_of(path) for path in made.glob("*.png")}
+    wrong = [f"docs/pictures/{name}: no document shows it" for name in committed - shown]
+    wrong += [f"docs/pictures/{name}: a document shows it, and it is not there" for name in shown - committed]
+    wrong += [f"docs/pictures/{name}: neither made by docs/make.py nor named in its ORIGINS" for name in committed - sizes.keys() - ORIGINS.keys()]
+    wrong += [f"docs/pictures/{name}: expected a picture of {size} pixels" for name, size in sizes.items()
+              if name not in committed or size_of(PICTURES / name) != size]
+    return wrong
 
 
 def main(program, what):
     if what not in ("--check", "--write"):
         sys.exit(__doc__)
+    write = what == "--write"
+    program = pathlib.Path(program).resolve()
+    version = subprocess.run([program, "--version"], check=True, capture_output=True, text=True).stdout
+    if write and "-dirty" in version:
+        sys.exit(f"--write needs a program of a clean commit, not {version}")
     with tempfile.TemporaryDirectory() as folder:
-        folder = pathlib.Path(folder)
-        wrong = run_examples(str(pathlib.Path(program).resolve()), folder, what == "--write")
-        made = folder / "pictures"
-        made.mkdir()
-        make_pictures(folder / "result", made)
-        for picture in sorted(made.glob("*.png")):
-            committed = PICTURES / picture.name
-            if what == "--write":
-                committed.write_bytes(picture.read_bytes())
-            elif not committed.exists() or size_of(committed) != size_of(picture):
-                wrong.append(f"{committed.relative_to(ROOT)}: expected a picture of {size_of(picture)} pixels")
-    if what == "--check" and wrong:
-        sys.exit("\n".join(wrong) + "\ndocs/make.py PROGRAM --write mends it.")
+        readme, room, made = (pathlib.Path(folder) / name for name in ("readme", "room", "pictures"))
+        for one in (readme, room, made):
+            one.mkdir()
+
+        def show_readme():
+            wrong = run_examples(program, readme, write)
+            make_pictures.pictures_of_result(readme / "result", made)
+            make_pictures.pictures_by_hand(program, readme, made)
+            return wrong
+
+        with ThreadPoolExecutor() as pool:
+            of_readme = pool.submit(show_readme)
+            others = [pool.submit(make_pictures.pictures_of_room, program, room, made),
+                      pool.submit(make_pictures.pictures_of_python, program.parents[1] / "python", program, made)]
+            wrong = of_readme.result()
+            for one in others:
+                one.result()
+        if write:
+            for picture in made.iterdir():
+                (PICTURES / picture.name).write_bytes(picture.read_bytes())
+        wrong += compare_pictures(made)
+    if wrong:
+        sys.exit("\n".join(wrong) + ("" if write else "\ndocs/make.py PROGRAM --write mends what it makes."))
 
 
 if __name__ == "__main__":

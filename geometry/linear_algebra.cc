@@ -47,7 +47,14 @@ Eigen::Isometry3d rigid_motion_between(const Eigen::Matrix3Xd& from, const Eigen
   form.topRightCorner<3, 1>() = turn;
   form.bottomLeftCorner<1, 3>() = turn.transpose();
   form(3, 3) = s.trace();
-  const Eigen::Vector4d best = symmetric_eigen(form).vectors.col(3);
+  const SymmetricEigen eigen = symmetric_eigen(form);
+  // All quaternions of the largest eigenvalue are best. The nearest of them to (0, 0, 0, 1) turns least; where there is
+  // none, all are half a turn.
+  constexpr double kRounding = 1e-9;
+  Eigen::Vector4d best = Eigen::Vector4d::Zero();
+  for (Eigen::Index n = 0; n < 4; ++n)
+    if (eigen.values[n] >= (1.0 - kRounding) * eigen.values[3]) best += eigen.vectors(3, n) * eigen.vectors.col(n);
+  if (best.norm() < kRounding) best = eigen.vectors.col(3);
   Eigen::Isometry3d motion = Eigen::Isometry3d::Identity();
   motion.linear() = Eigen::Quaterniond(best).normalized().toRotationMatrix();
   motion.translation() = to_mean - motion.linear() * from_mean;

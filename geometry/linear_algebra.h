@@ -36,8 +36,8 @@ SymmetricEigen symmetric_eigen(const MatrixView& symmetric);
 Eigen::VectorXd generalized_eigenvalues(const MatrixView& a, const MatrixView& b);
 
 // The rigid motion that takes the columns of `from` closest to those of `to`, by a quaternion (Horn, JOSA A 4, 1987):
-// Eigen's umeyama() does it by a decomposition that takes 20 s to compile. Precondition: three points or more, not on a
-// line.
+// Eigen's umeyama() does it by a decomposition that takes 20 s to compile. Of motions that do so equally, since the
+// points are one or lie on a line, the one of the smallest rotation.
 Eigen::Isometry3d rigid_motion_between(const Eigen::Matrix3Xd& from, const Eigen::Matrix3Xd& to);
 
 }  // namespace isoshift

@@ -62,12 +62,4 @@ std::optional<Eigen::Isometry3d> as_rigid(const Eigen::Affine3d& matrix) {
   return Eigen::Isometry3d(matrix.matrix());
 }
 
-Eigen::Matrix3d rotation_between(const Eigen::Vector3d& from, const Eigen::Vector3d& to) {
-  constexpr double kOpposed = 1e-12;
-  const Eigen::Vector3d a = from.normalized(), b = to.normalized();
-  const double w = 1.0 + a.dot(b);
-  const Eigen::Vector3d across = w > kOpposed ? Eigen::Vector3d(a.cross(b)) : a.unitOrthogonal();
-  return Eigen::Quaterniond(w > kOpposed ? w : 0.0, across.x(), across.y(), across.z()).normalized().toRotationMatrix();
-}
-
 }  // namespace isoshift

@@ -45,8 +45,4 @@ inline constexpr double kRigidTolerance = 1e-4;
 // A matrix as a rigid motion; nothing if it is none.
 std::optional<Eigen::Isometry3d> as_rigid(const Eigen::Affine3d& matrix);
 
-// The smallest rotation that turns one direction into another; half a turn about any axis across where they are
-// opposed.
-Eigen::Matrix3d rotation_between(const Eigen::Vector3d& from, const Eigen::Vector3d& to);
-
 }  // namespace isoshift

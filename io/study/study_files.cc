@@ -2,13 +2,10 @@
 
 #include <dcmtk/dcmdata/dcuid.h>
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <array>
 #include <cctype>
-#include <cerrno>
-#include <cstring>
 #include <fstream>
 #include <iterator>
 #include <utility>
@@ -21,6 +18,7 @@
 #include "io/dicom/dicom_dataset.h"
 #include "io/dicom/rt_image.h"
 #include "io/dicom/rt_structures.h"
+#include "io/study/files_below.h"
 #include "io/study/session_choice.h"
 
 namespace isoshift {
@@ -474,48 +472,6 @@ std::vector<StudyFiles::Image> counting_images(const StudyFiles& files) {
   return images;
 }
 
-std::vector<fs::path> files_below(const std::vector<fs::path>& paths, const std::unordered_set<std::string>& but,
-                                  std::set<fs::path>* unsearchable) {
-  std::vector<fs::path> files;
-  const auto add = [&](const fs::path& file) {
-    if (!but.contains(file.native())) files.push_back(file);
-  };
-  const auto cannot_search = [&](const fs::path& folder, const char* why) {
-    if (unsearchable == nullptr) throw Error(fmt::format("{}: cannot be searched: {}", folder.string(), why));
-    unsearchable->insert(folder);
-  };
-  for (const fs::path& path : paths) {
-    std::error_code error;
-    const auto status = fs::status(path, error);
-    if (!fs::exists(status)) throw Error(fmt::format("{}: no such file or folder", path.string()));
-    if (!fs::is_directory(status)) {
-      add(path);
-      continue;
-    }
-    for (auto entry = fs::recursive_directory_iterator(path, error); !error && entry != fs::end(entry);
-         entry.increment(error)) {
-      const bool is_hidden = entry->path().filename().native().starts_with('.');
-      if (entry->is_symlink()) {
-        if (is_hidden) continue;
-        if (!entry->exists()) cannot_search(entry->path(), "a link to a file or folder that is not there");
-        // What a link means is searched where it lies, or by its own name; no link leads round and round.
-        else if (unsearchable != nullptr)
-          unsearchable->insert(entry->path());
-      } else if (entry->is_directory()) {
-        if (::access(entry->path().c_str(), R_OK | X_OK) == 0) continue;
-        cannot_search(entry->path(), std::strerror(errno));
-        entry.disable_recursion_pending();
-      } else if (!is_hidden && entry->is_regular_file()) {
-        add(entry->path());
-      }
-    }
-    if (error) throw Error(fmt::format("{}: cannot be searched: {}", path.string(), error.message()));
-  }
-  std::ranges::sort(files);
-  files.erase(std::unique(files.begin(), files.end()), files.end());
-  return files;
-}
-
 std::string why_no_structures(const UnusedStructures& unused) {
   const auto names = [](const std::vector<fs::path>& files) {
     std::string list;
@@ -624,14 +580,8 @@ StudyFiles scan_study(const std::vector<fs::path>& paths) {
     }
   });
   StudyFiles files;
-  for (const fs::path& path : unsearchable) {
-    if (fs::is_symlink(path) && fs::exists(path))
-      files.left_aside.push_back(fmt::format("{}: a link, which is not followed: name what it leads to, {}",
-                                             path.string(), fs::canonical(path).string()));
-    else
-      files.unreadable.push_back(fmt::format(
-          "{}: cannot be searched: it may not be opened, or is a link to what is not there", path.string()));
-  }
+  for (const fs::path& path : unsearchable)
+    (is_link_to_something(path) ? files.left_aside : files.unreadable).push_back(why_not_searched(path));
   for (StudyFiles& of_file : scanned) merge(std::move(of_file), files);
   return files;
 }

@@ -6,7 +6,6 @@
 #include <optional>
 #include <set>
 #include <string>
-#include <unordered_set>
 #include <vector>
 
 #include "io/dicom/notes.h"
@@ -73,14 +72,6 @@ struct StudyFiles {
 std::string patient_id_of(const std::string& patient);
 // Whether two `patient`s of one PatientID may be one: their issuers are the same, or one names none.
 bool may_be_of_one_issuer(const std::string& a, const std::string& b);
-
-// All files below `paths` (files or folders), in the order of their names, without the files named in `but` and without
-// hidden files (with a leading dot). Links below the paths are not followed: they may lead out of the study, or round
-// and round. Throws Error for a path that does not exist or cannot be searched, and for a link to nothing. If
-// `unsearchable` is given, such folders and links, and all other links, are skipped and added to it.
-std::vector<std::filesystem::path> files_below(const std::vector<std::filesystem::path>& paths,
-                                               const std::unordered_set<std::string>& but = {},
-                                               std::set<std::filesystem::path>* unsearchable = nullptr);
 
 // Reads the headers of all files below `paths` (files or folders), in the order of their names. A file that is not
 // DICOM is left aside.

@@ -13,7 +13,7 @@
 #include "base/error.h"
 #include "base/text_file.h"
 #include "io/dicom/ct_series.h"
-#include "io/study/study_files.h"
+#include "io/study/files_below.h"
 #include "tests/support/pose_near.h"
 #include "tests/support/small_study.h"
 #include "tests/support/testdata.h"

@@ -118,29 +118,6 @@ TEST(ReleaseCommandTest, TheNameOfWhoReleasesIsOneLineOfText) {
   }
 }
 
-TEST(UsageCommandTest, WhatIsMistypedIsNamedBeforeWhatIsMissing) {
-  const std::pair<std::vector<std::string>, std::string> mistakes[] = {
-      {{"register", "--ovrwrite"}, "error: isoshift register has no flag --ovrwrite; did you mean --overwrite?\n"},
-      {{"register", "study"}, "error: --output is required\n       isoshift register --help explains the flags\n"},
-      {{"phantom", "-o", "x", "--voxel=4"}, "error: isoshift phantom has no flag --voxel; did you mean --voxel-mm?\n"},
-      {{"--hepl"}, "error: isoshift has no flag --hepl; did you mean --help?\n"},
-      {{"hlep"}, "error: isoshift has no command hlep; did you mean isoshift help?\n"},
-      {{"room"}, "error: isoshift room needs a command: watch, serve, release, delete, audit\n"},
-      {{"watch", "watch.json"}, "error: isoshift has no command watch; did you mean isoshift room watch?\n"}};
-  for (const auto& [words, message] : mistakes) {
-    const CommandOutcome outcome = run_command(words);
-    EXPECT_EQ(outcome.exit_status, 2) << words.front();
-    EXPECT_THAT(outcome.err, StartsWith(message));
-  }
-}
-
-TEST(UsageCommandTest, NoLineOfAHelpIsLongerThan80Columns) {
-  for (const char* command : {"register", "batch", "evaluate", "track", "drr"}) {
-    std::istringstream lines(run_command({"help", command}).out);
-    for (std::string line; std::getline(lines, line);) EXPECT_LE(line.size(), 80U) << command << ": " << line;
-  }
-}
-
 // While no watch runs, nothing tells whether another file has come in its place.
 TEST(ReleaseCommandTest, WithoutAWatchNothingIsSentWhoseFilesAreGone) {
   const TemporaryFolder work;

@@ -1,6 +1,10 @@
 #include "geometry/linear_algebra.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
 
 #include "geometry/rotation.h"
 #include "tests/support/pose_near.h"
@@ -48,6 +52,25 @@ TEST(LinearAlgebra, FindsTheRigidMotionBetweenPoints) {
     motion.linear() = rotation_from_vector(rad_from_deg(turn_deg) * Eigen::Vector3d(1, -2, 2) / 3.0);
     motion.translation() = Eigen::Vector3d(4, -6, 3);
     EXPECT_THAT(rigid_motion_between(from, motion * from), PoseNear(motion, 1e-9, 1e-6)) << turn_deg;
+  }
+}
+
+// Whatever the rest, one point says how to move, and two how to turn the line between them.
+TEST(LinearAlgebra, OfMotionsThatFitEquallyTheSmallestRotationIsFound) {
+  const Eigen::Vector3d at(5.0, -7.0, 9.0), along(1.0, 2.0, -2.0), shift(4.0, -6.0, 3.0);
+  EXPECT_THAT(rigid_motion_between(at, at + shift),
+              PoseNear(Eigen::Isometry3d(Eigen::Translation3d(shift)), 1e-9, 1e-9));
+  for (const Eigen::Vector3d& to : {Eigen::Vector3d(0.3, -4.0, 1.0), Eigen::Vector3d(along),
+                                    Eigen::Vector3d(1.001 * along), Eigen::Vector3d(-along)}) {
+    const Eigen::Matrix3Xd from_points = (Eigen::Matrix3Xd(3, 2) << at, at + along).finished();
+    const Eigen::Matrix3Xd to_points = (Eigen::Matrix3Xd(3, 2) << at + shift, at + shift + to).finished();
+    const Eigen::Isometry3d motion = rigid_motion_between(from_points, to_points);
+    EXPECT_THAT(Eigen::Vector3d(motion.linear() * along.normalized()), VectorNear(to.normalized(), 1e-9));
+    EXPECT_NEAR(motion.linear().determinant(), 1.0, 1e-12);
+    EXPECT_NEAR(rotation_vector(motion.linear()).norm(),
+                std::acos(std::clamp(along.normalized().dot(to.normalized()), -1.0, 1.0)), 1e-6);
+    EXPECT_THAT(Eigen::Vector3d(motion * (at + 0.5 * along)), VectorNear(at + shift + 0.5 * to, 1e-9))
+        << "the means meet";
   }
 }
 

@@ -27,16 +27,6 @@ TEST(Rotation, PlacesMoveWithSmallMotions) {
   EXPECT_THAT(Eigen::Vector3d(place + place_per_motion(place) * motion), VectorNear(moved, 1e-9));
 }
 
-TEST(Rotation, TurnsOneDirectionIntoAnother) {
-  const Eigen::Vector3d from(1.0, 2.0, -2.0);
-  for (const Eigen::Vector3d& to :
-       {Eigen::Vector3d(0.3, -4.0, 1.0), Eigen::Vector3d(2.0 * from), Eigen::Vector3d(-from)}) {
-    const Eigen::Matrix3d rotation = rotation_between(from, to);
-    EXPECT_THAT(Eigen::Vector3d(rotation * from.normalized()), VectorNear(to.normalized(), 1e-9));
-    EXPECT_NEAR(rotation.determinant(), 1.0, 1e-12);
-  }
-}
-
 TEST(Rotation, ZxyAnglesComposeAndDecompose) {
   std::mt19937_64 random(1);
   std::uniform_real_distribution<double> turn(-3.14, 3.14), tilt(-1.57, 1.57);

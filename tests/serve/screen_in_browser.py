@@ -36,6 +36,26 @@ def browser_of(user, address):
     return browser
 
 
+def open_room(program, work, preset="fast", **site):
+    """A room that registers what comes to WORK/in: the processes of watch and serve, and the screen's address."""
+    (work / "in").mkdir()
+    secret = work / "secret"
+    secret.write_text("word\n")
+    secret.chmod(0o600)
+    (work / "site.json").write_text(json.dumps({"site_file": 1, "name": "Linac 3", "sessions": {"views": 2, "quiet_s": 1}, **site}))
+    (work / "watch.json").write_text(json.dumps({
+        "watch_file": 1, "folder": "in", "results": "results", "site": "site.json", "register": [f"--preset={preset}"]}))
+    (work / "serve.json").write_text(json.dumps({
+        "serve_file": 1, "watch": "watch.json", "port": 0, "proxy": {"header": "X-Remote-User", "secret_file": "secret"},
+        "roles": {"doe": ["view", "register", "release"], "roe": ["view"], "poe": ["view", "release"]}}))
+    results, log = work / "results", work / "serve.log"
+    watch = subprocess.Popen([program, "room", "watch", work / "watch.json"], stderr=(work / "watch.log").open("w"))
+    wait_for(lambda: (results / "engine.json").exists(), 30, "the engine")
+    serve = subprocess.Popen([program, "room", "serve", work / "serve.json"], stderr=log.open("w"))
+    wait_for(lambda: "serving" in log.read_text(), 30, "the server")
+    return watch, serve, re.search(r"http://\S+", log.read_text())[0]
+
+
 def text(browser, selector):
     return "\n".join(one.text for one in browser.find_elements(By.CSS_SELECTOR, selector))
 
@@ -138,17 +158,7 @@ def look_without_a_server(doe, roe, work):
 
 
 def main(program, work):
-    (work / "in").mkdir()
-    secret = work / "secret"
-    secret.write_text("word\n")
-    secret.chmod(0o600)
-    (work / "site.json").write_text(json.dumps({"site_file": 1, "name": "Linac 3", "sessions": {"views": 2, "quiet_s": 1}}))
-    (work / "watch.json").write_text(json.dumps({
-        "watch_file": 1, "folder": "in", "results": "results", "site": "site.json", "register": ["--preset=fast"]}))
-    (work / "serve.json").write_text(json.dumps({
-        "serve_file": 1, "watch": "watch.json", "port": 0, "proxy": {"header": "X-Remote-User", "secret_file": "secret"},
-        "roles": {"doe": ["view", "register", "release"], "roe": ["view"], "poe": ["view", "release"]}}))
-    results, log = work / "results", work / "serve.log"
+    results = work / "results"
 
     def bring_study(seed, patient_name=None, minutes_between=0):
         study = work / f"study-{seed}"
@@ -171,11 +181,7 @@ def main(program, work):
         wait_for(lambda: len(list((results / "sessions").glob("[!.]*/result.json"))) == count, 120, "a result")
         return time.time()
 
-    watch = subprocess.Popen([program, "room", "watch", work / "watch.json"], stderr=(work / "watch.log").open("w"))
-    wait_for(lambda: (results / "engine.json").exists(), 30, "the engine")
-    serve = subprocess.Popen([program, "room", "serve", work / "serve.json"], stderr=log.open("w"))
-    wait_for(lambda: "serving" in log.read_text(), 30, "the server")
-    address = re.search(r"http://\S+", log.read_text())[0]
+    watch, serve, address = open_room(program, work)
     doe = roe = None
     try:
         doe, roe = browser_of("doe", address), browser_of("roe", address)

@@ -36,6 +36,13 @@ def answer_to(address):
         return error.code
 
 
+def open_view(program, log, *arguments):
+    """isoshift view, and the address that opens it once."""
+    view = subprocess.Popen([program, "view", *arguments], stdout=log.open("w"))
+    wait_for(lambda: "/open/" in log.read_text(), 60, "the address")
+    return view, re.search(r"http://\S+", log.read_text())[0]
+
+
 def colored(browser, color):
     """How many pixels of the first view have nearly this color."""
     return browser.execute_script("""
@@ -52,9 +59,7 @@ def main(program, work):
     subprocess.run([program, "phantom", "-o", study, "--seed", "8", "--voxel-mm", "2", "--image-pixels", "256",
                     "--translation", *map(str, TRANSLATION), "--rotation", "0", "0", str(ABOUT_Z)],
                    check=True, capture_output=True)
-    view = subprocess.Popen([program, "view", study, "-o", results, "--preset=setup"], stdout=log.open("w"))
-    wait_for(lambda: "/open/" in log.read_text(), 60, "the address")
-    address = re.search(r"http://\S+", log.read_text())[0]
+    view, address = open_view(program, log, study, "-o", results, "--preset=setup")
     root = address[:address.index("/open/")]
     browser = None
     try:
@@ -151,10 +156,8 @@ def main(program, work):
 #A result is looked at again.
         view.kill()
         view.wait()
-        view = subprocess.Popen([program, "view", study, "-o", results, "--start", results / "1" / "result.json"],
-                                stdout=log.open("w"))
-        wait_for(lambda: "/open/" in log.read_text(), 60, "the second address")
-        browser.get(re.search(r"http://\S+", log.read_text())[0])
+        view, address = open_view(program, log, study, "-o", results, "--start", results / "1" / "result.json")
+        browser.get(address)
         wait_for(lambda: "rendered in" in one("#times").text, 20, "the DRRs of the result")
         expect(abs(shown()[0] - 15) < 0.2, f"the page begins at {shown()}")
         for mode in ("side", "wipe", "flicker", "difference", "blend"):

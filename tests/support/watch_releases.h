@@ -30,6 +30,19 @@ class WatchReleases : public testing::Test {
   void bring_one_between(const std::string& patient) {
     room_.source.bring(xray(patient, patient + "3", "AP", second_of(10, 15, 5)));
   }
+  // The room opens, and the patient's session is registered.
+  void register_first(const std::string& patient) {
+    room_.start();
+    bring(patient);
+    room_.pass(std::chrono::seconds(60));
+  }
+  // Slices of the CT that come after the others.
+  void bring_late_slice(const std::string& patient) {
+    StudyFiles late = ct_of(patient);
+    late.cts[0].files = {"/in/late"};
+    late.cts[0].sop_instance_uids = {"late"};
+    room_.source.bring(late);
+  }
   static std::string session(const std::string& patient) { return session_name({patient + "1", patient + "2"}); }
   void release(const std::string& patient) {
     ResultsTree(room_.file.results)
@@ -37,9 +50,7 @@ class WatchReleases : public testing::Test {
   }
   // P's result is released, and no peer answers.
   void release_while_peers_are_down() {
-    room_.start();
-    bring("P");
-    room_.pass(std::chrono::seconds(60));
+    register_first("P");
     room_.sender.down = {"record", "archive"};
     release("P");
   }
@@ -57,6 +68,10 @@ class WatchReleases : public testing::Test {
   }
   bool is_released(const std::string& patient) const {
     return ResultsTree(room_.file.results).is_released(session(patient));
+  }
+  // What speaks against the result of a session.
+  std::string objection(const std::string& session) const {
+    return ResultsTree(room_.file.results).objection(session).words;
   }
   auto objects(const std::string& peer, const std::string& patient) const {
     const std::string key = fmt::format("{} {}/", peer, session(patient));

@@ -10,8 +10,8 @@
 #include "io/dicom/dicom_dataset.h"
 #include "io/objects/registration_check.h"
 #include "io/objects/registration_meaning.h"
+#include "io/study/files_below.h"
 #include "io/study/session.h"
-#include "io/study/study_files.h"
 #include "workflow/audit_setup/used_shifts.h"
 
 namespace isoshift {
@@ -31,7 +31,7 @@ std::vector<CheckedRegistration> registrations_below(const fs::path& folder, std
       of_no_use.emplace_back(error.what());
     }
   }
-  for (const fs::path& path : unsearchable) of_no_use.push_back(fmt::format("{}: cannot be searched", path.string()));
+  for (const fs::path& path : unsearchable) of_no_use.push_back(why_not_searched(path));
   if (objects.empty())
     throw Error(fmt::format("{}: holds no Spatial Registration object{}", folder.string(),
                             of_no_use.empty() ? "" : "; " + of_no_use.front()));

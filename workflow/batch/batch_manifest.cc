@@ -16,6 +16,7 @@
 #include "base/json_file.h"
 #include "base/sha256.h"
 #include "base/text_file.h"
+#include "io/study/files_below.h"
 #include "io/study/session_files.h"
 
 namespace isoshift {

@@ -8,6 +8,7 @@
 #include "base/json_file.h"
 #include "base/output_folder.h"
 #include "base/sha256.h"
+#include "io/study/files_below.h"
 
 namespace isoshift {
 namespace {

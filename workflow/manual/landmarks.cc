@@ -54,15 +54,6 @@ bool are_on_a_line(const Eigen::Matrix3Xd& points) {
   return symmetric_eigen(spread).values[1] < kLeastBesideMm * kLeastBesideMm;
 }
 
-// The columns of `to` from those of `from`.
-Eigen::Isometry3d motion_between(const Eigen::Matrix3Xd& from, const Eigen::Matrix3Xd& to) {
-  if (from.cols() > 2) return rigid_motion_between(from, to);
-  Eigen::Isometry3d motion = Eigen::Isometry3d::Identity();
-  if (from.cols() == 2) motion.linear() = rotation_between(from.col(1) - from.col(0), to.col(1) - to.col(0));
-  motion.translation() = to.rowwise().mean() - motion.linear() * from.rowwise().mean();
-  return motion;
-}
-
 }  // namespace
 
 LandmarkFit fit_landmarks(std::span<const XrayView> views, std::span<const Landmark> landmarks,
@@ -85,7 +76,7 @@ LandmarkFit fit_landmarks(std::span<const XrayView> views, std::span<const Landm
   }
   if (count > 2 && (are_on_a_line(in_drrs) || are_on_a_line(in_xrays)))
     throw Error("The landmarks lie on a line, about which the patient could be turned: mark another beside it");
-  const Eigen::Isometry3d motion = motion_between(in_drrs, in_xrays);
+  const Eigen::Isometry3d motion = rigid_motion_between(in_drrs, in_xrays);
   fit.setup_error = motion * current;
   if (!fit.setup_error.matrix().allFinite()) throw Error("The landmarks lie too far away");
   const Eigen::Matrix3Xd left = (motion * in_drrs) - in_xrays;

@@ -8,6 +8,7 @@
 
 #include "base/error.h"
 #include "io/dicom/dicom_dataset.h"
+#include "io/study/files_below.h"
 
 namespace isoshift {
 

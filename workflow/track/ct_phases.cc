@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include "base/error.h"
+#include "io/study/files_below.h"
 #include "registration/motion/tracker.h"
 #include "workflow/register/study_options.h"
 

@@ -13,6 +13,7 @@
 #include "base/output_folder.h"
 #include "geometry/mask.h"
 #include "io/dicom/structure_mask.h"
+#include "io/study/files_below.h"
 #include "io/study/motion_trace.h"
 #include "workflow/track/ct_phases.h"
 

@@ -374,36 +374,6 @@ TEST_F(StudyFilesTest, FilesThatLostTheirContentsAreSaid) {
   EXPECT_EQ(files.left_aside.size(), 4U);
 }
 
-TEST_F(StudyFilesTest, ALinkToNothingIsSaidAndStopsNothingElse) {
-  const TemporaryFolder folder;
-  std::ofstream(folder / "notes.txt") << "text";
-  fs::create_symlink("nowhere", folder / "link.dcm");
-  const StudyFiles files = scan_study({folder.path()});
-  EXPECT_THAT(files.unreadable, testing::ElementsAre(HasSubstr("link.dcm: cannot be searched")));
-  EXPECT_EQ(files.left_aside.size(), 1U);
-}
-
-TEST_F(StudyFilesTest, LinksInAFolderAreNotFollowedAndNamed) {
-  const TemporaryFolder folder, elsewhere;
-  std::ofstream(folder / "own") << "text";
-  std::ofstream(elsewhere / "a") << "text";
-  fs::create_directory_symlink(elsewhere.path(), folder / "out");
-  fs::create_symlink(elsewhere / "a", folder / "file");
-  fs::create_directory_symlink(folder.path(), folder / "back");  // round and round
-  EXPECT_EQ(files_below({folder.path()}), std::vector{folder / "own"});
-  EXPECT_EQ(files_below({folder / "out"}), std::vector{folder / "out" / "a"});  // named by a person
-  EXPECT_THAT(scan_study({folder.path()}).left_aside,
-              UnorderedElementsAre(
-                  HasSubstr("own"),
-                  HasSubstr("out: a link, which is not followed: name what it leads to, " + elsewhere.path().string()),
-                  HasSubstr("file: a link"), HasSubstr("back: a link")));
-  fs::create_directory_symlink("/not/there", folder / "lost");
-  std::set<fs::path> unsearchable;
-  EXPECT_EQ(files_below({folder.path()}, {}, &unsearchable).size(), 1U);
-  EXPECT_TRUE(unsearchable.contains(folder / "lost"));
-  EXPECT_THROW(files_below({folder.path()}), Error);
-}
-
 TEST_F(StudyFilesTest, WhatWasNamedIsWhatTheMessageNames) {
   EXPECT_EQ(error_of_finding({.study = {}, .ct = {}, .images = {study_.truth()}, .plan = {}}),
             "no RT Image found (searched " + study_.truth().string() + ").\n       Name the X-rays: --image FILE");

@@ -7,7 +7,7 @@
 
 #include <functional>
 
-#include "tests/support/small_study.h"
+#include "tests/support/cube_study.h"
 
 namespace isoshift::region_check_test {
 namespace {
@@ -29,24 +29,11 @@ bool is_near_axis(const Vector3d& at, const Vector3d& axis_mm, double radius_mm)
 
 // A trunk of water with a spine of bone and lungs of air in front of it, all along z; the isocenter in the spine.
 Study study_of_trunk() {
-  Study study;
-  CtSeries ct;
-  Eigen::Affine3d lattice(Eigen::Translation3d(-90.0, -90.0, -90.0));
-  lattice.scale(3.0);
-  ct.hu = Volume<float>(Eigen::Vector3i(61, 61, 61), lattice, -1000.0F);
-  for (int k = 0; k < 61; ++k)
-    for (int j = 0; j < 61; ++j)
-      for (int i = 0; i < 61; ++i) {
-        const Vector3d at = lattice * Vector3d(i, j, k);
-        if (is_near_axis(at, Vector3d::Zero(), 75.0)) ct.hu.at(i, j, k) = 0.0F;
-        if (is_near_axis(at, {-35.0, -15.0, 0.0}, 25.0) || is_near_axis(at, {35.0, -15.0, 0.0}, 25.0))
-          ct.hu.at(i, j, k) = -850.0F;
-        if (is_near_axis(at, kSpine, 15.0)) ct.hu.at(i, j, k) = 600.0F;
-      }
-  study.ct = std::make_shared<const CtSeries>(std::move(ct));
-  study.isocenter_patient_mm = kSpine;
-  study.planned_room_from_patient = planned_room_from_patient(PatientPosition::kHfs, study.table, kSpine);
-  return study;
+  return cube_study(61, 3.0, kSpine, [](const Vector3d& at) {
+    if (is_near_axis(at, kSpine, 15.0)) return 600.0F;
+    if (is_near_axis(at, {-35.0, -15.0, 0.0}, 25.0) || is_near_axis(at, {35.0, -15.0, 0.0}, 25.0)) return -850.0F;
+    return is_near_axis(at, Vector3d::Zero(), 75.0) ? 0.0F : -1000.0F;
+  });
 }
 
 ChosenVolume chosen(const Study& study, const Place& is_in, bool is_excluded = false) {

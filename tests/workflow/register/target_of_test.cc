@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "base/error.h"
+#include "tests/support/cube_study.h"
 #include "tests/support/small_study.h"
 
 namespace isoshift::target_of_test {
@@ -31,16 +32,7 @@ Structure box(int number, const std::string& name, const std::string& type, cons
 
 // A CT of 160 mm about the patient's origin; the isocenter at (10, 0, 0).
 Study study_with(std::vector<Structure> structures) {
-  Study study;
-  CtSeries ct;
-  Eigen::Affine3d lattice(Eigen::Translation3d(-80.0, -80.0, -80.0));
-  lattice.scale(kSliceMm);
-  ct.hu = Volume<float>(Eigen::Vector3i(41, 41, 41), lattice);
-  ct.frame_of_reference_uid = "1.2.3";
-  study.ct = std::make_shared<const CtSeries>(std::move(ct));
-  study.isocenter_patient_mm = Vector3d(10, 0, 0);
-  study.planned_room_from_patient =
-      planned_room_from_patient(PatientPosition::kHfs, study.table, study.isocenter_patient_mm);
+  Study study = cube_study(41, kSliceMm, {10, 0, 0}, [](const Vector3d&) { return 0.0F; });
   study.plan = RtPlan{};
   study.structures = RtStructures{.structures = std::move(structures)};
   return study;

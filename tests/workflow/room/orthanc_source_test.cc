@@ -9,6 +9,7 @@
 #include <iterator>
 #include <memory>
 
+#include "io/study/files_below.h"
 #include "tests/support/file_size_limit.h"
 #include "tests/support/small_study.h"
 #include "tests/support/treatment_room.h"

@@ -19,17 +19,7 @@ using testing::UnorderedElementsAre;
 
 class WatchChanges : public WatchReleases {
  protected:
-  WatchChanges() {
-    room_.start();
-    bring("P");
-    room_.pass(60s);
-  }
-  void bring_late_slice() {
-    StudyFiles late = ct_of("P");
-    late.cts[0].files = {"/in/late"};
-    late.cts[0].sop_instance_uids = {"late"};
-    room_.source.bring(late);
-  }
+  WatchChanges() { register_first("P"); }
   void revise_plan() {
     room_.contents.written["/in/plan.P"] = "revised";
     room_.source.bring(plan_of("P"));
@@ -57,15 +47,12 @@ class WatchChanges : public WatchReleases {
     fs::copy(tree.session(session(patient)), folder);
     tree.hand_over(tree.manual_basis(session(patient)), {.folder = folder, .files = sha256_of_folder(folder)}, "jdoe");
   }
-  std::string objection(const std::string& session) const {
-    return ResultsTree(room_.file.results).objection(session).words;
-  }
   std::vector<std::string> sessions() const { return ResultsTree(room_.file.results).sessions(); }
 };
 
 TEST_F(WatchChanges, LateSlicesAndARevisedPlanSupersedeAResult) {
   ASSERT_THAT(room_.runs(), SizeIs(1));
-  bring_late_slice();
+  bring_late_slice("P");
   room_.pass(60s);
   EXPECT_THAT(sessions(), UnorderedElementsAre(session("P"), session("P") + "-2"));
   EXPECT_THAT(room_.index(), HasSubstr("CT changed after the registration"));
@@ -180,14 +167,9 @@ TEST_F(WatchChanges, AKilledWatchRegistersOnceMoreAndNotTwice) {
 
 TEST_F(WatchChanges, APersonReleasesWhatWasRegisteredAgain) {
   allow_automatic_release();
-  room_.start();
-  bring("Q");
-  room_.pass(60s);
+  register_first("Q");
   ASSERT_TRUE(is_released("Q"));
-  StudyFiles late = ct_of("Q");
-  late.cts[0].files = {"/in/late"};
-  late.cts[0].sop_instance_uids = {"late"};
-  room_.source.bring(late);
+  bring_late_slice("Q");
   room_.pass(600s);
   EXPECT_THAT(room_.index(), HasSubstr("held for a person: its X-rays were registered before, from other files"));
   EXPECT_FALSE(ResultsTree(room_.file.results).is_released(session("Q") + "-2"));

@@ -35,9 +35,7 @@ class WatchForgeries : public WatchReleases, public testing::WithParamInterface<
       room_.file.signing_key = key_;
     }
     room_.runner.verdict = [](const auto&) { return Verdict::kReview; };
-    room_.start();
-    bring("P");
-    room_.pass(60s);
+    register_first("P");
   }
   ResultsTree tree() const { return ResultsTree(room_.file); }
   // A copy of P's result at another place.

@@ -44,9 +44,7 @@ TEST_F(WatchReleases, WhatIsOlderThanOtherXraysOfThePatientWaitsForAPerson) {
 
 // A person is told, and has to say so.
 TEST_F(WatchReleases, OtherXraysThatSpeakAgainstAResultAreSaidInItsRelease) {
-  room_.start();
-  bring("P");
-  room_.pass(60s);
+  register_first("P");
   bring_one_between("P");
   room_.pass(60s);
   EXPECT_THAT(room_.index(),
@@ -70,9 +68,7 @@ TEST_F(WatchReleases, OtherXraysThatSpeakAgainstAResultAreSaidInItsRelease) {
 
 // A verification after the couch has moved is everyday work.
 TEST_F(WatchReleases, APersonReleasesWhatIsOlderThanAnotherResultWithAWarning) {
-  room_.start();
-  bring("P");
-  room_.pass(60s);
+  register_first("P");
   room_.source.bring(xray("P", "P3", "AP", second_of(10, 20)));
   room_.source.bring(xray("P", "P4", "LAT", second_of(10, 20, 10)));
   room_.pass(60s);
@@ -83,9 +79,7 @@ TEST_F(WatchReleases, APersonReleasesWhatIsOlderThanAnotherResultWithAWarning) {
 }
 
 TEST_F(WatchReleases, AnObjectionReachesTheDiskWhateverItHoldsAndHoweverLate) {
-  room_.start();
-  bring("P");
-  room_.pass(60s);
+  register_first("P");
   const fs::path kept = room_.file.results / "objections.json";
   fs::create_directory(kept);  // cannot be replaced
   write_text(kept / "x", "");
@@ -114,9 +108,7 @@ TEST_F(WatchReleases, WhatIsSpokenAgainstBeforeItIsSentIsNotSent) {
 
 // What speaks against a result is not forgotten for a newer result.
 TEST_F(WatchReleases, AnObjectionIsNotWeakenedByXraysThatGo) {
-  room_.start();
-  bring("P");
-  room_.pass(60s);
+  register_first("P");
   bring_one_between("P");
   room_.pass(60s);
   EXPECT_THAT(error_of_release("P"), HasSubstr("grouped in another way"));
@@ -167,9 +159,7 @@ INSTANTIATE_TEST_SUITE_P(Xrays, WatchReleasesNothingOutdated,
                                          "of another plan"));
 
 TEST_F(WatchReleases, WhatAnEarlierRunRegisteredWaitsForAPerson) {
-  room_.start();
-  bring("P");
-  room_.pass(60s);
+  register_first("P");
   ASSERT_THAT(room_.runs(), SizeIs(1));
   allow_automatic_release();
   room_.start();
@@ -235,15 +225,13 @@ TEST_F(WatchReleases, APeerReceivesTheNewestReleaseLast) {
 
 // That planning sends with a plan.
 TEST_F(WatchReleases, ADrrIsNoXrayThatSpeaksAgainstAResult) {
-  room_.start();
-  bring("P");
-  room_.pass(60s);
+  register_first("P");
   StudyFiles drr = xray("P", "drr", "RtImage_Bm1", second_of(11, 0));
   std::swap(drr.images, drr.drrs);
   room_.source.bring(drr);
   room_.pass(60s);
   EXPECT_THAT(room_.runs(), SizeIs(1));
-  EXPECT_EQ(ResultsTree(room_.file.results).objection(session("P")).words, "");
+  EXPECT_EQ(objection(session("P")), "");
   EXPECT_THAT(room_.index(), HasSubstr("1 sessions registered, 0 waiting"));
 }
 

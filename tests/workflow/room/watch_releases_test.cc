@@ -28,9 +28,7 @@ using testing::UnorderedElementsAre;
 // A person at the screen (isoshift room serve) made another result of the X-rays, from a copy of the one there was.
 TEST_F(WatchReleases, AResultByHandIsTakenOverAndSupersedesTheOneBefore) {
   allow_automatic_release();
-  room_.start();
-  bring("P");
-  room_.pass(60s);
+  register_first("P");
   ASSERT_TRUE(is_released("P"));
   ResultsTree tree(room_.file.results);
   EXPECT_FALSE(tree.order(session("P")).parts.images.empty()) << "what to begin with is not known";
@@ -88,9 +86,7 @@ TEST_F(WatchReleases, OnlyAcceptedResultsAreReleasedWithoutAPerson) {
 TEST_F(WatchReleases, AVerdictThatWasExchangedForAWhileReleasesNothing) {
   allow_automatic_release();
   room_.runner.verdict = [](const auto&) { return Verdict::kReview; };
-  room_.start();
-  bring("P");
-  room_.pass(60s);
+  register_first("P");
   const fs::path result = room_.file.results / "sessions" / session("P") / "result.json";
   std::string text;
   std::getline(std::ifstream(result), text, '\0');
@@ -110,9 +106,7 @@ TEST_F(WatchReleases, AVerdictThatWasExchangedForAWhileReleasesNothing) {
 TEST_F(WatchReleases, WhatWasMadeUnderAnotherSiteFileWaitsForAPerson) {
   allow_automatic_release();
   room_.runner.site_sha256 = "an earlier site file";
-  room_.start();
-  bring("P");
-  room_.pass(60s);
+  register_first("P");
   ASSERT_THAT(room_.runs(), SizeIs(1));
   EXPECT_FALSE(is_released("P"));
   room_.start();
@@ -122,9 +116,7 @@ TEST_F(WatchReleases, WhatWasMadeUnderAnotherSiteFileWaitsForAPerson) {
 }
 
 TEST_F(WatchReleases, WithoutTheSitesRuleAcceptedResultsAreHeld) {
-  room_.start();
-  bring("P");
-  room_.pass(60s);
+  register_first("P");
   ASSERT_THAT(room_.runs(), SizeIs(1));
   // The rule comes later, with another site file.
   room_.file.site.sha256 = "another site file";

@@ -69,9 +69,7 @@ TEST_F(WatchSending, AnOlderResultIsNotSentOnceThereIsANewer) {
 
 // A person knew of the verification, not of what was taken after it.
 TEST_F(WatchSending, AReleaseDespiteOtherXraysIsForThose) {
-  room_.start();
-  bring("P");
-  room_.pass(60s);
+  register_first("P");
   bring_verification();
   room_.sender.down = {"record", "archive"};
   release("P");
@@ -84,9 +82,7 @@ TEST_F(WatchSending, AReleaseDespiteOtherXraysIsForThose) {
 }
 
 TEST_F(WatchSending, AnObjectionIsInTheAuditLogToo) {
-  room_.start();
-  bring("P");
-  room_.pass(60s);
+  register_first("P");
   bring_one_between("P");
   room_.pass(60s);
   EXPECT_THAT(audit(), HasSubstr(R"("event":"objection")"));
@@ -103,9 +99,7 @@ TEST_F(WatchSending, AnObjectionIsInTheAuditLogToo) {
 
 // The log cannot be written when the objection is found.
 TEST_F(WatchSending, AnObjectionWaitsForItsLineInTheAuditLog) {
-  room_.start();
-  bring("P");
-  room_.pass(60s);
+  register_first("P");
   const fs::path log = room_.file.results / "audit.jsonl", aside = room_.folder / "audit.jsonl";
   fs::rename(log, aside);
   fs::create_directory(log);
