@@ -201,7 +201,7 @@ std::string usage_error(const CLI::App& app, const CLI::ParseError& error) {
 
 // "--site: " for the value of a flag.
 std::string flag_before(std::span<const std::string> words, std::size_t n) {
-  const std::string_view before = n > 0 ? words[n - 1] : "";
+  const std::string_view before = n > 0 ? std::string_view(words[n - 1]) : "";
   return before.starts_with('-') ? std::string(before) + ": " : "";
 }
 
