@@ -17,7 +17,7 @@ set(isoshift_common_headers
 # only with the flags that it was precompiled with.
 file(WRITE ${PROJECT_BINARY_DIR}/precompiled.cc "")
 add_library(isoshift_light INTERFACE)
-target_compile_options(isoshift_light INTERFACE $<$<CONFIG:Release,RelWithDebInfo>:-Og>)
+target_compile_options(isoshift_light INTERFACE $<$<CONFIG:Release>:-Og> $<$<CONFIG:RelWithDebInfo>:-O1>)
 if(ISOSHIFT_PCH)
   foreach(kind "" _light)
     add_library(isoshift_precompiled${kind} OBJECT ${PROJECT_BINARY_DIR}/precompiled.cc)
