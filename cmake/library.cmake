@@ -13,8 +13,8 @@ set(isoshift_common_headers
     <string_view> <utility> <vector> <Eigen/Geometry> <fmt/format.h> <fmt/ranges.h> <nlohmann/json.hpp>)
 
 # isoshift_precompiled: for what computes, with the flags of the build. isoshift_precompiled_light: for what reads, decides
-# and writes, with -Og, which compiles in half of the time of -O2 and whose time to run nobody notices (-O1 with tests). GCC takes a header
-# only with the flags that it was precompiled with.
+# and writes, with -Og (with tests -O1), which compiles in half of the time of -O2 and whose time to run nobody notices.
+# GCC takes a header only with the flags that it was precompiled with.
 file(WRITE ${PROJECT_BINARY_DIR}/precompiled.cc "")
 add_library(isoshift_light INTERFACE)
 target_compile_options(isoshift_light INTERFACE $<$<CONFIG:Release>:-Og> $<$<CONFIG:RelWithDebInfo>:-O1>)
