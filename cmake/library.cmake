@@ -13,11 +13,12 @@ set(isoshift_common_headers
     <string_view> <utility> <vector> <Eigen/Geometry> <fmt/format.h> <fmt/ranges.h> <nlohmann/json.hpp>)
 
 # isoshift_precompiled: for what computes, with the flags of the build. isoshift_precompiled_light: for what reads, decides
-# and writes, with -Og (with tests -O1), which compiles in half of the time of -O2 and whose time to run nobody notices.
-# GCC takes a header only with the flags that it was precompiled with.
+# and writes, with -O1, which compiles a third faster and whose time to run nobody notices; not with -Og: of a template
+# that such a box shares with one that computes, the linker may keep its slow copy (bench/results/build-time.md). GCC
+# takes a header only with the flags that it was precompiled with.
 file(WRITE ${PROJECT_BINARY_DIR}/precompiled.cc "")
 add_library(isoshift_light INTERFACE)
-target_compile_options(isoshift_light INTERFACE $<$<CONFIG:Release>:-Og> $<$<CONFIG:RelWithDebInfo>:-O1>)
+target_compile_options(isoshift_light INTERFACE $<$<CONFIG:Release,RelWithDebInfo>:-O1>)
 if(ISOSHIFT_PCH)
   foreach(kind "" _light)
     add_library(isoshift_precompiled${kind} OBJECT ${PROJECT_BINARY_DIR}/precompiled.cc)
