@@ -256,7 +256,7 @@ int run_isoshift(int argc, const char* const* argv, Console& console) {
   try {
     std::vector<std::string> words(argv + 1, argv + argc);
     if (!words.empty() && words.front() == "help") {  // isoshift help room watch
-      words.erase(words.begin());
+      std::erase(words, "help");
       words.push_back("--help");
     }
     check_words(words);

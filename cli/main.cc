@@ -50,9 +50,9 @@ void end_cleanly_on_signals() {
 // Memory for what remains to be done where there is none left.
 std::unique_ptr<std::vector<char>> reserve = std::make_unique<std::vector<char>>(1 << 20);
 
-// Where a library ends the program (GLib and fontconfig do where memory runs out), or the system refuses a thread or
-// memory at a place that cannot report it, nothing half written stays. By rights a handler may do hardly anything: if
-// it hangs, an alarm ends it.
+// Where a library ends the program (GLib and fontconfig do where memory runs out) or goes on without the memory that it
+// was refused, or the system refuses a thread or memory at a place that cannot report it, nothing half written stays.
+// By rights a handler may do hardly anything: if it hangs, an alarm ends it.
 void end_without_traces(int signal) {
   ::signal(signal, SIG_DFL);
   ::alarm(5);
@@ -61,6 +61,15 @@ void end_without_traces(int signal) {
   (void)!::write(STDERR_FILENO, kWhy.data(), kWhy.size());
   isoshift::abandon_outputs();
   ::raise(signal);
+}
+
+// Sanitizers have handlers of their own.
+void end_without_traces_on_failures() {
+  for (const int signal : {SIGABRT, SIGTRAP, SIGSEGV, SIGBUS}) {  // GLib traps
+    struct sigaction present{};
+    ::sigaction(signal, nullptr, &present);
+    if (present.sa_handler == SIG_DFL) ::signal(signal, &end_without_traces);
+  }
 }
 
 // With less, threads end without a word in the midst of their work.
@@ -80,7 +89,7 @@ void keep_from_strangers() {
 
 int main(int argc, char** argv) {
   keep_from_strangers();
-  for (const int signal : {SIGABRT, SIGTRAP}) ::signal(signal, &end_without_traces);  // GLib traps
+  end_without_traces_on_failures();
   ::unsetenv("DCMDICTPATH");  // no variable of a shell may change what DCMTK takes attributes for
   isoshift::name_options(isoshift::OptionStyle::kFlags);
   // Not commands for people: what this program runs as its child, and the manual that the build makes.

@@ -69,6 +69,7 @@ TEST(HelpTest, TheFirstScreenShowsSixteenCommandsInFourGroups) {
 TEST(HelpTest, HelpIsACommandToo) {
   EXPECT_EQ(run_command({"help", "room", "watch"}).out, run_command({"room", "watch", "--help"}).out);
   EXPECT_EQ(run_command({"help"}).out, run_command({"--help"}).out);
+  EXPECT_EQ(run_command({"help", "help"}).out, run_command({"--help"}).out);
   EXPECT_EQ(run_command({"help", "register"}).exit_status, 0);
 }
 
