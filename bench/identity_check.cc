@@ -176,15 +176,15 @@ int check(int patient_count, std::optional<int> only) {
     for (int axis = 0; axis < 3 && result.uncertainty; ++axis)
       errors += fmt::format("{:.3f}/{:.3f} ", deg_from_rad(turn.angle() * turn.axis()[axis]),
                             deg_from_rad(result.uncertainty->sigma_rotation_rad()[axis]));
-    for (const std::string& reason : result.reasons) reasons += reason + "; ";
+    for (const std::string& reason : result.reasons()) reasons += reason + "; ";
     fmt::print("{},{},{},{},{},{:.3f},{:.3f},{:.3f},{:.3f},{:.2f},{:.3f},{:.3f},{:.3f},{:.3f},{:.2f},{},\"{}\"\n", ct,
-               of, what, to_string(result.verdict), result.bodies.empty() ? "whole" : "bodies",
+               of, what, to_string(result.verdict()), result.bodies.empty() ? "whole" : "bodies",
                result.target_match.of_most_within_40_mm, result.target_match.of_most_within_20_mm,
                result.target_match.of_all, result.target_match.of_parts, mtre_mm, least, as_is, best, disagreeing,
                result.seconds, errors, reasons);
     std::fflush(stdout);
-    count.accepted += result.verdict == Verdict::kAccepted ? 1 : 0;
-    wrong_accepted = wrong_accepted || (result.verdict == Verdict::kAccepted && (what != "right" || mtre_mm > 2.0));
+    count.accepted += result.verdict() == Verdict::kAccepted ? 1 : 0;
+    wrong_accepted = wrong_accepted || (result.verdict() == Verdict::kAccepted && (what != "right" || mtre_mm > 2.0));
   };
   for (int ct = 0; ct < patient_count; ++ct) {
     if (only && ct != *only) continue;

@@ -17,6 +17,7 @@
 #include <sstream>
 #include <string>
 #include <string_view>
+#include <system_error>
 #include <type_traits>
 #include <vector>
 
@@ -278,6 +279,12 @@ int run_isoshift(int argc, const char* const* argv, Console& console) {
     return kExitFailed;
   } catch (const std::filesystem::filesystem_error& error) {
     return say(console, Error(fmt::format("{}: {}", error.path1().string(), error.code().message())), kExitFailed);
+  } catch (const std::system_error& error) {  // "Resource temporarily unavailable"
+    return say(console,
+               Error(fmt::format("the system refused a thread or another of its resources ({}): memory or the number "
+                                 "of threads may be limited (ulimit -a)",
+                                 error.code().message())),
+               kExitFailed);
   } catch (const std::exception& error) {
     return say(console, error, kExitFailed);
   }

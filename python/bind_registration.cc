@@ -126,10 +126,10 @@ void bind_result(py::module_& module) {
                           "What a registration found. as_dict() has everything, with the names of result.json "
                           "(docs/result.schema.json).")
       .def_property_readonly(
-          "verdict", [](const SetupResult& result) { return std::string(to_string(result.verdict)); },
+          "verdict", [](const SetupResult& result) { return std::string(to_string(result.verdict())); },
           "accepted, review or rejected.")
       .def_property_readonly(
-          "reasons", [](const SetupResult& result) { return texts_of(result.reasons); },
+          "reasons", [](const SetupResult& result) { return texts_of(result.reasons()); },
           "Why the verdict is not accepted.")
       .def_property_readonly(
           "setup_error", [](const SetupResult& result) { return matrix_of(result.setup_error); },
@@ -195,7 +195,7 @@ void bind_register(py::module_& module) {
           throw Error(
               fmt::format("a result that is {}, or has directions that were not measured, is written only on "
                           "request: for_review, accept_unobservable; one that is rejected never is",
-                          to_string(result.verdict)));
+                          to_string(result.verdict())));
         return py::make_tuple(uid, notes.warnings);
       },
       py::arg("study"), py::arg("result"), py::arg("path"), py::kw_only(), py::arg("for_review") = false,

@@ -9,7 +9,7 @@
 #include "base/stopwatch.h"
 #include "registration/objective.h"
 #include "registration/pose_parameters.h"
-#include "registration/quality/judge.h"
+#include "registration/quality/findings.h"
 
 namespace isoshift {
 namespace {
@@ -138,7 +138,7 @@ RegistrationResult register_views(const RendererPyramid& renderers, std::span<co
   result.wanted_by_views = std::move(found_alone.wanted_room_from_patient);
 
   result.unobservable_room = unobservable_directions(views);
-  judge(found.parameters, options, result);
+  result.findings = findings_about(found.parameters, options, result);
   result.seconds = watch.seconds();
   return result;
 }

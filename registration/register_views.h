@@ -3,7 +3,7 @@
 //
 //   const RegistrationResult result =
 //       register_views(renderers, prepared(xrays), planned_room_from_patient, preset("setup"));
-//   if (result.verdict == Verdict::kAccepted) ...
+//   if (result.verdict() == Verdict::kAccepted) ...
 
 #include <Eigen/Geometry>
 #include <cstdint>

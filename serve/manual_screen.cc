@@ -207,8 +207,8 @@ HttpResponse ManualScreen::state() {
   return json_answer({{"state", "ended"},
                       {"by", now.by},
                       {"folder", now.result.string()},
-                      {"verdict", to_string(result.verdict)},
-                      {"reasons", result.reasons},
+                      {"verdict", to_string(result.verdict())},
+                      {"reasons", result.reasons()},
                       {"searched", result.is_searched},
                       {"setup_error", json_of_setup_error(result.setup_error)}});
 }

@@ -91,7 +91,7 @@ void Room::look_for_sessions(std::vector<std::string>& troubles) {
     try {
       const SetupResult report = read_report(tree_.session(session));
       if (report.views.empty()) throw Error(fmt::format("session {}: its result names no views", session));
-      list_.add(session, report, obstacle_to_release(tree_, session, report.verdict));
+      list_.add(session, report, obstacle_to_release(tree_, session, report.verdict()));
       known_[session] = registered_at;
     } catch (const std::exception& error) {
       troubles.push_back(fmt::format("session {}: {}", session, error.what()));

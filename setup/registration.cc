@@ -40,11 +40,6 @@ bool BodyMotion::is_determined() const {
   return (sigma_mm.array() <= kMostSigmaMm).all() && image_share >= kLeastShare;
 }
 
-void Registration::demote(Verdict to, std::string reason) {
-  verdict = std::max(verdict, to);
-  reasons.push_back(std::move(reason));
-}
-
 int Registration::evaluations() const {
   return std::accumulate(stages.begin(), stages.end(), 0,
                          [](int sum, const StageReport& stage) { return sum + stage.evaluations; });

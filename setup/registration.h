@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "setup/finding.h"
 #include "setup/irradiated_field.h"
 #include "setup/verdict.h"
 
@@ -144,10 +145,9 @@ struct TargetMatch {
 };
 
 struct Registration {
-  Verdict verdict = Verdict::kRejected;
-  std::vector<std::string> reasons = {"not run"};  // why the verdict is not `accepted`
-  std::string renderer, device;                    // what rendered the DRRs
-  std::string compared_with_cpu;                   // how well rays of the DRRs from a GPU agree with those of the CPU
+  std::vector<Finding> findings = {{.check = Check::kNotRun, .consequence = Verdict::kRejected}};
+  std::string renderer, device;   // what rendered the DRRs
+  std::string compared_with_cpu;  // how well rays of the DRRs from a GPU agree with those of the CPU
   Eigen::Isometry3d actual_room_from_patient = Eigen::Isometry3d::Identity();
   std::vector<Eigen::Vector3d> unobservable_room;  // unit directions along which the views cannot tell
   std::optional<Uncertainty> uncertainty;          // nothing: the images do not determine the pose
@@ -163,8 +163,8 @@ struct Registration {
   double target_deformation_mm = 0.0;  // how far the target's surface lies from where a rigid motion puts it, at most
   double seconds = 0.0, seconds_rendering = 0.0, seconds_similarity = 0.0;  // in all, and of that in the search
 
-  // Makes the verdict `to`, if that is worse than what it was, and adds the reason.
-  void demote(Verdict to, std::string reason);
+  Verdict verdict() const { return verdict_of(findings); }
+  std::vector<std::string> reasons() const { return in_words(findings); }  // why the verdict is not `accepted`
   int evaluations() const;
 };
 

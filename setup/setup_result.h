@@ -25,15 +25,14 @@ struct SetupResult : Registration {
   struct View {
     std::string label;
     std::string sop_class_uid, sop_instance_uid;
-    std::string sha256;                // of the file
-    int frame = 1;                     // of the instance, counted from 1
-    std::string acquired;              // "2026-03-01 10:15:00"; empty: unknown
-    std::string origin;                // ReportedValuesOrigin: ACTUAL, PLAN; empty: unknown
-    std::optional<double> gantry_deg;  // absent for a view given by its matrix
-    std::string machine;               // RadiationMachineName; empty: unknown
-    // XrayView's; nothing: made by a version of isoshift that did not say.
-    std::optional<Eigen::Matrix<double, 3, 4>> pixel_from_room;
-    std::optional<double> sid_mm;  // RTImageSID, or what supplied it; nothing: likewise
+    std::string sha256;                                          // of the file
+    int frame = 1;                                               // of the instance, counted from 1
+    std::string acquired;                                        // "2026-03-01 10:15:00"; empty: unknown
+    std::string origin;                                          // ReportedValuesOrigin: ACTUAL, PLAN; empty: unknown
+    std::optional<double> gantry_deg;                            // absent for a view given by its matrix
+    std::string machine;                                         // RadiationMachineName; empty: unknown
+    std::optional<Eigen::Matrix<double, 3, 4>> pixel_from_room;  // XrayView's
+    std::optional<double> sid_mm;                                // RTImageSID, or what supplied it
     Eigen::Vector3d source_room_mm = Eigen::Vector3d::Zero();
     double pixel_mm = 0.0;  // at the isocenter
     int columns = 0, rows = 0;
@@ -59,7 +58,7 @@ struct SetupResult : Registration {
   TableAngles table;
   std::optional<Eigen::Vector3d> table_position_mm;  // lateral, longitudinal, vertical read-outs at imaging, IEC 61217
   std::vector<Point> points;
-  std::optional<Target> target;  // nothing: made by a version of isoshift that did not look for it
+  std::optional<Target> target;
   Eigen::Isometry3d setup_error = Eigen::Isometry3d::Identity();
   bool translation_only = false;
   std::optional<Start> start;  // nothing: the planned pose
@@ -80,11 +79,10 @@ struct SetupResult : Registration {
   };
   std::optional<Machine> machine;        // the machine profile that was applied
   std::string ct_series_uid, ct_sha256;  // of all its slices' files
-  // Nothing in these two: made by a version of isoshift that did not say.
-  std::optional<std::string> ct_frame_uid;       // FrameOfReferenceUID
-  std::optional<std::string> structure_set_uid;  // empty: there was none
-  std::string plan_uid, plan_class_uid;          // empty: there was no plan
-  std::string spatial_registration_uid;          // empty: none was written
+  std::string ct_frame_uid;              // FrameOfReferenceUID
+  std::string structure_set_uid;         // empty: there was none
+  std::string plan_uid, plan_class_uid;  // empty: there was no plan
+  std::string spatial_registration_uid;  // empty: none was written
   std::vector<std::string> overrides, warnings, left_aside;
 };
 

@@ -109,7 +109,7 @@ ShownShift shown_shift(const SetupResult& result) {
       shown.target_sigma_mm =
           determined(result.uncertainty->sigma_at_mm(setup_error * target_mm), result.unobservable_room);
   }
-  shown.withheld = result.verdict == Verdict::kRejected;
+  shown.withheld = result.verdict() == Verdict::kRejected;
   std::vector<Eigen::Vector3d> unobservable_table;
   unobservable_table.reserve(result.unobservable_room.size());
   for (const Eigen::Vector3d& direction : result.unobservable_room)

@@ -111,7 +111,7 @@ Description describe_rt_image(RtImage image, const std::optional<std::string>& p
                     attribute.supplied_by.empty() ? "no switch supplies it" : "supplied by " + attribute.supplied_by));
   // What stands in the way is told, not thrown: inspecting is for files that registration refuses, too.
   try {
-    for (const Finding& finding : rt_image_findings(image))
+    for (const FailedCheck& finding : rt_image_findings(image))
       description.remark(Remark::kCheck, fmt::format("{}; allowed by --allow {}=REASON", finding.message, finding.key));
     const bool has_geometry = image.pixel_from_room || (image.plane && image.pixel_spacing_mm && image.position_mm &&
                                                         image.sad_mm && image.sid_mm && image.gantry_angle_deg);

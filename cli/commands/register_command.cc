@@ -63,7 +63,7 @@ int run_register(RegisterOptions options, bool as_json, Console& console) {
     console.out << fmt::format("\nWritten to {}\n",
                                std::filesystem::absolute(options.output).lexically_normal().string());
   }
-  return exit_status_of(report.verdict);
+  return exit_status_of(report.verdict());
 }
 
 void add_result_options(CLI::App& command, RegisterOptions& options) {

@@ -237,7 +237,7 @@ void check_same_lattice(const std::vector<Slice>& slices) {
 }
 
 // One patient throughout, whatever the Series Instance UID says.
-std::vector<Finding> patient_findings(const std::vector<Slice>& slices) {
+std::vector<FailedCheck> patient_findings(const std::vector<Slice>& slices) {
   const Slice& first = slices.front();
   for (const Slice& slice : slices)
     for (const auto& [tag, member] :
@@ -281,9 +281,9 @@ void drop_duplicates(std::vector<Slice>& sorted, const Eigen::Vector3d& normal, 
 }
 
 // CT-7: where the distances are not uniform, says so in the terms of the person who exported the series.
-std::vector<Finding> spacing_findings(const std::vector<double>& positions_mm, double median_mm,
-                                      const std::string& series) {
-  std::vector<Finding> findings;
+std::vector<FailedCheck> spacing_findings(const std::vector<double>& positions_mm, double median_mm,
+                                          const std::string& series) {
+  std::vector<FailedCheck> findings;
   int gaps = 0;
   const double tolerance_mm = std::max(0.01, 0.001 * median_mm);
   for (std::size_t k = 0; k + 1 < positions_mm.size(); ++k) {
@@ -344,7 +344,7 @@ Volume<float> assembled(std::vector<Slice>& slices, const Eigen::Matrix3d& axes,
                               slices[k].where, described(DCM_ImagePositionPatient),
                               (slices[k].position_mm - on_line).norm()));
   }
-  const std::vector<Finding> findings = spacing_findings(positions_mm, median_mm, series);
+  const std::vector<FailedCheck> findings = spacing_findings(positions_mm, median_mm, series);
   settle(findings, allowed, notes);
   const double spacing_mm = findings.empty() ? length_mm / static_cast<double>(slices.size() - 1)
                                              : std::max(ordered.front(), 0.25 * median_mm);

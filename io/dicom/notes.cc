@@ -7,9 +7,10 @@
 
 namespace isoshift {
 
-std::vector<Finding> not_allowed(const std::vector<Finding>& findings, const Allowances& allowed, Notes& notes) {
-  std::vector<Finding> others;
-  for (const Finding& finding : findings) {
+std::vector<FailedCheck> not_allowed(const std::vector<FailedCheck>& findings, const Allowances& allowed,
+                                     Notes& notes) {
+  std::vector<FailedCheck> others;
+  for (const FailedCheck& finding : findings) {
     if (const auto reason = allowed.find(finding.key); reason != allowed.end())
       notes.overrides.push_back(fmt::format("{} (allowed by {}: {})", finding.message, finding.key, reason->second));
     else
@@ -18,16 +19,16 @@ std::vector<Finding> not_allowed(const std::vector<Finding>& findings, const All
   return others;
 }
 
-std::vector<std::string> unsettled(const std::vector<Finding>& findings, const Allowances& allowed, Notes& notes) {
+std::vector<std::string> unsettled(const std::vector<FailedCheck>& findings, const Allowances& allowed, Notes& notes) {
   std::vector<std::string> doubts;
-  for (const Finding& finding : not_allowed(findings, allowed, notes))
+  for (const FailedCheck& finding : not_allowed(findings, allowed, notes))
     doubts.push_back(fmt::format("{} ({})", finding.message, option("allow", fmt::format("{}=REASON", finding.key))));
   return doubts;
 }
 
-void settle(const std::vector<Finding>& findings, const Allowances& allowed, Notes& notes) {
+void settle(const std::vector<FailedCheck>& findings, const Allowances& allowed, Notes& notes) {
   std::string refused;
-  for (const Finding& finding : not_allowed(findings, allowed, notes))
+  for (const FailedCheck& finding : not_allowed(findings, allowed, notes))
     refused += fmt::format(
         "{}{}\n"
         "       If that is known to be right, allow it: {}",

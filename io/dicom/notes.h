@@ -35,18 +35,18 @@ inline constexpr AllowKey kAllowKeys[] = {
 };
 
 // A check that failed. If its key is allowed, the finding becomes an override; else it must stop the run.
-struct Finding {
+struct FailedCheck {
   std::string_view key;
   std::string message;
 };
 
 // Moves allowed findings to notes.overrides and returns the others.
-std::vector<Finding> not_allowed(const std::vector<Finding>& findings, const Allowances& allowed, Notes& notes);
+std::vector<FailedCheck> not_allowed(const std::vector<FailedCheck>& findings, const Allowances& allowed, Notes& notes);
 
 // The same as doubts, each with the --allow switch that settles it.
-std::vector<std::string> unsettled(const std::vector<Finding>& findings, const Allowances& allowed, Notes& notes);
+std::vector<std::string> unsettled(const std::vector<FailedCheck>& findings, const Allowances& allowed, Notes& notes);
 
 // Moves allowed findings to notes.overrides; throws one Error with all the others, each naming its --allow switch.
-void settle(const std::vector<Finding>& findings, const Allowances& allowed, Notes& notes);
+void settle(const std::vector<FailedCheck>& findings, const Allowances& allowed, Notes& notes);
 
 }  // namespace isoshift

@@ -140,7 +140,7 @@ std::vector<MissingAttribute> missing_attributes(const RtImage& image);
 
 // Findings about the image type and the origin of the angles. Throws Error for faults that nobody may allow (BLANK,
 // FLUENCE, a tilted gantry, values out of range).
-std::vector<Finding> rt_image_findings(const RtImage& image);
+std::vector<FailedCheck> rt_image_findings(const RtImage& image);
 
 // The beam quality: KVP above 1000 is MV; without KVP by image type (PORTAL is MV), with a warning.
 Beam beam_of(const RtImage& image, Notes& notes);

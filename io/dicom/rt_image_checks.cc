@@ -122,9 +122,9 @@ std::vector<MissingAttribute> missing_attributes(const RtImage& image) {
   return missing;
 }
 
-std::vector<Finding> rt_image_findings(const RtImage& image) {
+std::vector<FailedCheck> rt_image_findings(const RtImage& image) {
   const std::string where = image.path.string();
-  std::vector<Finding> findings;
+  std::vector<FailedCheck> findings;
   if (image.image_type == "DRR")
     findings.push_back({"drr", fmt::format("{}: {} says DRR: this is not an X-ray", where, described(DCM_ImageType))});
   else if (image.is_rt_image() && image.image_type != "PORTAL" && image.image_type != "SIMULATOR" &&

@@ -75,7 +75,7 @@ bool plan_fits(CheckedRegistration& checked, const RtPlan& plan) {
       "Name the plan of this registration, or, if the isocenter is known to be right: " + option("isocenter", "X,Y,Z") +
       " and " + option("patient-position", "HFS") + " instead of " + option("plan");
   bool fits = true;
-  for (const Finding& finding :
+  for (const FailedCheck& finding :
        patient_findings({&checked.identity, checked.path.string()}, {&plan.identity, plan.path.string()})) {
     checked.error(fmt::format("the couch shift is not known: {}. {}", finding.message, next));
     fits = false;
@@ -264,7 +264,7 @@ RegistrationComparison compare(const CheckedRegistration& first, const Registrat
   Identity patient = first.identity, other_patient = second.identity;
   const bool has_ids = !patient.patient_id.empty() && !other_patient.patient_id.empty();
   if (!has_ids) patient.patient_id = other_patient.patient_id = "not compared";
-  for (const Finding& finding :
+  for (const FailedCheck& finding :
        patient_findings({&patient, first.path.string()}, {&other_patient, second.path.string()}))
     return cannot(finding.message + ". Compare registrations of one patient only");
   const std::array meanings = {&first_meaning, &second_meaning};

@@ -237,6 +237,22 @@ Json parts_json(const SetupResult::View& view) {
   return list;
 }
 
+Json findings_json(const SetupResult& report) {
+  Json list = Json::array();
+  for (const Finding& finding : report.findings) {
+    Json measures = Json::array();
+    for (const Measure& measure : finding.measures)
+      measures.push_back({{"value", measure.value}, {"limit", measure.limit}, {"unit", measure.unit}});
+    list.push_back({{"check", to_string(finding.check)},
+                    {"consequence", to_string(finding.consequence)},
+                    {"view", or_null(finding.view)},
+                    {"subject", or_null(finding.subject)},
+                    {"measures", measures},
+                    {"words", or_null(finding.words)}});
+  }
+  return list;
+}
+
 Json alternatives_json(const SetupResult& report) {
   Json list = Json::array();
   for (const Alternative& alternative : report.alternatives)
@@ -303,18 +319,17 @@ Json view_json(const SetupResult::View& view) {
 Json references_json(const SetupResult& report) {
   Json images = Json::array();
   for (const SetupResult::View& view : report.views) images.push_back(view.sop_instance_uid);
-  Json json = {{"ct_series", report.ct_series_uid},
-               {"ct_sha256", report.ct_sha256},
-               {"plan", or_null(report.plan_uid)},
-               {"plan_class", report.plan_class_uid},
-               {"plan_label", report.plan_label},
-               {"plan_approval", report.plan_approval},
-               {"plan_sha256", report.plan_sha256},
-               {"images", images},
-               {"spatial_registration", or_null(report.spatial_registration_uid)}};
-  if (report.ct_frame_uid) json["ct_frame_of_reference"] = *report.ct_frame_uid;
-  if (report.structure_set_uid) json["structure_set"] = or_null(*report.structure_set_uid);
-  return json;
+  return {{"ct_series", report.ct_series_uid},
+          {"ct_frame_of_reference", report.ct_frame_uid},
+          {"structure_set", or_null(report.structure_set_uid)},
+          {"ct_sha256", report.ct_sha256},
+          {"plan", or_null(report.plan_uid)},
+          {"plan_class", report.plan_class_uid},
+          {"plan_label", report.plan_label},
+          {"plan_approval", report.plan_approval},
+          {"plan_sha256", report.plan_sha256},
+          {"images", images},
+          {"spatial_registration", or_null(report.spatial_registration_uid)}};
 }
 
 }  // namespace
@@ -325,8 +340,9 @@ std::string json_report(const SetupResult& report) {
   Json json = {{"schema", 1},
                {"program", {{"name", "isoshift"}, {"version", report.version}, {"commit", report.commit}}},
                {"made_on", report.made_on},
-               {"verdict", to_string(report.verdict)},
-               {"reasons", report.reasons},
+               {"verdict", to_string(report.verdict())},
+               {"reasons", report.reasons()},
+               {"findings", findings_json(report)},
                {"action", to_string(shown.decision.action)},
                {"action_reasons", shown.decision.reasons},
                {"patient", Json::object()},

@@ -97,12 +97,10 @@ ViewMatch match_from(const Json& json) {
                   .similarity_final = or_nan(json.at("similarity_final"))};
   if (const auto distance_mm = number_from(json.at("left_out_mm")))
     match.left_out = {.distance_mm = *distance_mm, .angle_rad = rad_from_deg(json.at("left_out_deg"))};
-  // Results of before 2026-11-23 do not say.
-  if (json.contains("contradiction_mm") && !json.at("contradiction_mm").is_null())
+  if (!json.at("contradiction_mm").is_null())
     match.contradiction = {.mm = json.at("contradiction_mm"), .sigma_mm = json.at("contradiction_sigma_mm")};
-  // Results of before 2026-11-27 do not say.
-  if (const Json wanted = json.value("wanted", Json()); !wanted.is_null()) match.wanted = wanted_from(wanted);
-  if (json.contains("irradiated_field")) match.field = irradiated_field_from(json.at("irradiated_field"));
+  if (const Json& wanted = json.at("wanted"); !wanted.is_null()) match.wanted = wanted_from(wanted);
+  match.field = irradiated_field_from(json.at("irradiated_field"));
   for (const Json& part : json.at("parts"))
     match.consistency.parts.push_back({.center_px = vector_from<2>(part.at("center_px")),
                                        .width_px = part.at("width_px"),
@@ -123,19 +121,18 @@ SetupResult::View view_from(const Json& json) {
                          .acquired = json.at("acquired"),
                          .origin = json.at("reported_values_origin"),
                          .gantry_deg = number_from(json.at("gantry_deg")),
-                         .machine = json.value("radiation_machine", ""),
+                         .machine = json.at("radiation_machine"),
+                         .sid_mm = number_from(json.at("sid_mm")),
                          .source_room_mm = vector_from<3>(json.at("source_room_mm")),
                          .pixel_mm = json.at("pixel_mm"),
                          .columns = json.at("columns"),
                          .rows = json.at("rows"),
                          .is_megavoltage = json.at("beam") == "MV",
+                         .is_receptor_corrected = json.at("receptor_corrected"),
                          .match = match_from(json),
                          .picture = picture_from(json.at("picture"))};
-  // Results of before 2026-11-27 do not say.
-  if (const Json matrix = json.value("pixel_from_room", Json()); !matrix.is_null())
+  if (const Json& matrix = json.at("pixel_from_room"); !matrix.is_null())
     view.pixel_from_room = matrix_from<3, 4>(matrix);
-  view.sid_mm = number_from(json.value("sid_mm", Json()));
-  view.is_receptor_corrected = json.value("receptor_corrected", false);
   return view;
 }
 
@@ -163,7 +160,7 @@ std::optional<Target> target_from(const Json& json) {
   if (json.is_null()) return std::nullopt;
   Target target{.name = json.at("name"),
                 .chosen_by = json.at("chosen_by"),
-                .surrogate = json.value("surrogate", ""),
+                .surrogate = json.at("surrogate"),
                 .center_room_mm = vector_from<3>(json.at("center_room_mm"))};
   for (const Json& point : json.at("extent_room_mm")) target.extent_room_mm.push_back(vector_from<3>(point));
   return target;
@@ -173,7 +170,7 @@ std::vector<BodyMotion> bodies_from(const Json& json) {
   std::vector<BodyMotion> bodies;
   for (const Json& body : json) {
     const Json& sigma = body.at("sigma_mm");
-    const Json vertebra = body.value("vertebra", Json(nullptr));
+    const Json& vertebra = body.at("vertebra");
     bodies.push_back({.name = body.at("name"),
                       .vertebra = vertebra.is_null() ? std::nullopt : std::optional(vertebra.get<int>()),
                       .center_room_mm = vector_from<3>(body.at("center_room_mm")),
@@ -206,11 +203,10 @@ std::optional<SiteRules> site_from(const Json& json) {
       .name = json.at("name"),
       .sha256 = json.at("sha256"),
       .anatomy = json.at("anatomy"),
+      .target = text_from(json.at("target")),
+      .surrogate = text_from(json.at("surrogate")),
       .couch_dof = one_of(couch_dof_from(json.at("couch_degrees_of_freedom")), "site: couch_degrees_of_freedom"),
       .length_unit = json.at("length_unit") == "cm" ? LengthUnit::kCm : LengthUnit::kMm};
-  // Results of before 2026-11-23 do not say.
-  if (json.contains("target")) site.target = text_from(json.at("target"));
-  if (json.contains("surrogate")) site.surrogate = text_from(json.at("surrogate"));
   if (const Json& level = json.at("action_level"); !level.is_null())
     site.level = {.translation_mm = number_from(level.at("translation_mm")),
                   .vector_mm = number_from(level.at("vector_mm")),
@@ -224,27 +220,30 @@ std::optional<SiteRules> site_from(const Json& json) {
   return site;
 }
 
-// Components that were not determined come back as 0; the directions that say so come back, too.
-Eigen::Vector3d known_from(const Json& json) {
-  Eigen::Vector3d vector = Eigen::Vector3d::Zero();
-  for (std::size_t axis = 0; axis < 3; ++axis)
-    vector[static_cast<Eigen::Index>(axis)] = number_from(json.at(axis)).value_or(0.0);
-  return vector;
-}
-
 std::optional<Uncertainty> uncertainty_from(const Json& json) {
   if (json.at("translation_mm").is_null()) return std::nullopt;
-  // Results of before 2026-11-24 hold the sigmas alone.
-  if (!json.contains("covariance"))
-    return uncertainty_of_independent_axes(known_from(json.at("translation_mm")),
-                                           known_from(json.at("rotation_deg")).unaryExpr(&rad_from_deg));
   return Uncertainty{.covariance = matrix_from<6, 6>(json.at("covariance"))};
 }
 
-Verdict verdict_from(const std::string& word) {
-  for (const Verdict verdict : {Verdict::kAccepted, Verdict::kReview, Verdict::kRejected})
+Verdict consequence_from(const std::string& word) {
+  for (const Verdict verdict : {Verdict::kReview, Verdict::kRejected})
     if (word == to_string(verdict)) return verdict;
-  throw Error(fmt::format("verdict is \"{}\", expected accepted, review or rejected", word));
+  throw Error(fmt::format("findings: consequence is \"{}\", expected review or rejected", word));
+}
+
+std::vector<Finding> findings_from(const Json& json) {
+  std::vector<Finding> findings;
+  for (const Json& finding : json) {
+    findings.push_back({.check = one_of(check_from(finding.at("check").get<std::string>()), "findings: check"),
+                        .consequence = consequence_from(finding.at("consequence")),
+                        .view = text_from(finding.at("view")),
+                        .subject = text_from(finding.at("subject")),
+                        .words = text_from(finding.at("words"))});
+    for (const Json& measure : finding.at("measures"))
+      findings.back().measures.push_back(
+          {.value = or_nan(measure.at("value")), .limit = or_nan(measure.at("limit")), .unit = measure.at("unit")});
+  }
+  return findings;
 }
 
 // NOLINTNEXTLINE(readability-function-size): long because result.json is: each key into its field
@@ -253,8 +252,7 @@ SetupResult report_from(const Json& json) {
   report.made_on = json.at("made_on");
   report.version = json.at("program").at("version");
   report.commit = json.at("program").at("commit");
-  report.verdict = verdict_from(json.at("verdict"));
-  report.reasons = json.at("reasons");
+  report.findings = findings_from(json.at("findings"));
   report.site = site_from(json.at("site"));
   for (const auto& [name, member] : kIdentity) report.identity.*member = json.at("patient").at(name);
   const Json& references = json.at("references");
@@ -265,9 +263,8 @@ SetupResult report_from(const Json& json) {
   report.plan_class_uid = references.at("plan_class");
   report.ct_series_uid = references.at("ct_series");
   report.ct_sha256 = references.at("ct_sha256");
-  // Results of before 2026-11-29 do not say.
-  if (references.contains("ct_frame_of_reference")) report.ct_frame_uid = references.at("ct_frame_of_reference");
-  if (references.contains("structure_set")) report.structure_set_uid = text_from(references.at("structure_set"));
+  report.ct_frame_uid = references.at("ct_frame_of_reference");
+  report.structure_set_uid = text_from(references.at("structure_set"));
   report.spatial_registration_uid = text_from(references.at("spatial_registration"));
   report.patient_position = json.at("patient_position");
   report.isocenter_patient_mm = vector_from<3>(json.at("isocenter_patient_mm"));
@@ -279,17 +276,16 @@ SetupResult report_from(const Json& json) {
   if (!table.at("position_mm").is_null()) report.table_position_mm = vector_from<3>(table.at("position_mm"));
   for (const Json& point : json.at("points"))
     report.points.push_back({.name = point.at("name"), .room_mm = vector_from<3>(point.at("room_mm"))});
-  // Results of before 2026-11-23 do not say.
-  if (json.contains("target")) report.target = target_from(json.at("target"));
-  if (json.contains("bodies")) report.bodies = bodies_from(json.at("bodies"));
-  for (const Json& structure : json.value("structures", Json::array()))
+  report.target = target_from(json.at("target"));
+  report.bodies = bodies_from(json.at("bodies"));
+  for (const Json& structure : json.at("structures"))
     report.structures.push_back({.name = structure.at("name"),
                                  .displacement_mm = vector_from<3>(structure.at("displacement_mm")),
                                  .most_mm = structure.at("most_mm"),
                                  .is_determined = structure.at("is_determined")});
   if (!report.bodies.empty() && report.target) {
     report.target_image_share = json.at("target").at("image_share");
-    const auto match = [&](const char* name) { return or_nan(json.at("target").value(name, Json())); };
+    const auto match = [&](const char* name) { return or_nan(json.at("target").at(name)); };
     report.target_match = {.of_most_within_40_mm = match("match_within_40_mm"),
                            .of_most_within_20_mm = match("match_within_20_mm"),
                            .of_all = match("match"),
@@ -303,20 +299,18 @@ SetupResult report_from(const Json& json) {
   for (const Json& direction : uncertainty.at("unobservable"))
     report.unobservable_room.push_back(vector_from<3>(direction));
   report.uncertainty = uncertainty_from(uncertainty);
-  // Results of before 2026-11-27 do not say.
-  if (const Json by_imagers = uncertainty.value("by_imagers", Json()); !by_imagers.is_null())
+  if (const Json& by_imagers = uncertainty.at("by_imagers"); !by_imagers.is_null())
     report.by_imagers = Uncertainty{.covariance = matrix_from<6, 6>(by_imagers.at("covariance"))};
   report.translation_only = json.at("dof") == "translation";
-  // Results of before 2026-11-25 do not say: they began at the planned pose, and were searched.
-  if (const Json start = json.value("start", Json()); !start.is_null()) report.start = start_from(start);
-  report.is_searched = json.value("searched", true);
+  if (const Json& start = json.at("start"); !start.is_null()) report.start = start_from(start);
+  report.is_searched = json.at("searched");
   for (const Json& view : json.at("views")) report.views.push_back(view_from(view));
   for (const Json& stage : json.at("stages")) report.stages.push_back(stage_from(stage));
   for (const Json& alternative : json.at("alternatives"))
     report.alternatives.push_back({.description = alternative.at("description"),
                                    .similarity = alternative.at("similarity"),
                                    .as_is = alternative.at("as_is"),
-                                   .is_ruled_out = alternative.value("ruled_out", false)});
+                                   .is_ruled_out = alternative.at("ruled_out")});
   report.preset = json.at("preset");
   report.region = json.at("region");
   report.seed = json.at("seed");

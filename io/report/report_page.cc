@@ -331,9 +331,9 @@ ReportPage report_page(const SetupResult& report) {
   page.program = fmt::format("isoshift {} ({})", report.version, report.commit);
   page.disclaimer = kDisclaimer;
   page.who = who(report, bent_words(shown, unit));
-  page.verdict = report.verdict;
-  page.verdict_words = fmt::format("{}: {}", upper_case(to_string(report.verdict)), meaning(report.verdict));
-  page.reasons = all_printable(report.reasons);
+  page.verdict = report.verdict();
+  page.verdict_words = fmt::format("{}: {}", upper_case(to_string(report.verdict())), meaning(report.verdict()));
+  page.reasons = all_printable(report.reasons());
   page.action = shown.decision.action;
   page.action_words = action_words(report, shown);
   page.action_reasons = shown.decision.reasons;

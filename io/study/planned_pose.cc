@@ -66,7 +66,7 @@ class AnglesOfPlan {
     compare_table("roll", study_.table.roll_rad, beams, [](const RtPlan::Beam& beam) { return beam.roll_deg; }, notes);
   }
 
-  std::vector<Finding> doubts() && { return std::move(doubts_); }
+  std::vector<FailedCheck> doubts() && { return std::move(doubts_); }
 
  private:
   void doubt(std::string message) { doubts_.push_back({"plan-mismatch", std::move(message)}); }
@@ -122,12 +122,12 @@ class AnglesOfPlan {
 
   const Study& study_;
   bool are_named_ = true;  // every X-ray names its beam
-  std::vector<Finding> doubts_;
+  std::vector<FailedCheck> doubts_;
 };
 
 // An X-ray in the CT's frame of reference says where the machine's isocenter lay in it (docs/dicom.md, D2).
 void check_isocenter_of_images(const Study& study, const Allowances& allowed, Notes& notes) {
-  std::vector<Finding> findings;
+  std::vector<FailedCheck> findings;
   for (const RtImage& image : study.rt_images)
     if (image.isocenter_mm && image.frame_of_reference_uid == study.ct->frame_of_reference_uid &&
         (*image.isocenter_mm - study.isocenter_patient_mm).norm() > kSameIsocenterMm)
@@ -140,7 +140,7 @@ void check_isocenter_of_images(const Study& study, const Allowances& allowed, No
 }
 
 // An isocenter that a person supplies against the plan: with beams of several isocenters it is one of these.
-std::vector<Finding> isocenter_doubts(const Study& study, const std::vector<RtPlan::Beam>& beams) {
+std::vector<FailedCheck> isocenter_doubts(const Study& study, const std::vector<RtPlan::Beam>& beams) {
   const RtPlan::Beam* other = nullptr;
   for (const RtPlan::Beam& beam : beams) {
     if (!beam.isocenter_patient_mm) continue;
@@ -158,8 +158,8 @@ std::vector<Finding> isocenter_doubts(const Study& study, const std::vector<RtPl
 bool treats(const RtPlan::Beam& beam) { return beam.delivery_type != "SETUP"; }
 
 // What is treated against what was imaged: X-rays refer to setup beams.
-std::vector<Finding> treated_position_doubts(const Study& study) {
-  std::vector<Finding> doubts;
+std::vector<FailedCheck> treated_position_doubts(const Study& study) {
+  std::vector<FailedCheck> doubts;
   for (const RtPlan::Beam& beam : study.plan->beams)
     if (treats(beam) && beam.patient_position && *beam.patient_position != to_string(study.patient_position))
       doubts.push_back(
@@ -169,7 +169,7 @@ std::vector<Finding> treated_position_doubts(const Study& study) {
   return doubts;
 }
 
-std::vector<Finding> treated_isocenter_doubts(const Study& study) {
+std::vector<FailedCheck> treated_isocenter_doubts(const Study& study) {
   const RtPlan::Beam* elsewhere = nullptr;
   for (const RtPlan::Beam& beam : study.plan->beams) {
     if (!treats(beam) || !beam.isocenter_patient_mm) continue;
@@ -185,10 +185,10 @@ std::vector<Finding> treated_isocenter_doubts(const Study& study) {
 }
 
 // What of the plan contradicts where the patient lies. An isocenter typed in that is no beam's is said once.
-std::vector<Finding> plan_doubts(const StudyRequest& request, const Study& study,
-                                 const std::vector<RtPlan::Beam>& beams) {
-  std::vector<Finding> doubts = treated_position_doubts(study);
-  std::vector<Finding> of_isocenter;
+std::vector<FailedCheck> plan_doubts(const StudyRequest& request, const Study& study,
+                                     const std::vector<RtPlan::Beam>& beams) {
+  std::vector<FailedCheck> doubts = treated_position_doubts(study);
+  std::vector<FailedCheck> of_isocenter;
   if (request.isocenter_patient_mm) of_isocenter = isocenter_doubts(study, beams);
   if (of_isocenter.empty()) of_isocenter = treated_isocenter_doubts(study);
   std::ranges::move(of_isocenter, std::back_inserter(doubts));
@@ -231,7 +231,7 @@ void place_patient(const StudyRequest& request, const std::vector<RtPlan::Beam>&
                                          study.ct->patient_position, to_string(study.patient_position),
                                          described(DCM_PatientPosition)));
   if (study.plan) {
-    std::vector<Finding> doubts = plan_doubts(request, study, beams);
+    std::vector<FailedCheck> doubts = plan_doubts(request, study, beams);
     AnglesOfPlan angles(study);
     angles.compare_table(beams, notes);
     std::ranges::move(std::move(angles).doubts(), std::back_inserter(doubts));

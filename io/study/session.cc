@@ -16,11 +16,11 @@ namespace isoshift {
 namespace {
 
 // What a table read-out says of two images; nothing where it is the same, or missing in one of them.
-std::optional<Finding> table_finding(const TableReadOut& read_out, const RtImage& image, const RtImage& reference) {
+std::optional<FailedCheck> table_finding(const TableReadOut& read_out, const RtImage& image, const RtImage& reference) {
   const auto change = table_change(read_out, image.table, reference.table);
   if (!change) return std::nullopt;
-  return Finding{"table-moved", fmt::format("{}: the table {} since {} ({})", image.path.string(), *change,
-                                            reference.path.string(), described(read_out.tag))};
+  return FailedCheck{"table-moved", fmt::format("{}: the table {} since {} ({})", image.path.string(), *change,
+                                                reference.path.string(), described(read_out.tag))};
 }
 
 constexpr const char* kNoReadOuts =
@@ -37,8 +37,8 @@ bool is_retake(const RtImage& image, const RtImage& earlier) {
 }
 
 // Views of two machines, and table angles that only some views have: taken for all of them, these may be another setup.
-std::vector<Finding> setting_doubts(std::span<const RtImage> images) {
-  std::vector<Finding> doubts;
+std::vector<FailedCheck> setting_doubts(std::span<const RtImage> images) {
+  std::vector<FailedCheck> doubts;
   const auto machine_of = [](const RtImage& image) {
     const auto name = image.equipment.find("RadiationMachineName");
     return name == image.equipment.end() ? std::string() : name->second;
@@ -82,35 +82,35 @@ std::string_view option_for(const TableReadOut& read_out) {
 }
 
 // Views whose distance in time is not known. An unmoved table does not prove that the patient stayed on it.
-std::optional<Finding> unknown_time_doubt(std::span<const RtImage> images, bool is_table_known) {
+std::optional<FailedCheck> unknown_time_doubt(std::span<const RtImage> images, bool is_table_known) {
   const char* const unknown = is_table_known ? "so it is not known whether the views show one setup" : kNoReadOuts;
   for (const RtImage& image : images) {
     const bool is_frame_known = image.has_own_time || is_table_known;  // frames of one file are of one exposure series
     if (!is_frame_known || !acquisition_seconds(image))
-      return Finding{"time-span", fmt::format("{}: when it was taken is unknown ({}), and {}", image.label,
-                                              acquisition_seconds(image) ? "a frame without a time of its own"
-                                                                         : why_time_is_unknown(image),
-                                              unknown)};
+      return FailedCheck{"time-span", fmt::format("{}: when it was taken is unknown ({}), and {}", image.label,
+                                                  acquisition_seconds(image) ? "a frame without a time of its own"
+                                                                             : why_time_is_unknown(image),
+                                                  unknown)};
     if (image.utc_offset_min.has_value() != images.front().utc_offset_min.has_value())
-      return Finding{"time-span",
-                     fmt::format("{} and {}: only one of them says how far its time is from UTC ({}), and {}",
-                                 images.front().label, image.label, described(DCM_TimezoneOffsetFromUTC), unknown)};
+      return FailedCheck{"time-span",
+                         fmt::format("{} and {}: only one of them says how far its time is from UTC ({}), and {}",
+                                     images.front().label, image.label, described(DCM_TimezoneOffsetFromUTC), unknown)};
   }
   return std::nullopt;
 }
 
 // Views too far apart in time.
-std::optional<Finding> time_span_doubt(std::span<const RtImage> images, double max_span_s) {
+std::optional<FailedCheck> time_span_doubt(std::span<const RtImage> images, double max_span_s) {
   const auto [earliest, latest] = std::ranges::minmax_element(images, {}, acquisition_seconds);
   const double span_s = *acquisition_seconds(*latest) - *acquisition_seconds(*earliest);
   if (span_s <= max_span_s) return std::nullopt;
-  return Finding{"time-span", fmt::format("{} was taken {:.0f} s after {}, more than {:.0f} s: {}", latest->label,
-                                          span_s, earliest->label, max_span_s, kNoReadOuts)};
+  return FailedCheck{"time-span", fmt::format("{} was taken {:.0f} s after {}, more than {:.0f} s: {}", latest->label,
+                                              span_s, earliest->label, max_span_s, kNoReadOuts)};
 }
 
 }  // namespace
 
-std::vector<Finding> patient_findings(std::span<const PatientInput> inputs) {
+std::vector<FailedCheck> patient_findings(std::span<const PatientInput> inputs) {
   struct Attribute {
     std::string Identity::* member;
     DcmTagKey tag;
@@ -122,7 +122,7 @@ std::vector<Finding> patient_findings(std::span<const PatientInput> inputs) {
        {&Identity::patient_id_issuer, DCM_IssuerOfPatientID, as_it_is},
        {&Identity::patient_name, DCM_PatientName, comparable_name},
        {&Identity::patient_birth_date, DCM_PatientBirthDate, comparable_date}}};
-  std::vector<Finding> findings;
+  std::vector<FailedCheck> findings;
   for (const Attribute& attribute : attributes) {
     const auto value_of = [&](const PatientInput& input) {
       return attribute.comparable(input.identity->*attribute.member);
@@ -146,8 +146,8 @@ std::vector<Finding> patient_findings(std::span<const PatientInput> inputs) {
   return findings;
 }
 
-std::vector<Finding> session_findings(std::span<const RtImage> images, Notes& notes) {
-  std::vector<Finding> findings;
+std::vector<FailedCheck> session_findings(std::span<const RtImage> images, Notes& notes) {
+  std::vector<FailedCheck> findings;
   const auto compare = [&](const DcmTagKey& tag, auto&& value_of, auto&& finding_of) {
     const RtImage* reference = nullptr;
     for (const RtImage& image : images) {
@@ -163,10 +163,10 @@ std::vector<Finding> session_findings(std::span<const RtImage> images, Notes& no
   };
 
   compare(DCM_AcquisitionTime, acquisition_seconds,
-          [](const RtImage& image, const RtImage& first) -> std::optional<Finding> {
+          [](const RtImage& image, const RtImage& first) -> std::optional<FailedCheck> {
             const double apart_s = std::abs(*acquisition_seconds(image) - *acquisition_seconds(first));
             if (apart_s <= kMaxTimeSpanS) return std::nullopt;
-            return Finding{
+            return FailedCheck{
                 "time-span",
                 fmt::format(
                     "{}: taken {:.0f} s from {}, expected at most {:.0f} ({})\n"
@@ -183,8 +183,8 @@ std::vector<Finding> session_findings(std::span<const RtImage> images, Notes& no
   return findings;
 }
 
-std::vector<Finding> replaced_doubts(const RtImage& image, const RtImage& by_profile, const RtImage& used) {
-  std::vector<Finding> doubts;
+std::vector<FailedCheck> replaced_doubts(const RtImage& image, const RtImage& by_profile, const RtImage& used) {
+  std::vector<FailedCheck> doubts;
   const auto doubt = [&](const char* key, const std::string& by, const DcmTagKey& tag, const auto& value) {
     doubts.push_back({key, fmt::format("{} contradicts {}: {} is {}", by, image.label, described(tag), value)});
   };
@@ -221,9 +221,9 @@ std::vector<Finding> replaced_doubts(const RtImage& image, const RtImage& by_pro
   return doubts;
 }
 
-std::vector<Finding> session_doubts(std::span<const RtImage> images, double max_span_s) {
+std::vector<FailedCheck> session_doubts(std::span<const RtImage> images, double max_span_s) {
   if (images.size() < 2) return {};
-  std::vector<Finding> doubts = setting_doubts(images);
+  std::vector<FailedCheck> doubts = setting_doubts(images);
   // Read-outs that were planned, or that one view lacks, do not tell that the table stood still.
   const bool is_table_known = all_tell_position(images);
   auto time_doubt = unknown_time_doubt(images, is_table_known);
@@ -242,8 +242,8 @@ std::vector<Finding> session_doubts(std::span<const RtImage> images, double max_
   return doubts;
 }
 
-std::vector<Finding> table_findings(const RtImage& image, const RtImage& reference) {
-  std::vector<Finding> findings;
+std::vector<FailedCheck> table_findings(const RtImage& image, const RtImage& reference) {
+  std::vector<FailedCheck> findings;
   for (const TableReadOut& read_out : table_read_outs())
     if (auto finding = table_finding(read_out, image, reference)) findings.push_back(std::move(*finding));
   return findings;

@@ -23,27 +23,27 @@ struct PatientInput {
 
 // Checks that all are of one patient: each has the same ID, and issuer, name and birth date agree where they are given.
 // Each input is compared with the first that has the attribute: two may differ in what the CT does not say.
-std::vector<Finding> patient_findings(std::span<const PatientInput> inputs);
-inline std::vector<Finding> patient_findings(const PatientInput& one, const PatientInput& other) {
+std::vector<FailedCheck> patient_findings(std::span<const PatientInput> inputs);
+inline std::vector<FailedCheck> patient_findings(const PatientInput& one, const PatientInput& other) {
   return patient_findings(std::array{one, other});
 }
 
 // Checks that the views were taken at one time and at one table position. Each view is compared with the first view
 // that has the attribute. If only some views have the attribute, a warning names the others.
-std::vector<Finding> session_findings(std::span<const RtImage> images, Notes& notes);
+std::vector<FailedCheck> session_findings(std::span<const RtImage> images, Notes& notes);
 
 // Reasons to doubt that the views show one setup, so that a person must review the result:
 // - if not all views have measured read-outs of the table's position: views more than `max_span_s` apart, and a view
 //   that was taken twice (by its projection matrix where a machine profile gives it one);
 // - in any case: views with unknown times, views of two machines or two fractions, and a table angle that is not 0 in
 //   one view and missing in another.
-std::vector<Finding> session_doubts(std::span<const RtImage> images, double max_span_s);
+std::vector<FailedCheck> session_doubts(std::span<const RtImage> images, double max_span_s);
 
 // What a person says by switches against what an X-ray says, and what a machine profile says against its table angles.
 // `image`: as read; `by_profile`: with the profile; `used`: with the switches, too.
-std::vector<Finding> replaced_doubts(const RtImage& image, const RtImage& by_profile, const RtImage& used);
+std::vector<FailedCheck> replaced_doubts(const RtImage& image, const RtImage& by_profile, const RtImage& used);
 
 // The differences between the table read-outs of `image` and `reference`, as far as both have them.
-std::vector<Finding> table_findings(const RtImage& image, const RtImage& reference);
+std::vector<FailedCheck> table_findings(const RtImage& image, const RtImage& reference);
 
 }  // namespace isoshift

@@ -19,7 +19,7 @@
 namespace isoshift {
 namespace {
 
-std::vector<Finding> patient_findings(const Study& study) {
+std::vector<FailedCheck> patient_findings(const Study& study) {
   std::vector<PatientInput> inputs = {{&study.ct->identity, "the CT"}};
   if (study.plan) inputs.push_back({&study.plan->identity, study.plan->path.string()});
   if (study.structures) inputs.push_back({&study.structures->identity, study.structures->path.string()});
@@ -27,8 +27,8 @@ std::vector<Finding> patient_findings(const Study& study) {
   return patient_findings(inputs);
 }
 
-std::vector<Finding> plan_findings(const Study& study, Notes& notes) {
-  std::vector<Finding> findings;
+std::vector<FailedCheck> plan_findings(const Study& study, Notes& notes) {
+  std::vector<FailedCheck> findings;
   if (!study.plan) return findings;
   const RtPlan& plan = *study.plan;
   if (!plan.frame_of_reference_uid && plan.geometry == "TREATMENT_DEVICE")
@@ -62,7 +62,7 @@ std::vector<Finding> plan_findings(const Study& study, Notes& notes) {
 }
 
 // What is drawn in another frame of reference would lie anywhere on the CT.
-std::vector<Finding> structure_findings(const Study& study, Notes& notes) {
+std::vector<FailedCheck> structure_findings(const Study& study, Notes& notes) {
   std::vector<std::string> unknown, elsewhere;
   if (study.structures)
     for (const Structure& structure : study.structures->structures) {
@@ -211,7 +211,7 @@ void check_isocenter(const Study& study) {
 
 // What the X-rays say against their being of one session.
 struct SaidOfSession {
-  std::vector<Finding> findings, doubts;
+  std::vector<FailedCheck> findings, doubts;
 };
 
 // The X-rays with what a person and a machine profile supply, in order of acquisition.
@@ -243,7 +243,7 @@ std::vector<RtImage> read_images(const std::vector<std::filesystem::path>& paths
 
 // What each X-ray must have by itself. What is missing is told together with what is forbidden.
 void check_images(const Study& study, const StudyRequest& request, Notes& notes) {
-  std::vector<Finding> findings;
+  std::vector<FailedCheck> findings;
   for (const RtImage& image : study.rt_images)
     std::ranges::move(rt_image_findings(image), std::back_inserter(findings));
   std::string refused;
@@ -284,7 +284,7 @@ void check_instances(const Study& study) {
 // Whether the parts of the study belong together.
 void check_together(const StudyRequest& request, const SaidOfSession& said, Study& study, Notes& notes) {
   check_instances(study);
-  std::vector<Finding> findings = patient_findings(study);
+  std::vector<FailedCheck> findings = patient_findings(study);
   std::ranges::move(plan_findings(study, notes), std::back_inserter(findings));
   std::ranges::move(structure_findings(study, notes), std::back_inserter(findings));
   std::ranges::copy(said.findings, std::back_inserter(findings));

@@ -15,7 +15,8 @@
 #include "registration/bodies/target_search.h"
 #include "registration/bodies/turned_views.h"
 #include "registration/pose_parameters.h"
-#include "registration/quality/judge.h"
+#include "registration/quality/findings.h"
+#include "registration/quality/limits.h"
 
 namespace isoshift {
 namespace {
@@ -156,13 +157,9 @@ bool can_bodies_answer(const RegistrationOptions& options, const RegistrationRes
          whole.unobservable_room.empty();
 }
 
-// Whether parts of every view near the target have a signal and match where the whole puts them. Jaws that had opened
-// by 3 to 5 degrees, with targets on them 2 mm off and more, always had a part next to the target that disagreed; of
-// 273 patients who were right 9 had.
+// Whether parts of every view near the target have a signal and match where the whole puts them.
 bool do_parts_match_near(std::span<const FixedImage> images, const Vector3d& target_room_mm,
                          const RegistrationResult& whole) {
-  constexpr double kNearMm = 50.0, kNextToItMm = 30.0;
-  constexpr int kLeastParts = 2, kOfAll = 5;  // of the parts with a signal, one in five may disagree
   for (std::size_t view = 0; view < images.size(); ++view) {
     const XrayView& camera = images[view].view;
     const auto target_px = camera.project(target_room_mm);
@@ -170,12 +167,12 @@ bool do_parts_match_near(std::span<const FixedImage> images, const Vector3d& tar
     for (const ViewPart& part : whole.views[view].consistency.parts) {
       if (!target_px || !part.has_signal) continue;
       const double away_mm = (part.center_px - *target_px).norm() / pixels_per_mm(camera);
-      if (away_mm > kNearMm) continue;
-      if (part.disagrees && away_mm <= kNextToItMm) return false;
+      if (away_mm > limits::kPartsNearMm) continue;
+      if (part.disagrees && away_mm <= limits::kPartsNextToMm) return false;
       ++with_signal;
       disagreeing += part.disagrees ? 1 : 0;
     }
-    if (with_signal < kLeastParts || kOfAll * disagreeing > with_signal) return false;
+    if (with_signal < limits::kLeastPartsNear || limits::kOneDisagreesOf * disagreeing > with_signal) return false;
   }
   return true;
 }
@@ -194,25 +191,24 @@ BentPatient::BentPatient(const Volume<float>& ct_hu, const AttenuationModel& att
 bool may_have_bent(const RegistrationOptions& options, std::span<const FixedImage> images,
                    const RegistrationResult& whole) {
   if (!can_bodies_answer(options, whole)) return false;
-  if (whole.verdict == Verdict::kReview) return true;
-  return whole.verdict == Verdict::kAccepted &&
-         !do_parts_match_near(images, target_found_room_mm(options, whole), whole);
+  switch (whole.verdict()) {
+    case Verdict::kAccepted: return !do_parts_match_near(images, target_found_room_mm(options, whole), whole);
+    case Verdict::kReview: return true;
+    case Verdict::kRejected: return false;
+  }
+  return false;
 }
 
 bool may_target_lie_elsewhere(const RendererPyramid& renderers, std::span<const FixedImage> images,
                               const RegistrationOptions& options, const RegistrationResult& whole) {
-  if (!can_bodies_answer(options, whole) || whole.verdict != Verdict::kAccepted) return false;
+  if (!can_bodies_answer(options, whole) || whole.verdict() != Verdict::kAccepted) return false;
   const FixedViews views = compared_views(options, images);
   Renderer& renderer = renderers.with_voxels_up_to(kVoxelMm);
   const Eigen::Isometry3d& found = whole.actual_room_from_patient;
-  // Targets on jaws that had opened by 14 to 20 degrees had up to 0.70 and 0.89. Patients who were right, with metal
-  // near the target, had 0.54 and more, and all but four of 44 had 0.92 and more of parts. Coarse or noisy images match
-  // less everywhere, and cannot tell.
-  constexpr double kMinMatch = 0.86, kMinMatchOfParts = 0.92, kLeastEverywhere = 0.9, kLessThanEverywhere = 0.04;
   const CoarseMatch near = match_near_target(views, renderer, found, target_found_room_mm(options, whole));
-  if (near.of_all >= kMinMatch || near.of_parts >= kMinMatchOfParts) return false;
+  if (near.of_all >= limits::kLeastNear || near.of_parts >= limits::kLeastPartsOfNear) return false;
   const double everywhere = match_of_parts_everywhere(views, renderer, found);
-  return everywhere >= kLeastEverywhere && near.of_parts < everywhere - kLessThanEverywhere;
+  return everywhere >= limits::kLeastEverywhere && near.of_parts < everywhere - limits::kLessThanEverywhere;
 }
 
 void register_bodies(const BentPatient& patient, std::span<const FixedImage> images,
@@ -221,8 +217,7 @@ void register_bodies(const BentPatient& patient, std::span<const FixedImage> ima
   const Stopwatch watch;
   const Carriers carriers(patient.parts, patient.target, planned_room_from_patient, patient.parts.named_carriers);
   if (!carriers.exist()) {
-    result.demote(Verdict::kReview,
-                  "no bone was recognized within 20 mm of the target: X-rays do not show soft tissue");
+    result.findings.push_back({.check = Check::kNoBone});
     return;
   }
   const FixedViews fixed = compared_views(options, images);
@@ -255,7 +250,7 @@ void register_bodies(const BentPatient& patient, std::span<const FixedImage> ima
   result.structures =
       motions_of_structures(patient, planned_room_from_patient, target.setup_error, found.poses, result.bodies);
   std::ranges::copy(found.alternatives, std::back_inserter(result.alternatives));
-  judge(parameters_from_setup_error(target.setup_error), options, result);
+  result.findings = findings_about(parameters_from_setup_error(target.setup_error), options, result);
   result.seconds += watch.seconds();
 }
 

@@ -136,7 +136,7 @@ ViewsApart TurnedViews::apart(std::span<const Eigen::Isometry3d> wanted) {
     promised += starts.back().value + 0.5 * starts.back().gradient.dot(starts.back().step());
   }
   double gain = promised - before;
-  if (kPromisedToGained * gain >= ViewsApart::kMostShare * patient.by_bodies()) {
+  if (kPromisedToGained * gain >= limits::kMostShareApart * patient.by_bodies()) {
     gain = -before;
     for (std::size_t view = 0; view < patient.views(); ++view)
       gain += patient.most_probable_from(starts[view], view, ways).value;

@@ -8,7 +8,7 @@
 #include "base/error.h"
 #include "base/median.h"
 #include "registration/pose_parameters.h"
-#include "registration/quality/judge.h"
+#include "registration/quality/findings.h"
 #include "setup/couch_shift.h"
 
 namespace isoshift {

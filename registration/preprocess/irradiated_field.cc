@@ -226,18 +226,18 @@ bool make_corner(const Sides& sides) {
 }
 
 // The field as the image alone shows it.
-struct Finding {
+struct FoundField {
   Sides sides;
   std::string doubt = {};
   bool is_round = false;  // the circle that touches the sides
 };
 
 // What a cone or stereotactic leaves leave of the treatment beam.
-std::optional<Finding> small_finding(const XrayImage& xray, const UprightXray& upright) {
+std::optional<FoundField> small_finding(const XrayImage& xray, const UprightXray& upright) {
   if (xray.view.beam != Beam::kMegavoltage) return std::nullopt;
   const std::optional<SmallField> field = find_small_field(upright);
   if (!field) return std::nullopt;
-  Finding finding{.sides = {}, .is_round = field->is_round};
+  FoundField finding{.sides = {}, .is_round = field->is_round};
   for (std::size_t n = 0; n < 4; ++n) {
     const double at = field->sides[n];
     finding.sides[n].edge = {.at = static_cast<int>(std::lround(at)), .is_open = false};
@@ -246,8 +246,8 @@ std::optional<Finding> small_finding(const XrayImage& xray, const UprightXray& u
   return finding;
 }
 
-Finding find_in(const Upright& upright, const FieldEdges& edges, const Eigen::Vector2d& isocenter_upright_px) {
-  Finding finding{.sides = measured(upright, edges.best())};
+FoundField find_in(const Upright& upright, const FieldEdges& edges, const Eigen::Vector2d& isocenter_upright_px) {
+  FoundField finding{.sides = measured(upright, edges.best())};
   const Sides& sides = finding.sides;
   const bool is_aside = is_beside(sides, isocenter_upright_px, upright.xray.mm);
   const bool is_anatomy = is_aside || may_be_rod(sides);
@@ -280,7 +280,7 @@ Finding find_in(const Upright& upright, const FieldEdges& edges, const Eigen::Ve
 
 // Leaves may stand before jaws, whose leakage ends at an edge of its own: the innermost rectangle with at least three
 // clear sides.
-Finding innermost(const Upright& upright, Finding outer) {
+FoundField innermost(const Upright& upright, FoundField outer) {
   const int margin = static_cast<int>(std::lround(kInnerMarginMm / upright.xray.mm));
   cv::Rect part(cv::Point(), upright.xray.intensity.size());
   for (;;) {
@@ -292,7 +292,7 @@ Finding innermost(const Upright& upright, Finding outer) {
     if (sides_found(outer.sides) < 3 || inside.width < 2 * margin || inside.height < 2 * margin) return outer;
     const Upright cropped(upright.xray.cropped(inside));
     const FieldEdges edges(cropped.xray);
-    Finding inner{.sides = measured(cropped, edges.best())};
+    FoundField inner{.sides = measured(cropped, edges.best())};
     if (sides_clear(inner.sides) < 3) return outer;
     inner.doubt = doubt_about(inner.sides);
     for (std::size_t n = 0; n < 4; ++n) {
@@ -350,8 +350,8 @@ bool is_closed_further(const Sides& sides, const std::array<double, 4>& declared
 }
 
 // What is found, against what the file declares.
-Finding reconciled(Finding in_image, const DeclaredAperture& aperture, const Upright& upright, const FieldEdges& edges,
-                   IrradiatedField::Origin& origin) {
+FoundField reconciled(FoundField in_image, const DeclaredAperture& aperture, const Upright& upright,
+                      const FieldEdges& edges, IrradiatedField::Origin& origin) {
   const double mm = upright.xray.mm;
   const std::array<double, 4> declared = declared_sides(aperture, Mapping(upright.xray));
   const bool is_all = reaches_rim(declared, upright.xray.intensity.size(), mm);
@@ -367,7 +367,7 @@ Finding reconciled(Finding in_image, const DeclaredAperture& aperture, const Upr
   }
   if (!is_closed_further(in_image.sides, declared, mm)) {
     // Where a side is to be is known: fainter evidence will do.
-    Finding there{.sides = measured(upright, edges.near(declared))};
+    FoundField there{.sides = measured(upright, edges.near(declared))};
     if (is_confirmed(there.sides)) {
       origin = IrradiatedField::Origin::kDeclared;
       return there;
@@ -428,8 +428,8 @@ IrradiatedField find_irradiated_field(const XrayImage& xray, double pixels_per_m
   const FieldEdges edges(upright.xray);
   const Eigen::Vector2d isocenter_px =
       Mapping(upright.xray).upright(xray.view.project(Eigen::Vector3d::Zero()).value());
-  const std::optional<Finding> small = small_finding(xray, upright.xray);
-  Finding finding = small ? *small : innermost(upright, find_in(upright, edges, isocenter_px));
+  const std::optional<FoundField> small = small_finding(xray, upright.xray);
+  FoundField finding = small ? *small : innermost(upright, find_in(upright, edges, isocenter_px));
   IrradiatedField field{.origin = sides_found(finding.sides) > 0 ? Origin::kFound : Origin::kWholeReceptor};
   if (xray.declared_aperture)
     finding = reconciled(std::move(finding), *xray.declared_aperture, upright, edges, field.origin);

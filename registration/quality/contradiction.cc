@@ -10,6 +10,7 @@
 #include "registration/objective.h"
 #include "registration/pose_objective.h"
 #include "registration/pose_parameters.h"
+#include "registration/quality/limits.h"
 #include "registration/quality/uncertainty.h"
 
 namespace isoshift {
@@ -124,13 +125,11 @@ TurnBetweenViews turn_between(const std::vector<WantedAlone>& views, const Eigen
 }  // namespace
 
 bool TurnBetweenViews::is_clear() const {
-  constexpr double kMostRad = rad_from_deg(0.8), kMostSigmas = 3.5;
-  return !(angle_rad <= kMostRad || angle_rad <= kMostSigmas * sigma_rad);
+  return !(angle_rad <= limits::kMostTurnRad || angle_rad <= limits::kMostTurnSigmas * sigma_rad);
 }
 
 bool ViewsApart::is_clear() const {
-  constexpr double kLeastGain = 10.0;
-  return !(gain <= kLeastGain || share_of_bodies_gain <= kMostShare);
+  return !(gain <= limits::kLeastGainApart || share_of_bodies_gain <= limits::kMostShareApart);
 }
 
 Contradictions contradictions(const RendererPyramid& renderers, const FixedViews& views,

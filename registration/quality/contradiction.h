@@ -23,20 +23,14 @@ struct TurnBetweenViews {
   // as no bodies were searched.
   std::optional<double> share_of_bodies_gain;
 
-  // Undisturbed and bent patients of the campaign wanted at most 0.6 degrees as wholes, a gantry angle that is 2
-  // degrees wrong 1.0 to 3.1 (docs/algorithms.md, "Contradiction").
-  bool is_clear() const;
+  bool is_clear() const;  // by limits.h
 };
 
 // What the rigid patient gains in probability (in nats) at a pose of its own in every view, beside what bodies gain.
 struct ViewsApart {
   double gain = 0.0, share_of_bodies_gain = 0.0;
 
-  // Geometry that was wrong in one view, or a patient who moved between the views, gained 25 nats and more and 1.08 and
-  // more of what bodies gained (two of 33 that were right within 1 mm 0.77); right patients of the campaign 0.05 to
-  // 0.73 (docs/algorithms.md, "Contradiction").
-  static constexpr double kMostShare = 0.9;
-  bool is_clear() const;
+  bool is_clear() const;  // by limits.h
 };
 
 struct Contradictions {

@@ -71,7 +71,7 @@ class AuditedPhantomsCommandTest : public testing::Test {
       Fraction one{.session = name,
                    .patient = numbers.at(result.identity.patient_id),
                    .day = days_of_patient[result.identity.patient_id]++,
-                   .is_accepted = result.verdict == Verdict::kAccepted};
+                   .is_accepted = result.verdict() == Verdict::kAccepted};
       const std::string truth = one.day == 0 ? "truth.json" : fmt::format("truth_F{:02}.json", one.day + 1);
       result.setup_error = read_setup_error(study_of(one.patient) / truth);
       const ShownShift needed = shown_shift(result);

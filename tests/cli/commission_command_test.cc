@@ -15,6 +15,7 @@
 #include "geometry/rotation.h"
 #include "io/report/result_folder.h"
 #include "tests/support/command.h"
+#include "tests/support/findings.h"
 #include "tests/support/oblique_report.h"
 #include "tests/support/temporary_folder.h"
 
@@ -51,7 +52,7 @@ class CommissionCommandTest : public testing::Test {
     result.setup_error.linear() =
         rotation_from_zxy({rad_from_deg(deg.z()), rad_from_deg(deg.x()), rad_from_deg(deg.y())});
     result.uncertainty = uncertainty_of_independent_axes({0.1, 0.1, 0.1}, Eigen::Vector3d::Constant(0.001));
-    if (verdict == Verdict::kRejected) result.reasons = {"nothing matches"};
+    result.findings = findings_for(verdict, "nothing matches");
     const std::filesystem::path where = folder_ / "results" / "cases" / name;
     std::filesystem::create_directories(where);
     write_result(result, where);

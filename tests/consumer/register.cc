@@ -25,8 +25,8 @@ int main(int argc, char** argv) try {
       register_views(renderers, prepared(study.xrays), study.planned_room_from_patient, preset("setup"));
   const Eigen::Isometry3d error =
       setup_error_from_poses(study.planned_room_from_patient, found.actual_room_from_patient);
-  std::cout << fmt::format("{} ({:.2f})\n", to_string(found.verdict), fmt::join(error.translation(), ", "));
-  if (found.verdict != Verdict::kAccepted) return 3;
+  std::cout << fmt::format("{} ({:.2f})\n", to_string(found.verdict()), fmt::join(error.translation(), ", "));
+  if (found.verdict() != Verdict::kAccepted) return 3;
   write_spatial_registration(study, found.actual_room_from_patient, {}, argv[2], notes);
 } catch (const std::exception& error) {
   std::cerr << "error: " << error.what() << "\n";

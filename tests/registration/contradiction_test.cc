@@ -10,6 +10,7 @@
 
 #include "geometry/rotation.h"
 #include "registration/pose_parameters.h"
+#include "registration/quality/limits.h"
 #include "registration/register_views.h"
 #include "tests/support/registration_scene.h"
 
@@ -18,7 +19,7 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr double kLimitMm = 0.5;  // judge.cc's
+constexpr double kLimitMm = limits::kMaxContradictionMm;
 
 RegistrationScene scene_with(const Vector3d& rotation_deg, const Vector3d& translation_mm = {3.0, -2.0, 4.0}) {
   SceneOptions options{.shapes = asymmetric_body(), .pixels = 128};

@@ -1,4 +1,4 @@
-#include "registration/quality/judge.h"
+#include "registration/quality/findings.h"
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
@@ -53,17 +53,17 @@ constexpr std::array kInside = {1.0, -2.0, 3.0, 0.01, 0.02, -0.03};
 void expect_review(const std::function<void(RegistrationResult&)>& spoil, const std::string& reason) {
   RegistrationResult result = good_result();
   spoil(result);
-  judge(kInside, {}, result);
-  EXPECT_EQ(result.verdict, Verdict::kReview) << reason;
-  EXPECT_THAT(result.reasons, ElementsAre(HasSubstr(reason)));
+  result.findings = findings_about(kInside, {}, result);
+  EXPECT_EQ(result.verdict(), Verdict::kReview) << reason;
+  EXPECT_THAT(result.reasons(), ElementsAre(HasSubstr(reason)));
 }
 
 void expect_accepted(const std::function<void(RegistrationResult&)>& change) {
   RegistrationResult result = good_result();
   change(result);
-  judge(kInside, {}, result);
-  EXPECT_EQ(result.verdict, Verdict::kAccepted) << testing::PrintToString(result.reasons);
-  EXPECT_THAT(result.reasons, testing::IsEmpty());
+  result.findings = findings_about(kInside, {}, result);
+  EXPECT_EQ(result.verdict(), Verdict::kAccepted) << testing::PrintToString(result.reasons());
+  EXPECT_THAT(result.reasons(), testing::IsEmpty());
 }
 
 TEST(Quality, AcceptsWhatImprovedAndMatches) {
@@ -201,9 +201,9 @@ TEST(Quality, AParameterAtItsBoundNeedsReview) {
       RegistrationResult result = good_result();
       auto parameters = kInside;
       parameters[axis] = sign * 20.0;  // 0.2 rad on the sphere of 100 mm is 20 mm, too
-      judge(parameters, options, result);
-      EXPECT_EQ(result.verdict, Verdict::kReview);
-      EXPECT_THAT(result.reasons, ElementsAre(fmt::format("the {} ended at its bound", kNames[axis])));
+      result.findings = findings_about(parameters, options, result);
+      EXPECT_EQ(result.verdict(), Verdict::kReview);
+      EXPECT_THAT(result.reasons(), ElementsAre(fmt::format("the {} ended at its bound", kNames[axis])));
     }
 }
 
@@ -234,9 +234,9 @@ TEST(Quality, TheUncertaintyThatCountsIsThatOfTheTarget) {
   result.actual_room_from_patient.translation() = Eigen::Vector3d(3.0, -2.0, 1.0);
   for (int axis = 3; axis < 6; ++axis) set_sigma(result, axis, rad_from_deg(0.4));
   const RegistrationResult independent = result;
-  judge(kInside, options, result);
-  EXPECT_EQ(result.verdict, Verdict::kReview);
-  EXPECT_THAT(result.reasons, Contains(HasSubstr("the target is uncertain along y: 1.5 mm at two sigma")));
+  result.findings = findings_about(kInside, options, result);
+  EXPECT_EQ(result.verdict(), Verdict::kReview);
+  EXPECT_THAT(result.reasons(), Contains(HasSubstr("the target is uncertain along y: 1.5 mm at two sigma")));
 
   const Eigen::Vector3d found_mm = result.actual_room_from_patient * *options.target_patient_mm;
   Eigen::Matrix<double, 6, 6> about_target = Eigen::Matrix<double, 6, 6>::Identity();
@@ -245,10 +245,10 @@ TEST(Quality, TheUncertaintyThatCountsIsThatOfTheTarget) {
   result.uncertainty->covariance = about_target * independent.uncertainty->covariance * about_target.transpose();
   EXPECT_GT(result.uncertainty->sigma_translation_mm().y(), 0.5);
   EXPECT_LT((result.uncertainty->sigma_at_mm(found_mm) - independent.uncertainty->sigma_translation_mm()).norm(), 1e-9);
-  judge(kInside, options, result);
-  EXPECT_EQ(result.verdict, Verdict::kAccepted);
-  judge(kInside, {}, result);
-  EXPECT_EQ(result.verdict, Verdict::kReview);
+  result.findings = findings_about(kInside, options, result);
+  EXPECT_EQ(result.verdict(), Verdict::kAccepted);
+  result.findings = findings_about(kInside, {}, result);
+  EXPECT_EQ(result.verdict(), Verdict::kReview);
 }
 
 TEST(Quality, AnUncertaintyThatIsMissingOrNoNumberNeedsReview) {
@@ -257,9 +257,9 @@ TEST(Quality, AnUncertaintyThatIsMissingOrNoNumberNeedsReview) {
   for (const int axis : {1, 5}) {
     RegistrationResult result = good_result();
     set_sigma(result, axis, kNan);
-    judge(kInside, {}, result);
-    EXPECT_EQ(result.verdict, Verdict::kReview);
-    EXPECT_THAT(result.reasons, Each(AllOf(HasSubstr("is uncertain"), HasSubstr("nan"))));
+    result.findings = findings_about(kInside, {}, result);
+    EXPECT_EQ(result.verdict(), Verdict::kReview);
+    EXPECT_THAT(result.reasons(), Each(AllOf(HasSubstr("is uncertain"), HasSubstr("nan"))));
   }
 }
 
@@ -302,8 +302,8 @@ TEST(Quality, ASearchThatRanOutOfEvaluationsNeedsReview) {
 TEST(Quality, ASimilarityThatIsNoNumberIsNeverAccepted) {
   RegistrationResult result = good_result();
   result.views[0].similarity_final = std::numeric_limits<double>::quiet_NaN();
-  judge(kInside, {}, result);
-  EXPECT_NE(result.verdict, Verdict::kAccepted);
+  result.findings = findings_about(kInside, {}, result);
+  EXPECT_NE(result.verdict(), Verdict::kAccepted);
 }
 
 TEST(Quality, TheWorseTheMatchTheWorseTheVerdict) {
@@ -311,9 +311,9 @@ TEST(Quality, TheWorseTheMatchTheWorseTheVerdict) {
     RegistrationResult result = good_result();
     for (ViewMatch& view : result.views)
       view = {.similarity_start = 0.0, .similarity_final = similarity, .consistency = parts(20, 0)};
-    judge(kInside, {}, result);
-    EXPECT_EQ(result.reasons.empty(), result.verdict == Verdict::kAccepted) << similarity;
-    return result.verdict;
+    result.findings = findings_about(kInside, {}, result);
+    EXPECT_EQ(result.reasons().empty(), result.verdict() == Verdict::kAccepted) << similarity;
+    return result.verdict();
   };
   EXPECT_EQ(verdict_at(0.97), Verdict::kAccepted);
   EXPECT_EQ(verdict_at(0.02), Verdict::kRejected);
@@ -348,10 +348,10 @@ TEST(Quality, MorePartsMayDisagreeWhereAVolumeIsChosen) {
   const ProjectedRegion chosen(region);
   RegistrationResult result = good_result();
   result.views[0].consistency = parts(45, 5);
-  judge(kInside, {.region = &chosen}, result);
-  EXPECT_EQ(result.verdict, Verdict::kAccepted);
-  judge(kInside, {}, result);
-  EXPECT_EQ(result.verdict, Verdict::kReview);
+  result.findings = findings_about(kInside, {.region = &chosen}, result);
+  EXPECT_EQ(result.verdict(), Verdict::kAccepted);
+  result.findings = findings_about(kInside, {}, result);
+  EXPECT_EQ(result.verdict(), Verdict::kReview);
 }
 
 TEST(Quality, AnAlternativeThatIsBetterNeedsReviewWhereverItLies) {
@@ -384,9 +384,9 @@ TEST(Quality, AnAlternativeAsGoodNeedsReviewUnlessItMeansTheSamePose) {
 TEST(Quality, APresetWithoutTheCheckOfAlternativesNeedsReview) {
   RegistrationResult result = good_result();
   result.alternatives.clear();
-  judge(kInside, {.check_alternatives = false}, result);
-  EXPECT_EQ(result.verdict, Verdict::kReview);
-  EXPECT_THAT(result.reasons, ElementsAre(HasSubstr("leaves out the check")));
+  result.findings = findings_about(kInside, {.check_alternatives = false}, result);
+  EXPECT_EQ(result.verdict(), Verdict::kReview);
+  EXPECT_THAT(result.reasons(), ElementsAre(HasSubstr("leaves out the check")));
 }
 
 TEST(Quality, AViewThatPullsThePoseNeedsReview) {
@@ -407,10 +407,10 @@ TEST(Quality, EveryReasonIsGivenAndTheWorstDecides) {
   result.views[1].similarity_start = result.views[1].similarity_final = 0.01;
   result.uncertainty.reset();
   result.stages[1].reached_limit = true;
-  judge(kInside, {}, result);
-  EXPECT_EQ(result.verdict, Verdict::kRejected);
-  EXPECT_THAT(result.reasons, testing::UnorderedElementsAre(HasSubstr("did not converge"), HasSubstr("0.010"),
-                                                            HasSubstr("do not determine the pose")));
+  result.findings = findings_about(kInside, {}, result);
+  EXPECT_EQ(result.verdict(), Verdict::kRejected);
+  EXPECT_THAT(result.reasons(), testing::UnorderedElementsAre(HasSubstr("did not converge"), HasSubstr("0.010"),
+                                                              HasSubstr("do not determine the pose")));
 }
 
 TEST(Quality, OneViewCannotSeeDepth) {
@@ -420,9 +420,9 @@ TEST(Quality, OneViewCannotSeeDepth) {
   EXPECT_NEAR(std::abs(unobservable[0].dot(one[0].source_room_mm.normalized())), 1.0, 1e-12);
   RegistrationResult result = good_result();
   result.unobservable_room = unobservable;
-  judge(kInside, {}, result);
-  EXPECT_EQ(result.verdict, Verdict::kReview);
-  EXPECT_THAT(result.reasons, ElementsAre(HasSubstr("nearly the same direction")));
+  result.findings = findings_about(kInside, {}, result);
+  EXPECT_EQ(result.verdict(), Verdict::kReview);
+  EXPECT_THAT(result.reasons(), ElementsAre(HasSubstr("nearly the same direction")));
 }
 
 TEST(Quality, OpposedViewsSeeNoDepthEither) {

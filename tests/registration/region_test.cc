@@ -279,7 +279,7 @@ TEST(Region, ASmallVolumeIsRegistered) {
   registration.region = &region;
   const auto result = register_views(*scene.renderers, prepared(scene.xrays), scene.planned, registration);
   EXPECT_THAT(setup_error_from_poses(scene.planned, result.actual_room_from_patient), PoseNear(scene.truth, 1.0, 2.0));
-  EXPECT_NE(result.verdict, Verdict::kAccepted);  // too little to tell whether anatomy moved
+  EXPECT_NE(result.verdict(), Verdict::kAccepted);  // too little to tell whether anatomy moved
 }
 
 // In front of a belly that the CT cuts, what lies beyond covers the whole anterior view and cannot be left out there;

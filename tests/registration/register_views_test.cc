@@ -68,7 +68,7 @@ TEST(RegisterViews, RecoversKnownOffsetFromTwoOrthogonalViewsInEveryPatientPosit
     EXPECT_THAT(setup_error_from_poses(scene.planned, result.actual_room_from_patient), PoseNear(scene.truth, 0.3, 0.2))
         << to_string(position);
     // The check that was left out is all that is missing.
-    EXPECT_THAT(result.reasons, testing::ElementsAre(testing::HasSubstr("leaves out the check")))
+    EXPECT_THAT(result.reasons(), testing::ElementsAre(testing::HasSubstr("leaves out the check")))
         << to_string(position);
   }
 }
@@ -77,7 +77,7 @@ TEST(RegisterViews, AcceptsWhatItFindsAndSaysHowSureItIs) {
   Scene scene = make_scene(PatientPosition::kHfs, 0.0, {0.0, 90.0});
   const auto result = register_views(*scene.renderers, prepared(scene.xrays), scene.planned, preset("setup"));
   EXPECT_THAT(setup_error_from_poses(scene.planned, result.actual_room_from_patient), PoseNear(scene.truth, 0.3, 0.2));
-  EXPECT_EQ(result.verdict, Verdict::kAccepted) << testing::PrintToString(result.reasons);
+  EXPECT_EQ(result.verdict(), Verdict::kAccepted) << testing::PrintToString(result.reasons());
   ASSERT_TRUE(result.uncertainty);
   EXPECT_GT(result.uncertainty->sigma_translation_mm().minCoeff(), 0.0);
   EXPECT_GT(result.uncertainty->sigma_rotation_rad().minCoeff(), 0.0);
@@ -126,7 +126,7 @@ TEST(RegisterViews, APatientExactlyOnPlanIsAccepted) {
   Scene scene = make_scene(PatientPosition::kHfs, 0.0, {30.0, 120.0}, Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero());
   const auto result = register_views(*scene.renderers, prepared(scene.xrays), scene.planned, preset("setup"));
   EXPECT_THAT(setup_error_from_poses(scene.planned, result.actual_room_from_patient), PoseNear(scene.truth, 0.3, 0.2));
-  EXPECT_EQ(result.verdict, Verdict::kAccepted) << testing::PrintToString(result.reasons);
+  EXPECT_EQ(result.verdict(), Verdict::kAccepted) << testing::PrintToString(result.reasons());
 }
 
 TEST(RegisterViews, ABlankXrayIsAnError) {
@@ -169,14 +169,14 @@ TEST(RegisterViews, ASetPoseIsJudgedAsItIsAndNeedsAReview) {
   options.is_searched = false;
   const auto right = register_views(*scene.renderers, prepared(scene.xrays), scene.truth * scene.planned, options);
   EXPECT_THAT(right.actual_room_from_patient, PoseNear(scene.truth * scene.planned, 1e-9, 1e-9));
-  EXPECT_EQ(right.verdict, Verdict::kReview);
-  EXPECT_THAT(right.reasons, testing::ElementsAre("the pose was set, not searched"));
+  EXPECT_EQ(right.verdict(), Verdict::kReview);
+  EXPECT_THAT(right.reasons(), testing::ElementsAre("the pose was set, not searched"));
   EXPECT_TRUE(right.stages.empty());
   EXPECT_TRUE(right.uncertainty);
   // The planned pose lies 10 mm off, and what is judged shows it.
   const auto wrong = register_views(*scene.renderers, prepared(scene.xrays), scene.planned, options);
-  EXPECT_NE(wrong.verdict, Verdict::kAccepted);
-  EXPECT_GT(wrong.reasons.size(), 1U);
+  EXPECT_NE(wrong.verdict(), Verdict::kAccepted);
+  EXPECT_GT(wrong.reasons().size(), 1U);
   EXPECT_LT(wrong.views[0].similarity_final, right.views[0].similarity_final - 0.1);
 }
 

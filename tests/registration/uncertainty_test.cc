@@ -112,7 +112,7 @@ TEST(Uncertainty, OfABallIsNotAccepted) {
     const RegistrationScene scene = make_scene(options);
     const RegistrationResult result =
         register_views(*scene.renderers, prepared(scene.xrays), scene.planned, preset("setup"));
-    EXPECT_NE(result.verdict, Verdict::kAccepted);
+    EXPECT_NE(result.verdict(), Verdict::kAccepted);
     ASSERT_TRUE(result.uncertainty);
     EXPECT_GT(result.uncertainty->sigma_rotation_rad().minCoeff(), rad_from_deg(0.5));
   }

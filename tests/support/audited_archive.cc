@@ -124,7 +124,7 @@ std::vector<AuditedSession> audited(const MadeArchive& archive) {
     session.name = MadeArchive::name_of(n);
     session.acquired = result.views.front().acquired;
     session.day = *seconds_at(session.acquired) / 86400.0;
-    session.verdict = result.verdict;
+    session.verdict = result.verdict();
     session.identity = result.identity;
     session.setup_error = complete_components(shown_shift(result));
     session.found = found_of(result);

@@ -1,6 +1,7 @@
 #include "tests/support/oblique_report.h"
 
 #include "geometry/rotation.h"
+#include "tests/support/findings.h"
 
 namespace isoshift {
 
@@ -34,9 +35,7 @@ SetupResult oblique_report(Verdict verdict) {
   report.made_on = "2026-03-01T10:16:02+0100";
   report.version = "0.1.0";
   report.commit = "abc";
-  report.verdict = verdict;
-  report.reasons.clear();
-  if (verdict != Verdict::kAccepted) report.reasons = {"the views disagree"};
+  report.findings = findings_for(verdict);
   report.identity = {.character_set = "ISO_IR 192",
                      .patient_id = "ID-1",
                      .patient_name = "Example",

@@ -11,6 +11,7 @@
 #include "base/sha256.h"
 #include "io/report/formats.h"
 #include "io/report/result_folder.h"
+#include "tests/support/findings.h"
 #include "workflow/room/patient_files.h"
 
 namespace isoshift {
@@ -132,10 +133,9 @@ std::optional<Runner::End> FakeRunner::end() {
   is_running_ = false;
   if (failure) return End{.failure = failure};
   SetupResult report;
-  report.verdict = verdict(run.xrays);
-  report.reasons = run.doubts;
-  if (report.verdict == Verdict::kAccepted && !run.doubts.empty()) report.verdict = Verdict::kReview;
-  if (report.verdict != Verdict::kAccepted && run.doubts.empty()) report.reasons = {"the views disagree"};
+  report.findings.clear();
+  for (const std::string& doubt : run.doubts) report.findings.push_back({.check = Check::kFiles, .words = doubt});
+  std::ranges::copy(findings_for(verdict(run.xrays)), std::back_inserter(report.findings));
   report.site.emplace().sha256 = site_sha256;
   std::string all;
   for (const std::string& uid : run.xrays) {
@@ -150,7 +150,7 @@ std::optional<Runner::End> FakeRunner::end() {
   std::filesystem::create_directories(folder_);
   write_text(folder_ / kResultFile, json_report(report));
   write_text(folder_ / "report.dcm", "report of " + all);
-  if (report.verdict == Verdict::kAccepted) write_text(folder_ / kRegistrationFile, "registration of " + all);
+  if (report.verdict() == Verdict::kAccepted) write_text(folder_ / kRegistrationFile, "registration of " + all);
   const End end{.files = sha256_of_folder(folder_)};
   after_end(folder_);
   return end;

@@ -29,7 +29,7 @@ DRAWN = (".pdf", ".html", ".svg", ".png")
 TOLERANCE = 0.2  # mm and degrees
 IGNORED_KEYS = {"made_on", "commit", "program", "device", "sha256", "ct_sha256", "plan_sha256", "termination", "seconds", "picture",
                 "best"}
-KEYS_OF_NOTHING = {"reasons", "parts"}  # that follow from a pose at which nothing was found
+KEYS_OF_NOTHING = {"reasons", "findings", "parts"}  # that follow from a pose at which nothing was found
 POSE_KEYS = {"setup_error", "couch_shift", "couch_target_deg"}
 IGNORED_KEYWORDS = {"EncapsulatedDocument", "EncapsulatedDocumentLength", "InstanceCreationDate", "InstanceCreationTime",
                     "ContentDate", "ContentTime", "TimezoneOffsetFromUTC", "SeriesDate", "SeriesTime", "SoftwareVersions"}

@@ -223,10 +223,10 @@ TEST_P(TestdataResults, AreReadAndReportedAgain) {
   for (const std::string verdict : {"accepted", "review", "rejected"}) {
     SCOPED_TRACE(verdict);
     const SetupResult read = read_result(result(verdict));
-    EXPECT_EQ(to_string(read.verdict), verdict);
+    EXPECT_EQ(to_string(read.verdict()), verdict);
     EXPECT_EQ(read.version, GetParam());
     EXPECT_EQ(read.views.size(), 2U);
-    EXPECT_EQ(read.reasons.empty(), verdict == "accepted");
+    EXPECT_EQ(read.reasons().empty(), verdict == "accepted");
     const fs::path again = folder / verdict;
     const CommandOutcome outcome = run_command({"report", result(verdict).string(), "-o", again.string(), "--site",
                                                 testdata("config/site/linac.json").string(), "--anatomy", "head"});

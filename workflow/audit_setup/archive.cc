@@ -13,7 +13,6 @@
 #include "base/error.h"
 #include "base/local_time.h"
 #include "geometry/rotation.h"
-#include "io/objects/registration_check.h"
 #include "io/objects/spatial_registration.h"
 #include "io/report/result_folder.h"
 #include "setup/shown_shift.h"
@@ -50,23 +49,16 @@ struct ReadSession {
   std::optional<double> made_on;                 // seconds of UTC; nothing: unknown
 };
 
-// Results of before 2026-11-29 do not say, but the registration object beside them does.
-std::string ct_frame_of(const SetupResult& result, const fs::path& folder) {
-  if (result.ct_frame_uid) return *result.ct_frame_uid;
-  const fs::path registration = folder / kRegistrationFile;
-  return fs::exists(registration) ? check_registration(registration).registered_frame_uid : "";
-}
-
 ReadSession read_session(const fs::path& folder, std::string name, ComparedShift compared) {
   ReadSession read{.session = {.name = std::move(name), .folder = folder}, .frames = {}, .made_on = {}};
   AuditedSession& session = read.session;
   try {
     const SetupResult result = read_report(folder);
     read.made_on = utc_seconds_at(result.made_on);
-    session.verdict = result.verdict;
-    session.reasons = result.reasons;
+    session.verdict = result.verdict();
+    session.reasons = result.reasons();
     session.identity = result.identity;
-    session.ct_frame_uid = ct_frame_of(result, folder);
+    session.ct_frame_uid = result.ct_frame_uid;
     for (const SetupResult::View& view : result.views) {
       session.xrays.insert(view.sop_instance_uid);
       read.frames.emplace(view.sop_instance_uid, view.frame);
@@ -80,8 +72,8 @@ ReadSession read_session(const fs::path& folder, std::string name, ComparedShift
                          .couch_angle_deg = deg_from_rad(result.table.yaw_rad()),
                          .couch_pitch_deg = deg_from_rad(result.table.pitch_rad),
                          .couch_roll_deg = deg_from_rad(result.table.roll_rad)};
-    if (result.verdict != Verdict::kAccepted)
-      session.left_out = fmt::format("isoshift did not accept it ({})", to_string(result.verdict));
+    if (result.verdict() != Verdict::kAccepted)
+      session.left_out = fmt::format("isoshift did not accept it ({})", to_string(result.verdict()));
     if (const auto seconds = seconds_at(session.acquired))
       session.day = *seconds / 86400.0;
     else if (session.counts())

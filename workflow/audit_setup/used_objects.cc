@@ -41,7 +41,7 @@ std::vector<CheckedRegistration> registrations_below(const fs::path& folder, std
 // What the object means for the session's couch; why it means nothing, if it does not.
 std::string use_object(CheckedRegistration& object, const std::optional<Eigen::Vector3d>& source_isocenter_mm,
                        AuditedSession& session) {
-  for (const Finding& finding :
+  for (const FailedCheck& finding :
        patient_findings({&session.identity, "session " + session.name}, {&object.identity, object.path.string()}))
     return finding.message;
   if (session.ct_frame_uid.empty())

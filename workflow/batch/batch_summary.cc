@@ -22,7 +22,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 std::string status_of(const CaseEnd& end) {
-  if (end.report) return std::string(to_string(end.report->verdict));
+  if (end.report) return std::string(to_string(end.report->verdict()));
   return end.error.empty() ? "open" : "failed";
 }
 
@@ -32,7 +32,7 @@ std::string acquired(const CaseEnd& end) {
 
 // Why a case was not accepted, on one line.
 std::string reason_of(const CaseEnd& end) {
-  std::string text = end.report ? fmt::format("{}", fmt::join(end.report->reasons, "; ")) : end.error;
+  std::string text = end.report ? fmt::format("{}", fmt::join(end.report->reasons(), "; ")) : end.error;
   std::ranges::replace(text, '\n', ' ');
   return text;
 }
@@ -172,7 +172,7 @@ BatchSummary summary_of(const BatchFolder& folder, const std::vector<BatchCase>&
   for (const BatchCase& one : cases) {
     summary.cases.push_back(end_of(folder, one.name));
     const CaseEnd& end = summary.cases.back();
-    if (!end.report || end.report->verdict != Verdict::kAccepted) continue;
+    if (!end.report || end.report->verdict() != Verdict::kAccepted) continue;
     const auto components = complete_components(shown_shift(*end.report));
     if (!components) continue;
     OfPatient& patient = by_patient[patient_key(end.report->identity)];
@@ -201,7 +201,7 @@ std::string summary_json(const BatchSummary& summary) {
       const Components shown = shown_components(shown_shift(*end.report));
       for (std::size_t n = 0; n < 6; ++n) components[kErrorComponents[n]] = shown[n] ? Json(*shown[n]) : Json(nullptr);
       json["setup_error"] = components;
-      json["reasons"] = end.report->reasons;
+      json["reasons"] = end.report->reasons();
       json["seconds"] = {
           {"load", end.report->seconds_load}, {"register", end.report->seconds}, {"total", end.report->seconds_total}};
     } else if (!end.error.empty()) {

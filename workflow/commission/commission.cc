@@ -125,11 +125,11 @@ Commission commission_of(const CommissionRequest& request) {
   for (NamedResult& one : found.results) {
     if (!one.result.is_searched)
       commission.left_out.push_back({.session = one.name, .why = "its pose was set, not searched"});
-    else if (one.result.verdict != Verdict::kRejected)
+    else if (one.result.verdict() != Verdict::kRejected)
       commission.sessions.push_back(std::move(one));
     else
       commission.left_out.push_back(
-          {.session = one.name, .why = fmt::format("rejected: {}", fmt::join(one.result.reasons, "; "))});
+          {.session = one.name, .why = fmt::format("rejected: {}", fmt::join(one.result.reasons(), "; "))});
   }
   if (commission.sessions.empty()) {
     std::string message = fmt::format("{}: no result can be used:", request.results.string());

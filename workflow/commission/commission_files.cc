@@ -53,8 +53,8 @@ Json json_of(const NamedResult& session) {
   }
   return {{"name", session.name},
           {"acquired", session.acquired()},
-          {"verdict", to_string(result.verdict)},
-          {"reasons", result.reasons},
+          {"verdict", to_string(result.verdict())},
+          {"reasons", result.reasons()},
           {"program", {{"version", result.version}, {"commit", result.commit}}},
           {"preset", result.preset},
           {"machine_profile_sha256", result.machine ? Json(result.machine->sha256) : Json(nullptr)},

@@ -163,8 +163,8 @@ class CommissionPdf {
     lines.reserve(commission_.sessions.size() + commission_.left_out.size());
     for (const NamedResult& session : commission_.sessions)
       lines.push_back(fmt::format("{}  ·  {}  ·  {}{}{}", session.name, session.acquired(),
-                                  to_string(session.result.verdict), session.result.reasons.empty() ? "" : "; ",
-                                  fmt::join(session.result.reasons, "; ")));
+                                  to_string(session.result.verdict()), session.result.reasons().empty() ? "" : "; ",
+                                  fmt::join(session.result.reasons(), "; ")));
     for (const Commission::LeftOut& left : commission_.left_out)
       lines.push_back(fmt::format("left out: {}: {}", left.session, left.why));
     pages_.list("Sessions", lines);

@@ -74,24 +74,14 @@ StudyFiles named_files(const SetupResult& result, const StudyFiles& study) {
   return files;
 }
 
-// The same with the structure set that was registered, or, where an old result does not say, that registration takes.
+// The same with the structure set that was registered.
 StudyFiles registered_files(const SetupResult& result, const StudyFiles& study) {
   StudyFiles files = named_files(result, study);
-  if (result.structure_set_uid) {
-    if (result.structure_set_uid->empty()) return files;
-    const auto registered =
-        std::ranges::find(study.structures, *result.structure_set_uid, &StudyFiles::Structures::sop_instance_uid);
-    expect_found(registered != study.structures.end(), "structure set", *result.structure_set_uid);
-    files.structures.push_back(*registered);
-    return files;
-  }
-  StudyFiles candidates = files;
-  candidates.structures = study.structures;
-  candidates.images.insert(candidates.images.end(), files.other_xrays.begin(), files.other_xrays.end());
-  candidates.other_xrays.clear();
-  const std::filesystem::path taken = choose_parts(candidates).structures;
-  for (const StudyFiles::Structures& structures : study.structures)
-    if (structures.file == taken) files.structures.push_back(structures);
+  if (result.structure_set_uid.empty()) return files;
+  const auto registered =
+      std::ranges::find(study.structures, result.structure_set_uid, &StudyFiles::Structures::sop_instance_uid);
+  expect_found(registered != study.structures.end(), "structure set", result.structure_set_uid);
+  files.structures.push_back(*registered);
   return files;
 }
 

@@ -20,12 +20,14 @@ std::string without_reason(const std::string& message) {
 }
 
 // Nobody knows what the name of a folder tells.
-void replace_in(std::vector<std::string>& messages, const Pseudonyms& pseudonyms) {
-  for (std::string& message : messages) {
-    message = without_reason(pseudonyms.in(message));
-    if (message.find('/') != std::string::npos || message.find(".dcm") != std::string::npos)
-      message = "a message that names a file";
-  }
+void replace_in(std::string& message, const Pseudonyms& pseudonyms) {
+  message = without_reason(pseudonyms.in(message));
+  if (message.find('/') != std::string::npos || message.find(".dcm") != std::string::npos)
+    message = "a message that names a file";
+}
+
+void replace_in(Finding& finding, const Pseudonyms& pseudonyms) {
+  for (std::string* text : {&finding.view, &finding.subject, &finding.words}) replace_in(*text, pseudonyms);
 }
 
 void replace_name(std::string& name, const char* kind, Pseudonyms& pseudonyms) {
@@ -84,10 +86,9 @@ void replace_in(SiteRules& site, Pseudonyms& pseudonyms) {
 
 SetupResult deidentified(SetupResult result, Pseudonyms& pseudonyms) {
   result.identity = deidentified(result.identity, pseudonyms);
-  for (std::string* uid : {&result.ct_series_uid, &result.plan_uid, &result.spatial_registration_uid})
+  for (std::string* uid : {&result.ct_series_uid, &result.ct_frame_uid, &result.structure_set_uid, &result.plan_uid,
+                           &result.spatial_registration_uid})
     replace_uid(*uid, pseudonyms);
-  if (result.ct_frame_uid) replace_uid(*result.ct_frame_uid, pseudonyms);
-  if (result.structure_set_uid) replace_uid(*result.structure_set_uid, pseudonyms);
   for (SetupResult::View& view : result.views) replace_in(view, pseudonyms);
   replace_name(result.plan_label, "Plan", pseudonyms);
   result.made_on = pseudonyms.date(result.made_on);
@@ -105,8 +106,9 @@ SetupResult deidentified(SetupResult result, Pseudonyms& pseudonyms) {
   }
   for (Alternative& alternative : result.alternatives) alternative.description = pseudonyms.in(alternative.description);
   for (StructureMotion& structure : result.structures) replace_structure(structure.name, pseudonyms);
-  for (std::vector<std::string>* messages : {&result.region, &result.reasons, &result.overrides, &result.warnings})
-    replace_in(*messages, pseudonyms);
+  for (Finding& finding : result.findings) replace_in(finding, pseudonyms);
+  for (std::vector<std::string>* messages : {&result.region, &result.overrides, &result.warnings})
+    for (std::string& message : *messages) replace_in(message, pseudonyms);
   result.left_aside.clear();
   return result;
 }

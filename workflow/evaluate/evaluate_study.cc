@@ -14,7 +14,7 @@
 #include "base/version.h"
 #include "geometry/rotation.h"
 #include "geometry/target_error.h"
-#include "registration/quality/judge.h"
+#include "registration/quality/findings.h"
 #include "setup/couch_shift.h"
 #include "workflow/evaluate/compared_bodies.h"
 #include "workflow/register/same_setup.h"
@@ -171,8 +171,8 @@ EvaluatedRun evaluated(int number, const StartPose& start, const EvaluateOptions
         registration.from(start.setup_error * study.planned_room_from_patient, images, nobody, seed);
     add_errors(result, options.truth, study, target, run);
     run.bodies = compared_bodies(result.bodies, options.body_truths, options.truth, study.planned_room_from_patient);
-    run.verdict = result.verdict;
-    run.reasons = joined(result.reasons);
+    run.verdict = result.verdict();
+    run.reasons = joined(result.reasons());
     run.evaluations = result.evaluations();
     run.seconds = result.seconds;
     run.seconds_rendering = result.seconds_rendering;

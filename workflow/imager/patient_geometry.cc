@@ -16,7 +16,7 @@ namespace {
 // Why a result tells nothing of its imagers; empty: it does.
 std::string why_left_out(const SetupResult& result) {
   const auto any_lacks = [&](const auto& has) { return !std::ranges::all_of(result.views, has); };
-  if (result.verdict == Verdict::kRejected) return "rejected";
+  if (result.verdict() == Verdict::kRejected) return "rejected";
   if (result.views.size() < 2) return "of a single view";
   if (result.translation_only) return "without rotations";
   if (!result.is_searched) return "set by hand, not searched";

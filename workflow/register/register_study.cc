@@ -7,10 +7,10 @@
 #include <utility>
 
 #include "base/json_file.h"
-#include "base/option_name.h"
 #include "base/output_folder.h"
 #include "base/stopwatch.h"
 #include "io/report/result_folder.h"
+#include "registration/quality/limits.h"
 #include "setup/couch_shift.h"
 #include "workflow/register/same_setup.h"
 #include "workflow/register/setup_result_of.h"
@@ -23,7 +23,8 @@ namespace {
 // Accepted results are written; those for review, and those with a direction that nobody measured, only on request.
 bool may_write_registration(const RegisterOptions& options, const SetupResult& result) {
   if (!result.unobservable_room.empty() && !options.accept_unobservable) return false;
-  return result.verdict == Verdict::kAccepted || (result.verdict == Verdict::kReview && options.write_reg_for_review);
+  return result.verdict() == Verdict::kAccepted ||
+         (result.verdict() == Verdict::kReview && options.write_reg_for_review);
 }
 
 // The pose that is written: the setup error along a direction that no view measured is taken as 0, and is an override.
@@ -39,25 +40,20 @@ Eigen::Isometry3d written_pose(const Study& study, const SetupResult& result, No
 SpatialRegistrationOptions registration_options(RegistrationSource source, const SetupResult& result) {
   if (!result.is_searched)
     return {.content_label = kLabelOfHand, .content_description = kHandDescription, .source = source};
-  if (result.verdict == Verdict::kAccepted) return {.source = source};
+  if (result.verdict() == Verdict::kAccepted) return {.source = source};
   return {.content_label = kLabelOfReview, .content_description = kReviewDescription, .source = source};
 }
 
-// A patient turned by more than a couch corrects may lie right, but an angle in a file on a wrong scale looks the same
-// (couch 354 for 6 turns the answer by 12 degrees). A site whose action level has a rotation decides by that.
+// A patient turned by more than a couch corrects may lie right, but an angle in a file on a wrong scale looks the same.
+// A site whose action level has a rotation decides by that.
 void doubt_large_rotation(SetupResult& result) {
-  constexpr double kMostDeg = 5.0;
   const ZxyAngles turn = couch_shift_for(result.setup_error, result.table).change;
   for (const auto& [name, angle_rad] : {std::pair("yaw", turn.z_rad), {"pitch", turn.x_rad}, {"roll", turn.y_rad}})
-    if (std::abs(deg_from_rad(angle_rad)) > kMostDeg)
-      result.demote(
-          Verdict::kReview,
-          fmt::format("the couch would have to turn by {:.1f} degrees ({}), more than {:.0f} degrees about one "
-                      "axis: the patient may lie otherwise than planned, or an angle in a file may be on "
-                      "another scale. Look at both; an action level with rotation_deg in a site file ({}) says from "
-                      "which rotation "
-                      "to act",
-                      deg_from_rad(angle_rad), name, kMostDeg, option("site", "FILE")));
+    if (std::abs(deg_from_rad(angle_rad)) > limits::kMostRotationDeg)
+      result.findings.push_back(
+          {.check = Check::kLargeRotation,
+           .subject = name,
+           .measures = {{.value = deg_from_rad(angle_rad), .limit = limits::kMostRotationDeg, .unit = "deg"}}});
 }
 
 }  // namespace

@@ -55,7 +55,7 @@ RegistrationMessage answer_to(const std::string& line, const OptionsFrom& option
                                       std::max(1U, cores / static_cast<unsigned>(order.at_a_time)));
     Observer nobody;  // all is in the result
     ProgressTeller teller(parent);
-    const Verdict verdict = register_study(options, shared, order.tells_progress ? teller : nobody).verdict;
+    const Verdict verdict = register_study(options, shared, order.tells_progress ? teller : nobody).verdict();
     return Ended{.verdict = verdict, .files = sha256_of_folder(order.output)};
   } catch (const WriteError& error) {
     return Failed{.why = error.what(), .is_of_disk = true};

@@ -21,7 +21,7 @@ void add_words(const std::string& words, Objection& to) {
 
 void Objections::add_result(const std::string& session, const SetupResult& result, bool is_regrouped) {
   OfPatient& patient = patients_[result.identity.patient_id];
-  if (is_regrouped) patient.regrouped[session] = result.reasons;
+  if (is_regrouped) patient.regrouped[session] = result.reasons();
   patient.is_news = true;
   std::set<Xray>& own = patient.results[session];
   for (const SetupResult::View& view : result.views) {

@@ -36,7 +36,7 @@ void SessionList::add(const std::string& session, const SetupResult& report, con
     held += " for a person: " + reason_for_person;
   ListedSession added{.name = session,
                       .patient = fmt::format("{} ({})", report.identity.patient_name, report.identity.patient_id),
-                      .verdict = std::string(to_string(report.verdict)),
+                      .verdict = std::string(to_string(report.verdict())),
                       .action = std::string(to_string(shown_shift(report).decision.action)),
                       .patient_key = isoshift::patient_key(report.identity),
                       .held = std::move(held),

@@ -34,7 +34,7 @@ Trend::Result result_of(const ResultsTree& tree, ListedSession session) {
     result.plan = found.plan_label;
     result.components = shown_components(shown);
     if (found.site) result.level = found.site->level;
-    result.left_out = why_it_does_not_stand(tree, name, found.verdict);
+    result.left_out = why_it_does_not_stand(tree, name, found.verdict());
     if (!result.left_out.empty()) return result;
     if (!complete_components(shown)) result.left_out = "not all of its components are known";
     if (result.session.first.empty()) result.left_out = "the time of its X-rays is not known";

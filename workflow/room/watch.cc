@@ -232,12 +232,12 @@ void Watch::take_result(const std::string& session, const std::optional<Running>
   for (const auto& view : report.views) xrays.insert(view.sop_instance_uid);
   grouping_.add_result(session, xrays);
   changes_.add_result(session, report.identity.patient_id);
-  const std::string obstacle = obstacle_to_release(tree_, session, report.verdict);
+  const std::string obstacle = obstacle_to_release(tree_, session, report.verdict());
   const std::string reason = reason_for_person(session, report, made);
   index_.add(session, report, obstacle, reason);
   objections_.add_result(session, report, grouping_.is_regrouped(session));
-  if (made) parts_.observer.say(fmt::format("session {}: {}", session, to_string(report.verdict)));
-  if (made && watch_.site.automatic_release && report.verdict == Verdict::kAccepted && obstacle.empty() &&
+  if (made) parts_.observer.say(fmt::format("session {}: {}", session, to_string(report.verdict())));
+  if (made && watch_.site.automatic_release && report.verdict() == Verdict::kAccepted && obstacle.empty() &&
       reason.empty())
     accepted_[session] = made->patient_id;
 }
@@ -245,7 +245,7 @@ void Watch::take_result(const std::string& session, const std::optional<Running>
 // Why the site's rule does not release an accepted result. Empty: it may, or there is no such rule.
 std::string Watch::reason_for_person(const std::string& session, const SetupResult& result,
                                      const std::optional<Running>& made) const {
-  if (!watch_.site.automatic_release || result.verdict != Verdict::kAccepted) return "";
+  if (!watch_.site.automatic_release || result.verdict() != Verdict::kAccepted) return "";
   if (!result.site || result.site->sha256 != watch_.site.sha256) return "it was made under another site file";
   if (name_of_xrays(session) != session)
     return made ? "its X-rays were registered before, from other files" : "a person has made it by hand";

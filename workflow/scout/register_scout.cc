@@ -14,9 +14,7 @@
 #include "io/study/session.h"
 #include "io/study/study_files.h"
 #include "registration/evaluate.h"
-#include "registration/pose_parameters.h"
 #include "registration/presets.h"
-#include "registration/quality/judge.h"
 #include "registration/region.h"
 #include "workflow/scout/scout_picture.h"
 
@@ -70,7 +68,8 @@ CtSeries read_ct(const ScoutRequest& request, Notes& notes, Observer& observer) 
 }
 
 void check_same_patient(const CtSeries& ct, const Scout& scout, const ScoutRequest& request, Notes& notes) {
-  std::vector<Finding> findings = patient_findings({&ct.identity, "the CT"}, {&scout.identity, request.scout.string()});
+  std::vector<FailedCheck> findings =
+      patient_findings({&ct.identity, "the CT"}, {&scout.identity, request.scout.string()});
   if (scout.frame_of_reference_uid != ct.frame_of_reference_uid)
     findings.push_back(
         {"for-mismatch", fmt::format("{}: {} is not that of the CT, so nothing says where the scout lies",
@@ -149,18 +148,6 @@ class ScoutScene {
                          {planned_, found.actual_room_from_patient}, ct_corners_patient_mm_);
   }
 
-  // The rules of every registration, for what a single view can tell.
-  void judge_what_is_seen(const std::array<ScoutAxis, 6>& axes, RegistrationResult& found) const {
-    found.unobservable_room.clear();
-    for (StageReport& stage : found.stages) stage.spread_mm = stage.spread_rad = std::nullopt;
-    for (Eigen::Index axis = 0; axis < 6 && found.uncertainty; ++axis)
-      if (!axes[static_cast<std::size_t>(axis)].is_seen) {
-        found.uncertainty->covariance.row(axis).setZero();
-        found.uncertainty->covariance.col(axis).setZero();
-      }
-    judge(parameters_from_setup_error(offset_of(found)), options_, found);
-  }
-
  private:
   const Scout& scout_;
   Vector3d center_;
@@ -197,53 +184,58 @@ std::size_t axis_of_rays(const XrayView& view) {
   return static_cast<std::size_t>(axis);
 }
 
-// The room's axes are here the patient's, and are called so.
-std::string in_axes_of_the_patient(std::string reason) {
-  constexpr std::array<std::string_view, 6> kOfRoom = {"x translation",    "y translation",    "z translation",
-                                                       "rotation about x", "rotation about y", "rotation about z"};
-  for (std::size_t n = 0; n < kOfRoom.size(); ++n)
-    if (const std::size_t at = reason.find(kOfRoom[n]); at != std::string::npos)
-      reason.replace(at, kOfRoom[n].size(), kAxisNames[n]);
-  return reason;
+// What is found of every registration and holds for a single view, which does not see depth and has axes of its own to
+// judge (check_axes()). The room's axes are here the patient's, and are called so.
+std::vector<Finding> that_hold_for_one_view(std::vector<Finding> findings) {
+  constexpr std::array kOfSeveralViews = {Check::kUnobservable, Check::kStartsEndApart, Check::kUncertainTarget,
+                                          Check::kUncertainAxis};
+  std::erase_if(findings, [&](const Finding& finding) {
+    return std::ranges::find(kOfSeveralViews, finding.check) != kOfSeveralViews.end();
+  });
+  for (Finding& finding : findings)
+    for (std::size_t n = 0; n < kAxisNames.size(); ++n)
+      if (finding.subject == axis_of_room(n)) finding.subject = kAxisNames[n];
+  return findings;
 }
 
 // What one view must tell, and tell alike from every start. Of a rejected result no number is shown, and where the
 // images do not determine the pose, the verdict says so already.
-void judge_axes(const ScoutRegistration& scout, std::size_t along_rays, double sad_mm, RegistrationResult& found) {
-  if (!found.uncertainty || found.verdict == Verdict::kRejected) return;
+void check_axes(const ScoutRegistration& scout, std::size_t along_rays, double sad_mm, RegistrationResult& found) {
+  if (!found.uncertainty || found.verdict() == Verdict::kRejected) return;
   for (std::size_t n = 0; n < scout.axes.size(); ++n) {
     const ScoutAxis& axis = scout.axes[n];
     const bool must_be_seen = n < 3 ? n != along_rays : n == along_rays + 3;
-    const auto shown = [n](double value) { return n < 3 ? value : deg_from_rad(value); };
-    const char* unit = n < 3 ? "mm" : "degrees";
+    const auto against_limit = [n](double value) {
+      return n < 3 ? Measure{.value = value, .limit = kSeenMm, .unit = "mm"}
+                   : Measure{.value = deg_from_rad(value), .limit = deg_from_rad(kSeenRad), .unit = "deg"};
+    };
     if (must_be_seen && !axis.is_seen)
-      found.demote(Verdict::kReview, fmt::format("the {} is uncertain: {:.1f} {} at two sigma", kAxisNames[n],
-                                                 2.0 * shown(axis.sigma), unit));
+      found.findings.push_back(
+          {.check = Check::kUncertainAxis, .subject = kAxisNames[n], .measures = {against_limit(2.0 * axis.sigma)}});
     if (axis.is_seen && !(axis.repeatability <= (n < 3 ? kSeenMm : kSeenRad)))
-      found.demote(Verdict::kReview, fmt::format("from another start the {} ends {:.1f} {} away", kAxisNames[n],
-                                                 shown(axis.repeatability), unit));
+      found.findings.push_back({.check = Check::kOtherStartsEndApart,
+                                .subject = kAxisNames[n],
+                                .measures = {against_limit(axis.repeatability)}});
   }
   if (!(std::abs(scout.width - 1.0) <= kMostWidth))
-    found.demote(
-        Verdict::kReview,
-        fmt::format("across the table the scout shows the CT {:.3f} times as wide as spacing and distances "
-                    "say: one of them may be wrong, or the plane of the image is not that of the gantry's axis",
-                    scout.width));
+    found.findings.push_back(
+        {.check = Check::kScoutWidth, .measures = {{.value = scout.width, .limit = 1.0 + kMostWidth, .unit = ""}}});
   const ScoutAxis& about_table = scout.axes[5];
   if (!(std::abs(about_table.offset) <= std::max(kMostAboutTable, 2.0 * about_table.sigma)))
-    found.demote(Verdict::kReview,
-                 fmt::format("the patient would have turned by {:.1f} degrees about the table's direction; a central "
-                             "ray {:.0f} mm beside the middle of the rows looks the same: has the scout been cut?",
-                             deg_from_rad(about_table.offset), sad_mm * std::abs(std::tan(about_table.offset))));
+    found.findings.push_back(
+        {.check = Check::kScoutTurned,
+         .measures = {
+             {.value = deg_from_rad(about_table.offset), .limit = deg_from_rad(kMostAboutTable), .unit = "deg"},
+             {.value = sad_mm * std::abs(std::tan(about_table.offset)), .unit = "mm"}}});
 }
 
-void judge_side(const ScoutRegistration& scout, TubeSide other, RegistrationResult& found) {
+void check_side(const ScoutRegistration& scout, TubeSide other, RegistrationResult& found) {
   if (!(1.0 - scout.match_from_other_side >= kSideMargin * (1.0 - scout.match) &&
         scout.match >= scout.match_from_other_side + kSideNoise))
-    found.demote(Verdict::kReview,
-                 fmt::format("with the tube on the {} side the scout matches {} ({:.3f}; on the {} side {:.3f})",
-                             to_string(other), scout.match < scout.match_from_other_side ? "better" : "as well",
-                             scout.match_from_other_side, to_string(scout.tube), scout.match));
+    found.findings.push_back(
+        {.check = Check::kTubeSide,
+         .subject = std::string(to_string(other)),
+         .measures = {{.value = scout.match_from_other_side, .unit = ""}, {.value = scout.match, .unit = ""}}});
 }
 
 // From displaced starts.
@@ -294,13 +286,12 @@ ScoutRegistration register_scout(const ScoutRequest& request, Observer& observer
   const double farther_mm = depth.offset * image.view.central_direction_room()[static_cast<Eigen::Index>(along_rays)];
   result.width = scout.sad_mm / (scout.sad_mm + farther_mm);
   result.width_sigma = depth.sigma / scout.sad_mm;
-  scene.judge_what_is_seen(result.axes, answer);
-  judge_side(result, sides[1 - chosen], answer);
+  answer.findings = that_hold_for_one_view(std::move(answer.findings));
+  check_side(result, sides[1 - chosen], answer);
   measure_repeatability(scene, image, answer, request.seed, observer, result);
-  judge_axes(result, along_rays, scout.sad_mm, answer);
-  result.verdict = answer.verdict;
-  result.reasons.reserve(answer.reasons.size());
-  for (const std::string& reason : answer.reasons) result.reasons.push_back(in_axes_of_the_patient(reason));
+  check_axes(result, along_rays, scout.sad_mm, answer);
+  result.verdict = answer.verdict();
+  result.reasons = answer.reasons();
   result.center_patient_mm = scene.center_patient_mm();
   result.renderer = answer.renderer;
   result.device = answer.device;

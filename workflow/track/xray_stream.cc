@@ -19,7 +19,7 @@ std::optional<TimedXray> XrayStream::checked(RtImage header) const {
   if (request_.machine) header = with_machine(header, *request_.machine, request_.switches, said);
   header = with_switches(header, request_.switches, said);
   if (!header.patient_position) header.patient_position = std::string(to_string(study_.patient_position));
-  std::vector<Finding> findings = rt_image_findings(header);
+  std::vector<FailedCheck> findings = rt_image_findings(header);
   std::ranges::move(patient_findings({&study_.ct->identity, "the CT"}, {&header.identity, where}),
                     std::back_inserter(findings));
   std::ranges::move(table_findings(header, study_.rt_images.front()), std::back_inserter(findings));

@@ -408,8 +408,8 @@ TEST(Report, TheFirstPageSaysWhatMovedAndALaterOneHasTheTable) {
 TEST(Report, FirstPageHoldsAllThatIsSigned) {
   SetupResult report = oblique_report(Verdict::kReview);
   report.site = small_couch();
-  report.reasons =
-      std::vector<std::string>(12, "a reason that is told at some length, as reasons are, to fill the page");
+  report.findings.assign(
+      12, {.check = Check::kFiles, .words = "a reason that is told at some length, as reasons are, to fill the page"});
   for (int n = 0; n < 5; ++n) report.views.push_back(view_with_picture(fmt::format("VIEW {}", n)));
   report.warnings = std::vector<std::string>(80, "a warning");
   const std::string first = text_of_pdf(report, 1), all = text_of_pdf(report);

@@ -98,31 +98,34 @@ TEST_F(ResultFolderTest, WhatBodiesDidIsReadBack) {
 }
 
 // The sigma of a point far from the isocenter depends on how errors of translation and rotation go together.
-TEST_F(ResultFolderTest, TheCovarianceIsReadBackAndOlderResultsHaveSigmas) {
+TEST_F(ResultFolderTest, TheCovarianceIsReadBack) {
   SetupResult report = bent_report(Verdict::kAccepted);
   Eigen::Matrix<double, 6, 6> root = Eigen::Matrix<double, 6, 6>::Identity() * 0.1;
   root.bottomRows<3>() *= 0.01;
   root(0, 4) = -0.05;
   report.uncertainty = Uncertainty{.covariance = root * root.transpose()};
-  auto json = nlohmann::json::parse(json_report(report));
-  const SetupResult read = report_from_json(json.dump(), "result.json");
+  const SetupResult read = report_from_json(json_report(report), "result.json");
   EXPECT_EQ(read.uncertainty->covariance, report.uncertainty->covariance);
-  json["uncertainty"].erase("covariance");
-  const SetupResult older = report_from_json(json.dump(), "result.json");
-  EXPECT_LT((older.uncertainty->sigma_translation_mm() - report.uncertainty->sigma_translation_mm()).norm(), 1e-12);
-  EXPECT_LT((older.uncertainty->sigma_rotation_rad() - report.uncertainty->sigma_rotation_rad()).norm(), 1e-12);
 }
 
-TEST_F(ResultFolderTest, ResultsWithoutBodiesAreThoseOfTheWholePatient) {
-  auto json = nlohmann::json::parse(json_report(bent_report(Verdict::kAccepted)));
-  json.erase("bodies");
-  json["target"].erase("deformation_mm");
+// Of a finding everything is read back, and its words are those that were written.
+TEST_F(ResultFolderTest, FindingsAreReadBack) {
+  SetupResult report = bent_report(Verdict::kAccepted);
+  report.findings = {
+      {.check = Check::kPullsThePose,
+       .view = "KV_45",
+       .measures = {{.value = 1.4, .limit = 1.0, .unit = "mm"}, {.value = 0.1, .limit = 1.0, .unit = "deg"}}},
+      {.check = Check::kMatch,
+       .consequence = Verdict::kRejected,
+       .measures = {{.value = std::numeric_limits<double>::quiet_NaN(), .limit = 0.5}}},
+      {.check = Check::kFiles, .words = "the CT lacks slices"}};
+  const auto json = nlohmann::json::parse(json_report(report));
+  EXPECT_EQ(json["findings"][0]["check"], "pulls_the_pose");
+  EXPECT_TRUE(json["findings"][1]["measures"][0]["value"].is_null());
   const SetupResult read = report_from_json(json.dump(), "result.json");
-  EXPECT_TRUE(read.bodies.empty());
-  const auto again = nlohmann::json::parse(json_report(read));
-  EXPECT_TRUE(again["bodies"].is_array());
-  EXPECT_TRUE(again["bodies"].empty());
-  EXPECT_TRUE(again["target"]["deformation_mm"].is_null());
+  EXPECT_EQ(read.verdict(), Verdict::kRejected);
+  EXPECT_EQ(read.reasons(), report.reasons());
+  EXPECT_EQ(nlohmann::json::parse(json_report(read))["findings"], json["findings"]);
 }
 
 // What is not a number is written as null; the body is then not determined.
@@ -155,11 +158,13 @@ TEST_F(ResultFolderTest, AShiftThatWasChangedByHandIsRefused) {
   scaled["setup_error"]["rotation_matrix"][0] = {2, 0, 0};
   EXPECT_THAT([&] { report_from_json(scaled.dump(), "result.json"); },
               ThrowsMessage<Error>(HasSubstr("result.json: setup_error: rotation_matrix is no rotation")));
-  auto judged = json;
+  auto judged = nlohmann::json::parse(json_report(bent_report(Verdict::kReview))), found = judged;
   judged["verdict"] = "fine";
-  EXPECT_THAT(
-      [&] { report_from_json(judged.dump(), "result.json"); },
-      ThrowsMessage<Error>(HasSubstr("result.json: verdict is \"fine\", expected accepted, review or rejected")));
+  EXPECT_THAT([&] { report_from_json(judged.dump(), "result.json"); },
+              ThrowsMessage<Error>(HasSubstr("result.json: verdict is \"fine\", but findings make it \"review\"")));
+  found["findings"][0]["consequence"] = "accepted";
+  EXPECT_THAT([&] { report_from_json(found.dump(), "result.json"); },
+              ThrowsMessage<Error>(HasSubstr("findings: consequence is \"accepted\", expected review or rejected")));
 }
 
 // What is said twice is compared: both fields are named.
@@ -181,14 +186,14 @@ TEST_F(ResultFolderTest, AResultThatContradictsItselfIsRefused) {
   const auto json = nlohmann::json::parse(json_report(report));
   ASSERT_NO_THROW(report_from_json(json.dump(), "result.json"));
   const std::vector<std::tuple<const char*, nlohmann::json, const char*, const char*>> edits = {
-      {"/reasons", {"the views disagree"}, "verdict", "reasons"},
-      {"/verdict", "review", "verdict", "reasons"},
+      {"/reasons", {"the views disagree"}, "reasons holds 1", "findings holds 0"},
+      {"/verdict", "review", "verdict", "findings"},
       {"/searched", false, "searched", "stages"},
       {"/views/0/pixel_mm", 0.5, "views/0/pixel_mm", "views/0/pixel_from_room"},
       {"/views/0/sid_mm", 1800.0, "views/0/sid_mm", "views/0/pixel_from_room"},
       {"/views/0/similarity_final", 7, "views/0/similarity_final is 7", "between -1 and 1"},
       {"/alternatives/0/similarity", 7, "alternatives/0/similarity", "between -1 and 1"},
-      {"/verdict", "rejected", "", "setup_error"},
+      {"/verdict", "rejected", "verdict", "findings"},
       {"/uncertainty/translation_mm/1", 2.0, "uncertainty/translation_mm/1", "uncertainty/covariance"},
       {"/uncertainty/covariance/1/1", 0.0004, "target/sigma_mm", "uncertainty/covariance"},
       {"/uncertainty/covariance/1/0", 0.1, "uncertainty/covariance", "not symmetric"},
@@ -230,8 +235,8 @@ TEST_F(ResultFolderTest, OneXrayIsNoTwoViewsAndAReasonSaysSomething) {
   EXPECT_THAT(error_of(report), HasSubstr("views/1/sop_instance_uid is that of an earlier view"));
   report.views[1].frame = 2;
   EXPECT_EQ(error_of(report), "");
-  report.reasons = {""};
-  EXPECT_THAT(error_of(report), HasSubstr("reasons holds an empty text"));
+  report.findings.front().words.clear();
+  EXPECT_THAT(error_of(report), HasSubstr("findings holds one that says nothing"));
 }
 
 TEST_F(ResultFolderTest, ThePdfIsADicomObjectToo) {

@@ -7,6 +7,7 @@
 #include "registration/presets.h"
 #include "tests/drr/test_views.h"
 #include "tests/support/bent_scene.h"
+#include "tests/support/findings.h"
 
 namespace isoshift::register_bodies_test {
 namespace {
@@ -80,7 +81,7 @@ TEST(RegisterBodies, AnotherPatientIsNotAccepted) {
   // Where the CT shows vertebrae 1 to 3, the X-rays show 4 to 6 of another column.
   const BentScene other = bent_column(std::vector<MovedGroup>(6, {.translation_mm = {0.0, -54.0, 0.0}}));
   const RegistrationResult result = registered(scene, other.images, preset("setup"));
-  EXPECT_NE(result.verdict, Verdict::kAccepted);
+  EXPECT_NE(result.verdict(), Verdict::kAccepted);
 }
 
 TEST(RegisterBodies, WithoutBoneNearTheTargetTheWholeAnswersForReview) {
@@ -92,9 +93,9 @@ TEST(RegisterBodies, WithoutBoneNearTheTargetTheWholeAnswersForReview) {
   register_bodies(patient_of(scene, 25.0F), scene.images, scene.planned, options, result);
   EXPECT_EQ(result.actual_room_from_patient.matrix(), whole.actual_room_from_patient.matrix());
   EXPECT_TRUE(result.bodies.empty());
-  EXPECT_NE(result.verdict, Verdict::kAccepted);
-  ASSERT_FALSE(result.reasons.empty());
-  EXPECT_NE(result.reasons.back().find("no bone"), std::string::npos) << result.reasons.back();
+  EXPECT_NE(result.verdict(), Verdict::kAccepted);
+  ASSERT_FALSE(result.findings.empty());
+  EXPECT_EQ(result.findings.back().check, Check::kNoBone);
 }
 
 // A whole with a view whose parts near the isocenter have a signal.
@@ -103,7 +104,7 @@ struct SeenWhole {
   RegistrationResult result;
 
   SeenWhole() {
-    result.verdict = Verdict::kAccepted;
+    result.findings.clear();
     result.views.resize(1);
     for (const double x : {80.0, 100.0, 120.0})
       result.views[0].consistency.parts.push_back({.center_px = {x, 100.0}, .has_signal = true});
@@ -120,7 +121,7 @@ TEST(RegisterBodies, ATargetThatMovedFarIsNotWhereTheWholePutsIt) {
   const auto may_lie_elsewhere = [&](const BentScene& scene) {
     const RendererPyramid renderers(RendererKind::kCpu, scene.ct, {}, std::array{Beam::kKilovoltage});
     RegistrationResult whole;
-    whole.verdict = Verdict::kAccepted;
+    whole.findings.clear();
     whole.actual_room_from_patient = scene.truth[0] * scene.planned;
     return may_target_lie_elsewhere(renderers, scene.images, options, whole);
   };
@@ -134,9 +135,9 @@ TEST(RegisterBodies, OnlyPatientsWhoNeedAReviewMayHaveBent) {
   SeenWhole whole;
   RegistrationOptions options = preset("setup");
   EXPECT_FALSE(whole.may_have_bent(options)) << "accepted";
-  whole.result.verdict = Verdict::kRejected;
+  whole.result.findings = findings_for(Verdict::kRejected);
   EXPECT_FALSE(whole.may_have_bent(options));
-  whole.result.verdict = Verdict::kReview;
+  whole.result.findings = findings_for(Verdict::kReview);
   EXPECT_TRUE(whole.may_have_bent(options));
   EXPECT_FALSE(whole.may_have_bent(preset("fast"))) << "it leaves out the checks";
   options.dof = Dof::kTranslation;

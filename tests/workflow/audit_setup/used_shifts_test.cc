@@ -1,6 +1,7 @@
 // The table of used shifts, registration objects in its place, and the archive that they are compared with.
 
 #include "workflow/audit_setup/used_shifts.h"
+#include "tests/support/findings.h"
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
@@ -85,8 +86,7 @@ TEST_F(AuditArchive, NamesFoldersOfOneNameWithThoseAboveThem) {
 // What follows a session that does not count may show what its couch shift has left.
 TEST_F(AuditArchive, TheFirstOfADayIsTheFirstThatWasImaged) {
   SetupResult review = example("1.1", "2026-03-01 09:00:00");
-  review.verdict = Verdict::kReview;
-  review.reasons = {"the target's surroundings match poorly"};
+  review.findings = findings_for(Verdict::kReview, "the target's surroundings match poorly");
   write("reviewed", review);
   write("after", example("1.2", "2026-03-01 09:06:00"));
   write("next-day", example("1.3", "2026-03-02 09:00:00"));
@@ -103,8 +103,7 @@ TEST_F(AuditArchive, CountsTheLastResultOfTheSameXraysAndWhatWasAccepted) {
   write("a", first);
   write("a-2", again);
   SetupResult review = example("1.2", "2026-03-02 10:00:00");
-  review.verdict = Verdict::kReview;
-  review.reasons = {"the target's surroundings match poorly"};
+  review.findings = findings_for(Verdict::kReview, "the target's surroundings match poorly");
   write("b", review);
   write("c", example("1.3", ""));
   fs::create_directories(archive() / "d");

@@ -1,4 +1,5 @@
 #include "workflow/room/session_index.h"
+#include "tests/support/findings.h"
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
@@ -23,7 +24,7 @@ class SessionIndexTest : public testing::Test {
   void add(const std::string& session, const std::string& acquired, Verdict verdict = Verdict::kAccepted,
            const std::string& obstacle = "") {
     SetupResult report;
-    report.verdict = verdict;
+    report.findings = findings_for(verdict);
     report.identity.patient_name = "Doe^Jane";
     report.identity.patient_id = "7";
     report.views.emplace_back().acquired = acquired;

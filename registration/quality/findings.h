@@ -2,6 +2,7 @@
 // Whether the numbers of a registration can be trusted.
 
 #include <span>
+#include <vector>
 
 #include "registration/register_views.h"
 
@@ -14,8 +15,9 @@ std::vector<Eigen::Vector3d> unobservable_directions(std::span<const XrayView> v
 // Where the pose found puts the target: the isocenter if the options name none.
 Eigen::Vector3d target_found_room_mm(const RegistrationOptions& options, const RegistrationResult& result);
 
-// Sets verdict and reasons from everything else in the result, and from the parameters of the pose found
-// (pose_parameters.h).
-void judge(std::span<const double> parameters, const RegistrationOptions& options, RegistrationResult& result);
+// What speaks against the result, by everything that it holds and by the parameters of the pose found
+// (pose_parameters.h): a function of measurements alone, whose limits are those of limits.h.
+std::vector<Finding> findings_about(std::span<const double> parameters, const RegistrationOptions& options,
+                                    const RegistrationResult& result);
 
 }  // namespace isoshift
