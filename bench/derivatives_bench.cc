@@ -95,7 +95,7 @@ void climb_stage(benchmark::State& state, const char* name, OptimizerKind optimi
       for (int n = 0; n < 5; ++n) benchmark::DoNotOptimize(objective.values(one));
       plain += seconds_since(begin) / 5.0;
       const SearchResult found =
-          search(scene().renderers, views, scene().planned, {.stages = std::span(&stage, 1), .parameters = start});
+          search(scene().renderers, views, scene().planned, {.stages = {stage}, .parameters = start});
       seconds += found.seconds_rendering + found.seconds_similarity;
       evaluations += found.stages.front().evaluations;
       error_mm += distance_between(found.parameters, std::vector<double>(6)).translation_mm;

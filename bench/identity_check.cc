@@ -11,15 +11,15 @@
 #include <iostream>
 #include <limits>
 #include <map>
+#include <memory>
 #include <optional>
 #include <random>
 
 #include "base/error.h"
 #include "bench/scene.h"
-#include "bodies/soft_masks.h"
 #include "geometry/target_error.h"
-#include "registration/bodies/register_bodies.h"
 #include "registration/presets.h"
+#include "registration/target/target_registration.h"
 
 namespace isoshift {
 namespace {
@@ -137,17 +137,13 @@ int check(int patient_count, std::optional<int> only) {
       "best_"
       "alternative,disagreeing,seconds,"
       "err_sigma,reasons\n");
-  RegistrationOptions options = preset("setup");
-  const auto one = [&](const RendererPyramid& renderers, const BentPatient& bent, int ct, int of,
-                       const std::string& what, const std::vector<XrayImage>& xrays) {
+  const auto one = [&](const TargetRegistration& registration, int ct, int of, const std::string& what,
+                       const std::vector<XrayImage>& xrays) {
     Count& count = counts[what];
     ++count.all;
     RegistrationResult result;
     try {
-      const std::vector<FixedImage> images = prepared(xrays);
-      result = register_views(renderers, images, planned, options);
-      if (may_have_bent(options, images, result) || may_target_lie_elsewhere(renderers, images, options, result))
-        register_bodies(bent, images, planned, options, result);
+      result = registration.from(planned, prepared(xrays));
     } catch (const Error& error) {
       fmt::print("{},{},{},error,,,,,,,,,,,,\"{}\"\n", ct, of, what, error.what());
       return;
@@ -188,25 +184,20 @@ int check(int patient_count, std::optional<int> only) {
   };
   for (int ct = 0; ct < patient_count; ++ct) {
     if (only && ct != *only) continue;
-    const Volume<float> hu = ct_of(patients[static_cast<std::size_t>(ct)]);
-    const RendererPyramid renderers(RendererKind::kCpu, hu, {}, std::array{Beam::kKilovoltage});
-    RegionOfInterest all_of_the_ct;
-    all_of_the_ct.cut_ends = beyond_the_ct(hu, AttenuationModel{}.threshold_hu);
-    const ProjectedRegion region(all_of_the_ct);
-    options.region = &region;
-    const BodyMap bodies = find_bodies(hu);
-    const Target target = target_of(bodies);
-    options.target_patient_mm = planned.inverse() * target.center_room_mm;
-    const BentPatient bent(hu, AttenuationModel{}, std::array{Beam::kKilovoltage},
-                           patient_bodies(bodies, soft_masks(bodies), *options.target_patient_mm), target, {});
+    const auto hu = std::make_shared<const Volume<float>>(ct_of(patients[static_cast<std::size_t>(ct)]));
+    const RendererPyramid renderers(RendererKind::kCpu, *hu, {}, std::array{Beam::kKilovoltage});
+    BodyStore bodies;
+    const TargetRegistration registration({.patient = {.ct_hu = hu, .room_from_patient = planned},
+                                           .target = target_of(*bodies.map(hu)),
+                                           .options = preset("setup")},
+                                          renderers, *hu, bodies);
     for (const auto& [what, xrays] : variants(patients[static_cast<std::size_t>(ct)].xrays))
-      one(renderers, bent, ct, ct, what, xrays);
+      one(registration, ct, ct, what, xrays);
     const std::vector<XrayImage>& own = patients[static_cast<std::size_t>(ct)].xrays;
     const std::size_t next = static_cast<std::size_t>((ct + 1) % patient_count);
-    if (patient_count > 1)
-      one(renderers, bent, ct, ct, "lateral of another patient", {own[0], patients[next].xrays[1]});
+    if (patient_count > 1) one(registration, ct, ct, "lateral of another patient", {own[0], patients[next].xrays[1]});
     for (int of = 0; of < patient_count; ++of)
-      if (of != ct) one(renderers, bent, ct, of, "another patient", patients[static_cast<std::size_t>(of)].xrays);
+      if (of != ct) one(registration, ct, of, "another patient", patients[static_cast<std::size_t>(of)].xrays);
   }
   for (const auto& [what, count] : counts)
     std::cerr << fmt::format("{:<24} {:>4} of {:>4} accepted\n", what, count.accepted, count.all);

@@ -94,11 +94,21 @@ std::vector<Stage> paper_stages() {
 }  // namespace
 
 RegistrationOptions preset(std::string_view name) {
-  if (name == "setup") return {.preset = "setup", .stages = setup_stages()};
-  if (name == "fast") return {.preset = "fast", .stages = fast_stages(), .check_alternatives = false};
-  if (name == "paper")
-    return {.preset = "paper", .stages = paper_stages(), .eight_bit_xrays = true, .check_alternatives = false};
-  throw UsageError(fmt::format("there is no preset {}; the presets are {}", name, fmt::join(kPresets, ", ")));
+  RegistrationOptions options;
+  options.preset = name;
+  if (name == "setup") {
+    options.stages = setup_stages();
+  } else if (name == "fast") {
+    options.stages = fast_stages();
+    options.check_alternatives = false;
+  } else if (name == "paper") {
+    options.stages = paper_stages();
+    options.eight_bit_xrays = true;
+    options.check_alternatives = false;
+  } else {
+    throw UsageError(fmt::format("there is no preset {}; the presets are {}", name, fmt::join(kPresets, ", ")));
+  }
+  return options;
 }
 
 }  // namespace isoshift

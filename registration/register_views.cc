@@ -101,13 +101,8 @@ RegistrationResult register_views(const RendererPyramid& renderers, std::span<co
   }
   require_visible(renderers, fixed, start_room_from_patient);
 
-  const SearchOptions search_options{.stages = options.stages,
-                                     .dof = options.dof,
-                                     .bound_mm = options.bound_mm,
-                                     .bound_rad = options.bound_rad,
-                                     .seed = options.seed};
   const SearchResult found =
-      options.is_searched ? search(renderers, fixed, start_room_from_patient, search_options, progress)
+      options.is_searched ? search(renderers, fixed, start_room_from_patient, options, progress)
                           : SearchResult{.parameters = parameters_from_setup_error(Eigen::Isometry3d::Identity())};
   RegistrationResult result;
   result.renderer = to_string(renderers.finest().kind());
@@ -120,12 +115,12 @@ RegistrationResult register_views(const RendererPyramid& renderers, std::span<co
   report_views(renderers, fixed, start_room_from_patient, last, result);
   report_uncertainty(renderers, fixed, options, result);
   if (options.is_searched && options.check_alternatives)
-    result.alternatives = compare_alternatives(renderers, fixed, start_room_from_patient, search_options, found);
+    result.alternatives = compare_alternatives(renderers, fixed, start_room_from_patient, options, found);
   if (options.check_vertebrae)
-    std::ranges::copy(compare_vertebrae(renderers, fixed, start_room_from_patient, search_options, found),
+    std::ranges::copy(compare_vertebrae(renderers, fixed, start_room_from_patient, options, found),
                       std::back_inserter(result.alternatives));
   std::vector<LeftOutView> left_out;
-  if (options.is_searched) left_out = leave_out_views(renderers, fixed, start_room_from_patient, search_options, found);
+  if (options.is_searched) left_out = leave_out_views(renderers, fixed, start_room_from_patient, options, found);
   for (std::size_t view = 0; view < left_out.size(); ++view) result.views[view].left_out = left_out[view];
 
   Contradictions found_alone =

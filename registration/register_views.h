@@ -8,6 +8,7 @@
 #include <Eigen/Geometry>
 #include <cstdint>
 #include <map>
+#include <memory>
 #include <optional>
 #include <span>
 #include <string>
@@ -24,19 +25,14 @@
 
 namespace isoshift {
 
-struct RegistrationOptions {
-  std::string preset;  // what the stages are called
-  std::vector<Stage> stages;
-  Dof dof = Dof::kRigid;
+struct RegistrationOptions : SearchOptions {
+  std::string preset;            // what the stages are called
   bool is_searched = true;       // false: the start itself is judged, and needs a review
-  double bound_mm = 50.0;        // the search box about the start
-  double bound_rad = 0.35;       // the same for rotations, about 20 degrees
-  std::uint64_t seed = 1;        // the only source of randomness: same seed, same pose
   bool eight_bit_xrays = false;  // line integrals of the field in 256 steps, as the founding paper's
   bool check_alternatives = true;
-  bool check_vertebrae = false;             // along the spine; on request, for it takes as long as the registration
-  RectanglesByLabel rectangles;             // of the views with these labels: nothing else of them is compared
-  const ProjectedRegion* region = nullptr;  // borrowed; what of the views is compared. nullptr: all
+  bool check_vertebrae = false;  // along the spine; on request, for it takes as long as the registration
+  RectanglesByLabel rectangles;  // of the views with these labels: nothing else of them is compared
+  std::shared_ptr<const ProjectedRegion> region;  // what of the views is compared; null: all
   // How far errors of the imagers may have put the pose off: as Uncertainty, and added to what the images say.
   std::optional<Uncertainty> by_imagers;
   std::optional<Eigen::Vector3d> target_patient_mm;  // where its place must be certain; nothing: at the isocenter

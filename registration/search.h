@@ -43,11 +43,11 @@ struct Stage {
 };
 
 struct SearchOptions {
-  std::span<const Stage> stages;
+  std::vector<Stage> stages;
   Dof dof = Dof::kRigid;
-  double bound_mm = 50.0;   // the search box
-  double bound_rad = 0.35;  // the same for rotations
-  std::uint64_t seed = 1;
+  double bound_mm = 50.0;          // the search box about the start
+  double bound_rad = 0.35;         // the same for rotations, about 20 degrees
+  std::uint64_t seed = 1;          // the only source of randomness: same seed, same pose
   std::vector<double> parameters;  // where to begin; empty: at no setup error
 };
 

@@ -18,5 +18,14 @@ cmake -S "$source/tests/consumer" -B "$work/build" -G Ninja -DCMAKE_PREFIX_PATH=
   cmake --build "$work/build" >>"$work/log" 2>&1 || { cat "$work/log" >&2; exit 1; }
 cp -r "$source/testdata/small/1" "$work/study"
 rm -r "$work/study/RTIMAGE/F02"
-"$work/build/consumer" "$work/study" "$work/object.dcm"
+"$work/build/consumer" "$work/study" "$work/object.dcm" | tee "$work/found"
+# The library and the program give one answer.
+"$build/cli/isoshift" register "$work/study" -o "$work/result" --renderer cpu >"$work/log"
+/usr/bin/python3 - "$work/result/result.json" "$work/found" <<'END'
+import json, sys
+result, found = json.load(open(sys.argv[1])), open(sys.argv[2]).read().splitlines()
+translation = ", ".join(f"{value:.4f}" for value in result["setup_error"]["known_translation_mm"])
+expected = [f"{result['verdict']} ({translation})", *result["reasons"]]
+sys.exit(0 if found == expected else f"error: the library found {found}, the program {expected}")
+END
 "$build/cli/isoshift" check "$work/object.dcm" --plan "$work/study/RTPLAN.dcm"

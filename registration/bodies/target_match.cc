@@ -235,7 +235,7 @@ std::optional<Vector3d> place_wanted_near_target(const RendererPyramid& renderer
     near.images.push_back(std::move(*part));
   }
   SearchOptions last_stage = options;
-  last_stage.stages = options.stages.last(1);
+  last_stage.stages = {options.stages.back()};
   last_stage.parameters.clear();
   const auto found = search_if_possible(renderers, near, room_from_patient, last_stage);
   if (!found) return std::nullopt;

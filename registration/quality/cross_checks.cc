@@ -32,7 +32,7 @@ std::vector<LeftOutView> leave_out_views(const RendererPyramid& renderers, const
   std::vector<LeftOutView> left_out;
   if (views.images.size() < 3) return left_out;
   SearchOptions last_stage = options;
-  last_stage.stages = options.stages.last(1);
+  last_stage.stages = {options.stages.back()};
   last_stage.parameters = found.parameters;
   for (std::size_t view = 0; view < views.images.size(); ++view) {
     FixedViews others = views;

@@ -22,7 +22,7 @@ RegistrationScene asymmetric_scene() {
 std::map<std::string, Alternative> alternatives_of(const RegistrationScene& scene) {
   const Stage fine = fine_stage();
   std::map<std::string, Alternative> named;
-  const SearchOptions options{.stages = std::span(&fine, 1)};
+  const SearchOptions options{.stages = {fine}};
   const SearchResult found = search(*scene.renderers, scene.views(), scene.planned, options);
   for (const Alternative& alternative :
        compare_alternatives(*scene.renderers, scene.views(), scene.planned, options, found))

@@ -36,7 +36,7 @@ double contradiction_mm(const RegistrationScene& scene, const std::vector<FixedI
   coarse.initial_step_rad = rad_from_deg(2.0);
   coarse.pixel_mm = coarse.voxel_mm = 4.0;
   coarse.similarity = SimilarityKind::kNcc;
-  const std::array stages = {coarse, fine_stage()};
+  const std::vector<Stage> stages = {coarse, fine_stage()};
   const SearchResult found = search(*scene.renderers, views, scene.planned, {.stages = stages});
   const Eigen::Isometry3d pose = setup_error_from_parameters(found.parameters) * scene.planned;
   double squares = 0.0;

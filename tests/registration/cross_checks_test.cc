@@ -21,7 +21,7 @@ SceneOptions three_views(const Vector3d& translation_mm) {
 
 std::vector<LeftOutView> left_out_of(const RegistrationScene& scene) {
   const Stage stage = fine_stage();
-  const SearchOptions options{.stages = std::span(&stage, 1)};
+  const SearchOptions options{.stages = {stage}};
   const SearchResult found = search(*scene.renderers, scene.views(), scene.planned, options);
   return leave_out_views(*scene.renderers, scene.views(), scene.planned, options, found);
 }
@@ -65,7 +65,7 @@ TEST(CompareVertebrae, FindsTheNextOnesOnEitherSide) {
   options.ct_mm = Vector3d(120, 100, 300);
   const RegistrationScene scene = make_scene(options);
   const Stage stage = fine_stage();
-  const SearchOptions search_options{.stages = std::span(&stage, 1)};
+  const SearchOptions search_options{.stages = {stage}};
   const SearchResult found = search(*scene.renderers, scene.views(), scene.planned, search_options);
   const auto alternatives = compare_vertebrae(*scene.renderers, scene.views(), scene.planned, search_options, found);
   ASSERT_EQ(alternatives.size(), 2U);
@@ -83,7 +83,7 @@ TEST(CompareVertebrae, OfABodyWithoutThemIsNothingAsGood) {
   SceneOptions options{.shapes = asymmetric_body()};
   const RegistrationScene scene = make_scene(options);
   const Stage stage = fine_stage();
-  const SearchOptions search_options{.stages = std::span(&stage, 1)};
+  const SearchOptions search_options{.stages = {stage}};
   const SearchResult found = search(*scene.renderers, scene.views(), scene.planned, search_options);
   for (const Alternative& alternative :
        compare_vertebrae(*scene.renderers, scene.views(), scene.planned, search_options, found))

@@ -195,7 +195,7 @@ TEST(Quality, AFieldThatIsNotSureNeedsReview) {
 TEST(Quality, AParameterAtItsBoundNeedsReview) {
   constexpr std::array kNames = {"x translation",    "y translation",    "z translation",
                                  "rotation about x", "rotation about y", "rotation about z"};
-  const RegistrationOptions options{.bound_mm = 20.0, .bound_rad = 0.2};
+  const RegistrationOptions options{{.bound_mm = 20.0, .bound_rad = 0.2}};
   for (std::size_t axis = 0; axis < kInside.size(); ++axis)
     for (const double sign : {-1.0, 1.0}) {
       RegistrationResult result = good_result();
@@ -345,10 +345,10 @@ TEST(Quality, PartsThatDisagreeNeedReview) {
 TEST(Quality, MorePartsMayDisagreeWhereAVolumeIsChosen) {
   RegionOfInterest region{.volume = Volume<std::uint8_t>({4, 4, 4}, Eigen::Affine3d::Identity())};
   region.volume->at(1, 1, 1) = 1;
-  const ProjectedRegion chosen(region);
+  const auto chosen = std::make_shared<const ProjectedRegion>(region);
   RegistrationResult result = good_result();
   result.views[0].consistency = parts(45, 5);
-  result.findings = findings_about(kInside, {.region = &chosen}, result);
+  result.findings = findings_about(kInside, {.region = chosen}, result);
   EXPECT_EQ(result.verdict(), Verdict::kAccepted);
   result.findings = findings_about(kInside, {}, result);
   EXPECT_EQ(result.verdict(), Verdict::kReview);

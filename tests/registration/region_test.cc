@@ -244,11 +244,11 @@ RegistrationScene cut_spine(const Vector3d& ct_mm) {
 }
 
 Eigen::Isometry3d registered(const RegistrationScene& scene) {
-  const ProjectedRegion region(
-      {.volume = {}, .excluded = {}, .cut_ends = beyond_the_ct(scene.ct, AttenuationModel{}.threshold_hu)});
+  const auto region = std::make_shared<const ProjectedRegion>(RegionOfInterest{
+      .volume = {}, .excluded = {}, .cut_ends = beyond_the_ct(scene.ct, AttenuationModel{}.threshold_hu)});
   RegistrationOptions registration = preset("setup");
   registration.check_alternatives = false;
-  registration.region = &region;
+  registration.region = region;
   const auto result = register_views(*scene.renderers, prepared(scene.xrays), scene.planned, registration);
   return setup_error_from_poses(scene.planned, result.actual_room_from_patient);
 }
@@ -271,12 +271,12 @@ TEST(Region, ASmallVolumeIsRegistered) {
   options.placement.translation_mm = Vector3d(2.0, -1.5, 1.0);
   options.placement.rotation_deg = Vector3d(0.5, -0.5, 0.4);
   const RegistrationScene scene = make_scene(options);
-  const ProjectedRegion region(
-      {.volume = mask_of({.center_mm = Vector3d(10.0, 20.0, -20.0), .radius_mm = 18.0}, Vector3d::Ones()),
-       .excluded = {},
-       .cut_ends = {}});
+  const auto region = std::make_shared<const ProjectedRegion>(RegionOfInterest{
+      .volume = mask_of({.center_mm = Vector3d(10.0, 20.0, -20.0), .radius_mm = 18.0}, Vector3d::Ones()),
+      .excluded = {},
+      .cut_ends = {}});
   RegistrationOptions registration = preset("setup");
-  registration.region = &region;
+  registration.region = region;
   const auto result = register_views(*scene.renderers, prepared(scene.xrays), scene.planned, registration);
   EXPECT_THAT(setup_error_from_poses(scene.planned, result.actual_room_from_patient), PoseNear(scene.truth, 1.0, 2.0));
   EXPECT_NE(result.verdict(), Verdict::kAccepted);  // too little to tell whether anatomy moved

@@ -105,9 +105,10 @@ TEST(RegisterViews, OnlyTheRegionOfInterestIsCompared) {
     for (int j = 0; j < ct.size.y(); ++j)
       for (int i = 0; i < ct.size.x(); ++i)
         left.at(i, j, k) = (ct.patient_from_voxel * Eigen::Vector3d(i, j, k)).x() < 30.0 ? 1 : 0;
-  const ProjectedRegion region({.volume = left, .excluded = {}, .cut_ends = {}});
+  const auto region =
+      std::make_shared<const ProjectedRegion>(RegionOfInterest{.volume = left, .excluded = {}, .cut_ends = {}});
   RegistrationOptions options = without_alternatives();
-  options.region = &region;
+  options.region = region;
   const auto result = register_views(*scene.renderers, prepared(scene.xrays), scene.planned, options);
   EXPECT_THAT(setup_error_from_poses(scene.planned, result.actual_room_from_patient), PoseNear(scene.truth, 0.5, 0.4));
 }

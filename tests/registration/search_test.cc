@@ -196,7 +196,7 @@ TEST(Search, WithoutDerivativesAClimbIsBobyqas) {
   const RendererPyramid siddon(RendererKind::kSiddon, scene.ct, {}, std::array{Beam::kKilovoltage});
   const auto end = [&](OptimizerKind optimizer) {
     stage.optimizer = optimizer;
-    return search(siddon, scene.views(), scene.planned, {.stages = std::span(&stage, 1)});
+    return search(siddon, scene.views(), scene.planned, {.stages = {stage}});
   };
   const SearchResult climbed = end(OptimizerKind::kLevenbergMarquardt);
   EXPECT_EQ(climbed.stages[0].optimizer, "bobyqa");

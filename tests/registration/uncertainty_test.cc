@@ -78,8 +78,7 @@ TEST(Uncertainty, SaysHowFarOffNoisyRegistrationsEnd) {
     scene.xrays = xrays_of(small_scene(kPhotons, seed));
     scene.images.clear();
     for (const XrayImage& xray : scene.xrays) scene.images.push_back(prepare(xray));
-    const SearchResult found =
-        search(*scene.renderers, scene.views(), scene.actual(), {.stages = std::span(&stage, 1)});
+    const SearchResult found = search(*scene.renderers, scene.views(), scene.actual(), {.stages = {stage}});
     const Eigen::Isometry3d error = setup_error_from_parameters(found.parameters);
     const Eigen::AngleAxisd turn(error.linear());
     Eigen::Matrix<double, 6, 1> off;

@@ -19,7 +19,6 @@
 #include "workflow/evaluate/compared_bodies.h"
 #include "workflow/register/same_setup.h"
 #include "workflow/register/target_of.h"
-#include "workflow/register/target_registration.h"
 
 namespace isoshift {
 namespace {
@@ -163,12 +162,11 @@ EvaluatedRun evaluated(int number, const StartPose& start, const EvaluateOptions
                    .mpd_mm = kNothing,
                    .mrpd_mm = kNothing,
                    .target_mm = kNothing};
-  Observer nobody;
   try {
     const std::uint64_t seed =
         options.registration.search.seed + (options.has_seed_per_run ? static_cast<std::uint64_t>(number) : 0);
     const RegistrationResult result =
-        registration.from(start.setup_error * study.planned_room_from_patient, images, nobody, seed);
+        registration.from(start.setup_error * study.planned_room_from_patient, images, {}, seed);
     add_errors(result, options.truth, study, target, run);
     run.bodies = compared_bodies(result.bodies, options.body_truths, options.truth, study.planned_room_from_patient);
     run.verdict = result.verdict();
@@ -244,7 +242,8 @@ EvaluationFolder evaluate_loaded(const Study& study, EvaluateOptions options, Ob
   const Surrogate surrogate = surrogate_of(study, choice.target, "", bodies);
   RendererStore renderers;
   const RegistrationSetup setup(options.registration, study, beams_of(study), renderers);
-  const TargetRegistration registration(study, options.registration, setup, choice, surrogate, bodies);
+  const TargetRegistration registration(target_problem(study, options.registration, setup, choice, surrogate),
+                                        setup.renderers(), setup.rendered_ct(), bodies);
   const Json configuration = configuration_of(options, study, setup.renderers().finest(), choice.target);
   if (!options.of_study.empty() && study_in(configuration) != options.of_study)
     throw Error(

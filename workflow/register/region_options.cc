@@ -17,9 +17,6 @@
 namespace isoshift {
 namespace {
 
-// Beyond the compared region the CT is rendered over this distance more, so that its cut surface is seen outside only.
-constexpr double kRenderedBeyondMm = 15.0;
-
 const Structure& structure_of(const Study& study, const std::string& name) {
   if (!study.structures)
     throw Error(fmt::format("structure {}: {} ({} names one)", name, why_no_structures(study.unused_structures),
@@ -31,43 +28,18 @@ Volume<std::uint8_t> mask_in_ct(const Study& study, const std::string& name) {
   return mask_of(structure_of(study, name), study.ct->hu.size, study.ct->hu.patient_from_voxel);
 }
 
-void unite(Volume<std::uint8_t>& mask, const Volume<std::uint8_t>& other) {
-  std::ranges::transform(mask.voxels, other.voxels, mask.voxels.begin(), std::ranges::max);
-}
-
-Volume<std::uint8_t> sphere(const Volume<float>& ct, const Eigen::Vector3d& center_patient_mm, double radius_mm) {
-  Volume<std::uint8_t> mask(ct.size, ct.patient_from_voxel);
-  for (int k = 0; k < ct.size.z(); ++k)
-    for (int j = 0; j < ct.size.y(); ++j)
-      for (int i = 0; i < ct.size.x(); ++i) {
-        const Eigen::Vector3d at_patient_mm = ct.patient_from_voxel * Eigen::Vector3d(i, j, k);
-        mask.at(i, j, k) = (at_patient_mm - center_patient_mm).norm() <= radius_mm ? 1 : 0;
-      }
-  return mask;
-}
-
-// `volume`: what is compared, `rendered`: what of the CT is rendered, and a little around it; unset: all.
-RegionOfStudy region_within(std::optional<Volume<std::uint8_t>> volume,
-                            const std::optional<Volume<std::uint8_t>>& rendered, const RegionOptions& options,
-                            const Study& study, double threshold_hu) {
-  RegionOfInterest region;
-  RegionOfStudy result;
-  if (rendered) result.rendered_ct = only_inside(study.ct->hu, dilated(*rendered, kRenderedBeyondMm));
-  region.volume = std::move(volume);
-  region.cut_ends = beyond_the_ct(study.ct->hu, threshold_hu);
+std::vector<ChosenVolume> excluded_volumes(const RegionOptions& options, const Study& study) {
+  std::vector<ChosenVolume> volumes;
+  volumes.reserve(options.excluded.size());
   for (const std::string& name : options.excluded) {
-    Volume<std::uint8_t> mask = mask_in_ct(study, name);
-    result.rendered_ct = without(result.rendered_ct.value_or(study.ct->hu), mask);
-    // A couch lies behind everything: its pixels stay, only its voxels go.
-    if (structure_of(study, name).interpreted_type == "SUPPORT") continue;
-    region.excluded.push_back(dilated(mask, options.margin_mm));
-    result.chosen.push_back({.words = fmt::format("structure {}, which is excluded,", name),
-                             .mask = std::move(mask),
-                             .is_drawn = true,
-                             .is_excluded = true});
+    const bool is_couch = structure_of(study, name).interpreted_type == "SUPPORT";
+    volumes.push_back({.words = fmt::format("structure {}, which is excluded,", name),
+                       .mask = mask_in_ct(study, name),
+                       .is_drawn = true,
+                       .is_excluded = true,
+                       .keeps_pixels = is_couch});
   }
-  result.projected = ProjectedRegion(region);
-  return result;
+  return volumes;
 }
 
 }  // namespace
@@ -112,7 +84,7 @@ std::vector<std::string> RegionOptions::in_words() const {
 RegionOfStudy region_of(const RegionOptions& options, const Study& study, double threshold_hu) {
   if (options.around_isocenter_mm && !(*options.around_isocenter_mm > 0.0))
     throw UsageError(fmt::format("--around-isocenter {}: expected more than 0 mm", *options.around_isocenter_mm));
-  std::vector<ChosenVolume> chosen;
+  RegionOfStudy result{.chosen = excluded_volumes(options, study)};
   std::optional<Volume<std::uint8_t>> compared;
   const auto add = [&](std::string words, Volume<std::uint8_t> exact, double margin_mm, bool is_drawn = false) {
     Volume<std::uint8_t> grown = margin_mm > 0.0 ? dilated(exact, margin_mm) : exact;
@@ -120,11 +92,11 @@ RegionOfStudy region_of(const RegionOptions& options, const Study& study, double
       unite(*compared, grown);
     else
       compared = std::move(grown);
-    chosen.push_back({.words = std::move(words), .mask = std::move(exact), .is_drawn = is_drawn});
+    result.chosen.push_back({.words = std::move(words), .mask = std::move(exact), .is_drawn = is_drawn});
   };
   if (options.around_isocenter_mm) {
     add(fmt::format("the sphere of {} mm about the isocenter", *options.around_isocenter_mm),
-        sphere(study.ct->hu, study.isocenter_patient_mm, *options.around_isocenter_mm), 0.0);
+        sphere_in(study.ct->hu, study.isocenter_patient_mm, *options.around_isocenter_mm), 0.0);
     if (std::ranges::all_of(compared->voxels, [](std::uint8_t inside) { return inside != 0; }))
       throw UsageError(
           fmt::format("--around-isocenter {}: the whole CT lies within this distance, which is what is "
@@ -140,22 +112,8 @@ RegionOfStudy region_of(const RegionOptions& options, const Study& study, double
       add(body_in_words(map, body), std::move(mask), options.margin_mm);
     }
   }
-  RegionOfStudy result = region_within(compared, compared, options, study, threshold_hu);
-  std::ranges::move(chosen, std::back_inserter(result.chosen));
+  result.region = region_within(compared, compared, result.chosen, options.margin_mm, study.ct->hu, threshold_hu);
   return result;
-}
-
-RegionOfStudy ball_about(const Eigen::Vector3d& center_patient_mm, double radius_mm,
-                         std::span<const ChosenVolume> chosen, const RegionOptions& options, const Study& study,
-                         double threshold_hu) {
-  const Volume<std::uint8_t> ball = sphere(study.ct->hu, center_patient_mm, radius_mm);
-  std::optional<Volume<std::uint8_t>> rendered;
-  for (const ChosenVolume& volume : chosen) {
-    if (volume.is_excluded) continue;
-    if (!rendered) rendered = ball;
-    unite(*rendered, dilated(volume.mask, options.margin_mm));
-  }
-  return region_within(ball, rendered, options, study, threshold_hu);
 }
 
 }  // namespace isoshift

@@ -1,17 +1,14 @@
 #pragma once
 // The region, as the user asks for it.
 
-#include <cstdint>
 #include <map>
 #include <optional>
-#include <span>
 #include <string>
 #include <vector>
 
-#include "geometry/volume.h"
 #include "io/study/study.h"
 #include "registration/preprocess/preprocess.h"
-#include "registration/region.h"
+#include "registration/target/chosen_region.h"
 
 namespace isoshift {
 
@@ -29,30 +26,12 @@ struct RegionOptions {
   std::vector<std::string> in_words() const;
 };
 
-// A volume of the CT that a person or a file chose, as drawn: 1 inside, on the CT's lattice.
-struct ChosenVolume {
-  std::string words;  // "structure Spine"
-  Volume<std::uint8_t> mask;
-  bool is_drawn = false;     // by contours, which may lie anywhere; bodies and spheres lie where they must
-  bool is_excluded = false;  // and not what is compared
-};
-
-// The CT as it is rendered, and the region projected into the views.
 struct RegionOfStudy {
   std::vector<ChosenVolume> chosen;
-
-  // The CT inside the volume of interest, without excluded structures; unset: the whole CT.
-  std::optional<Volume<float>> rendered_ct;
-  ProjectedRegion projected;
+  ChosenRegion region;
 };
 // Throws UsageError for a radius that is not positive or holds the whole CT and for a body that there is not, and Error
 // for a structure the study lacks.
 RegionOfStudy region_of(const RegionOptions& options, const Study& study, double threshold_hu);
-
-// The surroundings of a place are compared, whatever was chosen; what was excluded stays excluded. What was chosen is
-// rendered, too: it does not end at the ball.
-RegionOfStudy ball_about(const Eigen::Vector3d& center_patient_mm, double radius_mm,
-                         std::span<const ChosenVolume> chosen, const RegionOptions& options, const Study& study,
-                         double threshold_hu);
 
 }  // namespace isoshift

@@ -72,9 +72,12 @@ SetupResult register_loaded(const Study& study, const RegisterOptions& options, 
   choice.target.surrogate = surrogate.words;
   const RegistrationSetup setup(options.registration, study, beams_of(study), shared.renderers);
   const std::vector<FixedImage> images = prepared(study.xrays);
-  const TargetRegistration registration(study, options.registration, setup, choice, surrogate, shared.bodies);
+  const TargetRegistration registration(target_problem(study, options.registration, setup, choice, surrogate),
+                                        setup.renderers(), setup.rendered_ct(), shared.bodies);
   const Eigen::Isometry3d setup_error = start ? start->setup_error : Eigen::Isometry3d::Identity();
-  RegistrationResult found = registration.from(setup_error * study.planned_room_from_patient, images, observer);
+  RegistrationResult found =
+      registration.from(setup_error * study.planned_room_from_patient, images,
+                        [&](std::string_view step, double share) { observer.progress(step, share); });
 
   SetupResult result = setup_result_of(study, images, options.registration, setup, choice.target, std::move(found));
   if (!site || !site->level || !site->level->rotation_deg) doubt_large_rotation(result);

@@ -11,7 +11,6 @@
 #include "workflow/observer.h"
 #include "workflow/register/registration_setup.h"
 #include "workflow/register/study_options.h"
-#include "workflow/register/target_registration.h"
 
 namespace isoshift {
 

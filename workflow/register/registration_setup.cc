@@ -50,22 +50,41 @@ std::optional<Uncertainty> uncertainty_by_imagers(const Study& study, Dof dof) {
 RegistrationSetup::RegistrationSetup(const RegistrationRequest& request, const Study& study,
                                      const std::vector<Beam>& beams, RendererStore& store)
     : ct_(study.ct), options_(request.search.registration()) {
-  RegionOfStudy region = region_of(request.region, study, request.rendering.threshold_hu);
-  region_ct_ = std::move(region.rendered_ct);
+  RegionOfStudy of_study = region_of(request.region, study, request.rendering.threshold_hu);
+  region_ct_ = std::move(of_study.region.rendered_ct);
   if (region_ct_)
     renderers_ = std::make_shared<const RendererPyramid>(request.rendering.kind(), *region_ct_,
                                                          request.rendering.model(), beams, request.rendering.options());
   else
     renderers_ = store.get(request.rendering, study.ct, beams);
-  region_ = std::move(region.projected);
-  chosen_ = std::move(region.chosen);
+  options_.region = std::make_shared<const ProjectedRegion>(std::move(of_study.region.projected));
+  chosen_ = std::move(of_study.chosen);
   // X-rays show what lies before and behind a volume of interest, DRRs of that volume do not: intensities cannot be
   // compared, edges can.
-  if (region_.has_volume() && !request.search.is_paper())
+  if (options_.region->has_volume() && !request.search.is_paper())
     for (Stage& stage : options_.stages) stage.similarity = SimilarityKind::kGradientCorrelation;
-  options_.region = &region_;
   options_.by_imagers = uncertainty_by_imagers(study, options_.dof);
   options_.rectangles = request.region.rectangles_of(study);
+}
+
+TargetProblem target_problem(const Study& study, const RegistrationRequest& request, const RegistrationSetup& setup,
+                             const TargetChoice& choice, const Surrogate& surrogate) {
+  TargetProblem problem{
+      .patient = planned_patient(study),
+      .target = choice.target,
+      .surrogate = surrogate,
+      .others = [&study, name = choice.target.name] { return structures_beside(name, study); },
+      .chosen = setup.chosen(),
+      .margin_mm = request.region.margin_mm,
+      .rendering = {.kind = request.rendering.kind(),
+                    .model = request.rendering.model(),
+                    .options = request.rendering.options(),
+                    .beams = beams_of(study)},
+      .options = setup.options(),
+  };
+  for (const std::string& doubt : study.doubts) problem.findings.push_back({.check = Check::kFiles, .words = doubt});
+  for (const std::string& doubt : choice.doubts) problem.findings.push_back({.check = Check::kTarget, .words = doubt});
+  return problem;
 }
 
 }  // namespace isoshift

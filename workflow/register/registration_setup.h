@@ -6,10 +6,12 @@
 #include <vector>
 
 #include "drr/renderer_pyramid.h"
+#include "registration/target/target_registration.h"
 #include "workflow/register/region_options.h"
 #include "workflow/register/rendering_options.h"
 #include "workflow/register/search_request.h"
 #include "workflow/register/study_options.h"
+#include "workflow/register/target_of.h"
 
 namespace isoshift {
 
@@ -35,13 +37,10 @@ class RendererStore {
   std::shared_ptr<const RendererPyramid> last_;
 };
 
-// Cannot be moved: the options point to the region.
 class RegistrationSetup {
  public:
   RegistrationSetup(const RegistrationRequest& request, const Study& study, const std::vector<Beam>& beams,
                     RendererStore& store);
-  RegistrationSetup(const RegistrationSetup&) = delete;
-  RegistrationSetup& operator=(const RegistrationSetup&) = delete;
 
   const RendererPyramid& renderers() const { return *renderers_; }
   const Volume<float>& rendered_ct() const { return region_ct_ ? *region_ct_ : ct_->hu; }
@@ -49,12 +48,15 @@ class RegistrationSetup {
   const std::vector<ChosenVolume>& chosen() const { return chosen_; }  // what a person or a file chose of the CT
 
  private:
-  ProjectedRegion region_;
   std::vector<ChosenVolume> chosen_;
   std::shared_ptr<const CtSeries> ct_;
   std::optional<Volume<float>> region_ct_;  // where a volume of interest is rendered and not the whole CT
   std::shared_ptr<const RendererPyramid> renderers_;
   RegistrationOptions options_;
 };
+
+// What is registered of a study for its target. Borrows the study, until the problem is solved.
+TargetProblem target_problem(const Study& study, const RegistrationRequest& request, const RegistrationSetup& setup,
+                             const TargetChoice& choice, const Surrogate& surrogate);
 
 }  // namespace isoshift

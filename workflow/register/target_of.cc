@@ -10,33 +10,19 @@
 
 #include "base/error.h"
 #include "base/option_name.h"
-#include "drr/attenuation.h"
 #include "geometry/mask.h"
 #include "io/dicom/structure_mask.h"
-#include "workflow/register/region_check.h"
+#include "registration/target/region_check.h"
+#include "registration/target/target_volume.h"
 
 namespace isoshift {
 namespace {
 
 constexpr const char* kIsocenter = "isocenter";
-constexpr double kSurroundingsMm = 30.0;
-constexpr double kNearEndMm = 25.0;
-
-// The six neighbors of a cube's center, its edges and its corners.
-std::vector<Eigen::Vector3d> directions_all_around() {
-  std::vector<Eigen::Vector3d> directions;
-  for (int n = 0; n < 27; ++n) {
-    const Eigen::Vector3i step(n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1);
-    if (!step.isZero()) directions.push_back(step.cast<double>().normalized());
-  }
-  return directions;
-}
 
 Target surroundings(std::string chosen_by) {
-  Target target{.name = fmt::format("{}, {:.0f} mm", kIsocenterSurroundings, kSurroundingsMm),
-                .chosen_by = std::move(chosen_by)};
-  for (const Eigen::Vector3d& direction : directions_all_around())
-    target.extent_room_mm.push_back(kSurroundingsMm * direction);
+  Target target = isocenter_surroundings();
+  target.chosen_by = std::move(chosen_by);
   return target;
 }
 
@@ -74,22 +60,9 @@ PossibleTarget candidate_of(const Structure& structure, const Study& study) {
 }
 
 Target target_from(const PossibleTarget& candidate, const Study& study, std::string chosen_by) {
-  const Eigen::Isometry3d& room_from_patient = study.planned_room_from_patient;
-  Target target{.name = candidate.structure->name,
-                .chosen_by = std::move(chosen_by),
-                .center_room_mm = room_from_patient * centroid_patient_mm(candidate.mask)};
-  const Volume<std::uint8_t>& mask = candidate.mask;
-  const Eigen::Affine3d room_from_voxel = room_from_patient * mask.patient_from_voxel;
-  const std::vector<Eigen::Vector3d> directions = directions_all_around();
-  target.extent_room_mm.assign(directions.size(), target.center_room_mm);
-  for (int k = 0; k < mask.size.z(); ++k)
-    for (int j = 0; j < mask.size.y(); ++j)
-      for (int i = 0; i < mask.size.x(); ++i) {
-        if (mask.at(i, j, k) == 0) continue;
-        const Eigen::Vector3d at = room_from_voxel * Eigen::Vector3d(i, j, k);
-        for (std::size_t n = 0; n < directions.size(); ++n)
-          if (directions[n].dot(at) > directions[n].dot(target.extent_room_mm[n])) target.extent_room_mm[n] = at;
-      }
+  Target target = target_in(candidate.mask, study.planned_room_from_patient);
+  target.name = candidate.structure->name;
+  target.chosen_by = std::move(chosen_by);
   return target;
 }
 
@@ -248,28 +221,6 @@ TargetChoice chosen_by_plan(const Study& study) {
   return choice;
 }
 
-// How far from a point a CT ends although the body goes on there: at most kNearEndMm.
-std::optional<double> end_of_ct_near_mm(const Volume<float>& ct, const Eigen::Vector3d& point_patient_mm) {
-  const Eigen::Vector3d at = ct.patient_from_voxel.inverse() * point_patient_mm, spacing = ct.spacing_mm();
-  const auto threshold_hu = static_cast<float>(AttenuationModel().threshold_hu);
-  std::optional<double> nearest_mm;
-  for (int axis = 0; axis < 3; ++axis)
-    for (const int end : {0, ct.size[axis] - 1}) {
-      const double away_mm = (end == 0 ? at[axis] : end - at[axis]) * spacing[axis];
-      if (away_mm > nearest_mm.value_or(kNearEndMm)) continue;
-      const int u = (axis + 1) % 3, v = (axis + 2) % 3;
-      bool goes_on = false;
-      Eigen::Vector3i voxel;
-      voxel[axis] = end;
-      for (voxel[u] = 0; voxel[u] < ct.size[u] && !goes_on; ++voxel[u])
-        for (voxel[v] = 0; voxel[v] < ct.size[v] && !goes_on; ++voxel[v])
-          goes_on = std::hypot((voxel[u] - at[u]) * spacing[u], (voxel[v] - at[v]) * spacing[v]) <= kNearEndMm &&
-                    ct.at(voxel.x(), voxel.y(), voxel.z()) > threshold_hu;
-      if (goes_on) nearest_mm = std::max(0.0, away_mm);
-    }
-  return nearest_mm;
-}
-
 void doubt_near_end_of_ct(const Study& study, TargetChoice& choice) {
   const Eigen::Vector3d center = study.planned_room_from_patient.inverse() * choice.target.center_room_mm;
   if (const auto away_mm = end_of_ct_near_mm(study.ct->hu, center))
@@ -316,6 +267,21 @@ TargetChoice target_of(const Study& study, const TargetWish& wish) {
   TargetChoice choice = chosen(study, wish);
   doubt_near_end_of_ct(study, choice);
   return choice;
+}
+
+PlannedPatient planned_patient(const Study& study) {
+  return {.ct_hu = {study.ct, &study.ct->hu}, .room_from_patient = study.planned_room_from_patient};
+}
+
+Surrogate surrogate_of(const Study& study, const Target& target, const std::string& by_site, BodyStore& bodies) {
+  if (by_site.empty()) return surrogate_near(planned_patient(study), target, bodies);
+  if (!study.structures)
+    throw Error(fmt::format("surrogate {} (the site file): {} ({} names one)", by_site,
+                            why_no_structures(study.unused_structures), option("structures", "FILE")));
+  const Volume<float>& ct = study.ct->hu;
+  return surrogate_in(planned_patient(study), target,
+                      {.words = fmt::format("{} (the site file)", by_site),
+                       .mask = mask_of(structure_named(*study.structures, by_site), ct.size, ct.patient_from_voxel)});
 }
 
 }  // namespace isoshift

@@ -1,10 +1,11 @@
 #pragma once
-// Which volume of a study is its target.
+// Which volume of a study is its target, and which bones carry it.
 
 #include <string>
 #include <vector>
 
 #include "io/study/study.h"
+#include "registration/target/surrogate.h"
 #include "setup/target.h"
 
 namespace isoshift {
@@ -30,5 +31,11 @@ TargetChoice target_of(const Study& study, const TargetWish& wish);
 
 // Targets and organs that are drawn in the CT, but for the one of this name; not those that cannot be filled.
 std::vector<Target> structures_beside(const std::string& target, const Study& study);
+
+PlannedPatient planned_patient(const Study& study);
+
+// Which bones carry the target. `by_site`: the structure that the site file names for the anatomy; empty: what lies
+// near the target. Throws Error if the structure is not there or has no closed contour, or no bone.
+Surrogate surrogate_of(const Study& study, const Target& target, const std::string& by_site, BodyStore& bodies);
 
 }  // namespace isoshift

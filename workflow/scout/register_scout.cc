@@ -118,9 +118,10 @@ class ScoutScene {
         planned_(Eigen::Translation3d(-center_)),
         renderers_(request.rendering.kind(), ct.hu, request.rendering.model(), std::array{Beam::kKilovoltage},
                    request.rendering.options()),
-        region_({.volume = {}, .excluded = {}, .cut_ends = beyond_the_ct(ct.hu, request.rendering.threshold_hu)}),
+        region_(std::make_shared<const ProjectedRegion>(RegionOfInterest{
+            .volume = {}, .excluded = {}, .cut_ends = beyond_the_ct(ct.hu, request.rendering.threshold_hu)})),
         options_(preset("setup")) {
-    options_.region = &region_;
+    options_.region = region_;
     options_.seed = request.seed;
   }
   ScoutScene(const ScoutScene&) = delete;
@@ -143,7 +144,7 @@ class ScoutScene {
 
   ViewPicture picture(const FixedImage& image, const RegistrationResult& found) const {
     FixedImage compared = image;
-    region_.restrict(compared, found.actual_room_from_patient, 0.0);
+    region_->restrict(compared, found.actual_room_from_patient, 0.0);
     return scout_picture(compared, renderers_.finest(), scout_.column_step_patient_mm.norm(),
                          {planned_, found.actual_room_from_patient}, ct_corners_patient_mm_);
   }
@@ -154,7 +155,7 @@ class ScoutScene {
   std::array<Vector3d, 8> ct_corners_patient_mm_;
   Eigen::Isometry3d planned_;
   RendererPyramid renderers_;
-  ProjectedRegion region_;
+  std::shared_ptr<const ProjectedRegion> region_;
   RegistrationOptions options_;
 };
 

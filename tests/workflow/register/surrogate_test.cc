@@ -1,6 +1,6 @@
 // A target that X-rays do not show is told, unless the site says which bones carry it.
 
-#include "workflow/register/surrogate.h"
+#include "workflow/register/target_of.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -88,7 +88,7 @@ TEST(Surrogate, RibsAloneAreADoubt) {
     const Study study =
         study_of({.anatomy = "thorax", .seed = 5, .spacing_mm = {2, 2, 3}, .cropped_mm = {0.0, 0.0, cropped_mm}});
     BodyStore bodies;
-    const BodyMap& map = *bodies.map(study.ct);
+    const BodyMap& map = *bodies.map(planned_patient(study).ct_hu);
     ASSERT_EQ(cropped_mm > 0.0, vertebrae_in(map) < 4);
     const Vector3d vertebra = std::ranges::find(map.bodies, Body::Kind::kVertebra, &Body::kind)->center_patient_mm;
     const auto aside = std::ranges::max(map.bodies, {}, [&](const Body& one) {
@@ -113,7 +113,7 @@ TEST(Surrogate, ShouldersAreADoubt) {
                                   .cropped_mm = {0.0, 0.0, 210.0 - length_mm},
                                   .shifted_mm = {0.0, 0.0, 0.5 * (210.0 - length_mm)}});
     BodyStore bodies;
-    ASSERT_EQ(length_mm < 210.0, vertebrae_in(*bodies.map(study.ct)) < 4);
+    ASSERT_EQ(length_mm < 210.0, vertebrae_in(*bodies.map(planned_patient(study).ct_hu)) < 4);
     const Vector3d spine = PhantomCt::center() + Vector3d(65.0, 0.0, 0.0);  // of a thorax, aside of its tumor
     for (const double side : {-1.0, 1.0})
       for (const Vector3d& at :
@@ -130,7 +130,7 @@ TEST(Surrogate, AShortNeckIsADoubt) {
   const PhantomCt head{.anatomy = "head", .seed = 5};
   const Study study = study_of(head);
   BodyStore bodies;
-  const std::ptrdiff_t count = vertebrae_in(*bodies.map(study.ct));
+  const std::ptrdiff_t count = vertebrae_in(*bodies.map(planned_patient(study).ct_hu));
   ASSERT_GT(count, 0);
   ASSERT_LT(count, 4);
   const Vector3d second = head.vertebrae()[1];
@@ -149,7 +149,7 @@ TEST(Surrogate, AShortNeckIsADoubt) {
 TEST(Surrogate, DenseSoftTissueIsNoBone) {
   Study study = study_of({.anatomy = "thorax", .seed = 5, .spacing_mm = {2, 2, 3}});
   BodyStore bodies;
-  const BodyMap map = *bodies.map(study.ct);
+  const BodyMap map = *bodies.map(planned_patient(study).ct_hu);
   CtSeries ct = *study.ct;
   const Vector3d front = map.bodies.front().center_patient_mm + Vector3d(-60.0, -70.0, 40.0);
   int near = 0;

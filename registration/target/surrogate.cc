@@ -1,4 +1,4 @@
-#include "workflow/register/surrogate.h"
+#include "registration/target/surrogate.h"
 
 #include <fmt/format.h>
 
@@ -10,13 +10,11 @@
 #include <vector>
 
 #include "base/error.h"
-#include "base/option_name.h"
 #include "bodies/lattice.h"
 #include "bodies/vertebrae.h"
-#include "io/dicom/structure_mask.h"
 #include "registration/bodies/carriers.h"
-#include "workflow/register/near_target.h"
-#include "workflow/register/region_check.h"
+#include "registration/target/near_target.h"
+#include "registration/target/region_check.h"
 
 namespace isoshift {
 namespace {
@@ -113,8 +111,8 @@ Spine spine_of(const Volume<float>& ct_hu) {
 // Why a target at a vertebra, or behind it, may have moved unnoticed: below a head the CT shows less than four of them,
 // and next to nothing tells how such a neck has bent. Targets 20 to 45 mm before and behind C2 were accepted 2 to 5 mm
 // off. A jaw lies farther to the front.
-std::optional<std::string> doubt_of_neck(const Study& study, const Spine& spine, const Target& target) {
-  const Eigen::Vector3d at_patient_mm = points_patient_mm(study, target).front();
+std::optional<std::string> doubt_of_neck(const PlannedPatient& patient, const Spine& spine, const Target& target) {
+  const Eigen::Vector3d at_patient_mm = points_patient_mm(patient, target).front();
   if (spine.vertebrae.empty() || spine.is_of_trunk ||
       at_patient_mm.z() > spine.vertebrae.back().upper.center_patient_mm.z())
     return {};
@@ -136,11 +134,11 @@ struct NearTarget {
 // The dense places near a target. What is near its center counts, and where nothing is, what most of its surface is
 // near to. Doubted only in a trunk: in a head bones hang together. Vertebrae are asked first, because they are found
 // quickly and are what most targets lie near.
-NearTarget bones_near(const Study& study, const Spine& spine, const Target& target, BodyStore& bodies) {
-  const Volume<float>& ct_hu = study.ct->hu;
-  const std::vector<Eigen::Vector3d> points = points_patient_mm(study, target);
+NearTarget bones_near(const PlannedPatient& patient, const Spine& spine, const Target& target, BodyStore& bodies) {
+  const Volume<float>& ct_hu = *patient.ct_hu;
+  const std::vector<Eigen::Vector3d> points = points_patient_mm(patient, target);
   if (!spine.is_of_trunk || is_vertebra_near(spine.vertebrae, points.front())) return {};
-  const BodyMap& map = *bodies.map(study.ct);
+  const BodyMap& map = *bodies.map(patient.ct_hu);
   PointsByBone near = points_by_bone(ct_hu, map, std::span(points).first(1));
   if (near.of_spine + near.of_others == 0) near = points_by_bone(ct_hu, map, points);
   if (near.are_carried()) return {};
@@ -158,44 +156,37 @@ NearTarget bones_near(const Study& study, const Spine& spine, const Target& targ
 
 }  // namespace
 
-std::vector<Eigen::Vector3d> points_patient_mm(const Study& study, const Target& target) {
-  const Eigen::Isometry3d patient_from_room = study.planned_room_from_patient.inverse();
+std::vector<Eigen::Vector3d> points_patient_mm(const PlannedPatient& patient, const Target& target) {
+  const Eigen::Isometry3d patient_from_room = patient.room_from_patient.inverse();
   std::vector<Eigen::Vector3d> points = {patient_from_room * target.center_room_mm};
   for (const Eigen::Vector3d& point : target.extent_room_mm) points.push_back(patient_from_room * point);
   return points;
 }
 
-Surrogate surrogate_of(const Study& study, const Target& target, const std::string& by_site, BodyStore& bodies) {
-  if (!by_site.empty()) {
-    if (!study.structures)
-      throw Error(fmt::format("surrogate {} (the site file): {} ({} names one)", by_site,
-                              why_no_structures(study.unused_structures), option("structures", "FILE")));
-    Volume<std::uint8_t> drawn =
-        mask_of(structure_named(*study.structures, by_site), study.ct->hu.size, study.ct->hu.patient_from_voxel);
-    if (!holds_bone(study.ct->hu, drawn))
-      throw Error(fmt::format("surrogate {} (the site file): the CT shows no bone in this structure", by_site));
-    ChosenVolume volume{.words = fmt::format("surrogate {} (the site file)", by_site), .mask = std::move(drawn)};
-    std::optional<std::string> doubt = volume_doubt(study, volume);
-    if (!doubt) doubt = doubt_of_neck(study, spine_of(study.ct->hu), target);
-    return {.words = fmt::format("bones in {} (the site file)", by_site),
-            .drawn = std::move(volume.mask),
-            .doubt = std::move(doubt)};
-  }
-  if (std::ranges::any_of(points_patient_mm(study, target),
-                          [&](const Eigen::Vector3d& point) { return is_bone_near(study.ct->hu, point); })) {
-    const Spine spine = spine_of(study.ct->hu);
-    NearTarget near{.doubt = doubt_of_neck(study, spine, target)};
-    if (!near.doubt) near = bones_near(study, spine, target, bodies);
-    return {.words = fmt::format("{} within {:.0f} mm", near.what, kCarriersNearMm),
+Surrogate surrogate_in(const PlannedPatient& patient, const Target& target, ChosenVolume drawn) {
+  const std::string name = drawn.words;
+  drawn.words = "surrogate " + name;
+  if (!holds_bone(*patient.ct_hu, drawn.mask))
+    throw Error(fmt::format("{}: the CT shows no bone in this structure", drawn.words));
+  std::optional<std::string> doubt = volume_doubt(patient, drawn);
+  if (!doubt) doubt = doubt_of_neck(patient, spine_of(*patient.ct_hu), target);
+  return {.words = "bones in " + name, .drawn = std::move(drawn.mask), .doubt = std::move(doubt)};
+}
+
+Surrogate surrogate_near(const PlannedPatient& patient, const Target& target, BodyStore& bodies) {
+  const auto is_near_bone = [&](const Eigen::Vector3d& point) { return is_bone_near(*patient.ct_hu, point); };
+  if (!std::ranges::any_of(points_patient_mm(patient, target), is_near_bone))
+    return {.words = "none",
             .drawn = {},
-            .doubt = std::move(near.doubt)};
-  }
-  return {
-      .words = "none",
-      .drawn = {},
-      .doubt = fmt::format("no bone lies within {:.0f} mm of the target, and the site file names no surrogate: X-rays "
-                           "do not show soft tissue",
-                           kCarriersNearMm)};
+            .doubt = fmt::format("no bone lies within {:.0f} mm of the target, and the site file names no surrogate: "
+                                 "X-rays do not show soft tissue",
+                                 kCarriersNearMm)};
+  const Spine spine = spine_of(*patient.ct_hu);
+  NearTarget near{.doubt = doubt_of_neck(patient, spine, target)};
+  if (!near.doubt) near = bones_near(patient, spine, target, bodies);
+  return {.words = fmt::format("{} within {:.0f} mm", near.what, kCarriersNearMm),
+          .drawn = {},
+          .doubt = std::move(near.doubt)};
 }
 
 }  // namespace isoshift

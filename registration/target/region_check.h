@@ -9,9 +9,9 @@
 #include <vector>
 
 #include "geometry/volume.h"
-#include "io/study/study.h"
+#include "registration/target/chosen_region.h"
+#include "registration/target/planned_patient.h"
 #include "setup/target.h"
-#include "workflow/register/region_options.h"
 
 namespace isoshift {
 
@@ -23,10 +23,11 @@ bool is_in_body(const Volume<std::uint8_t>& mask, const Volume<float>& ct_hu);
 // the isocenter. A drawn volume must lie in the body, and hold bone on a third of its slices; all together, grown by
 // the margin, must hold a quarter of the bone within 20 mm of the target. `surrogate`: the structure whose bones carry
 // the target, if a site names one: then it is some of their bone that must be held.
-std::vector<std::string> region_doubts(const Study& study, std::span<const ChosenVolume> chosen, double margin_mm,
-                                       const Target& target, const std::optional<Volume<std::uint8_t>>& surrogate);
+std::vector<std::string> region_doubts(const PlannedPatient& patient, std::span<const ChosenVolume> chosen,
+                                       double margin_mm, const Target& target,
+                                       const std::optional<Volume<std::uint8_t>>& surrogate);
 
 // The same of one volume without a look at the target: nothing if it lies in the body and holds bone.
-std::optional<std::string> volume_doubt(const Study& study, const ChosenVolume& volume);
+std::optional<std::string> volume_doubt(const PlannedPatient& patient, const ChosenVolume& volume);
 
 }  // namespace isoshift

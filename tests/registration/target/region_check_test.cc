@@ -1,6 +1,6 @@
 // Chosen regions that do not hold the target's bone: flipped, turned, shifted, in air, too small.
 
-#include "workflow/register/region_check.h"
+#include "registration/target/region_check.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -8,6 +8,7 @@
 #include <functional>
 
 #include "tests/support/cube_study.h"
+#include "workflow/register/target_of.h"
 
 namespace isoshift::region_check_test {
 namespace {
@@ -54,7 +55,7 @@ std::vector<std::string> doubts(const Study& study, const std::vector<ChosenVolu
   Target target{.name = "PTV"};
   for (int axis = 0; axis < 3; ++axis)
     for (const double side_mm : {-10.0, 10.0}) target.extent_room_mm.emplace_back(side_mm * Vector3d::Unit(axis));
-  return region_doubts(study, volumes, kMarginMm, target, {});
+  return region_doubts(planned_patient(study), volumes, kMarginMm, target, {});
 }
 
 bool is_spine(const Vector3d& at) { return is_near_axis(at, kSpine, kRegionRadiusMm); }
@@ -114,9 +115,10 @@ TEST(RegionDoubts, ANamedSurrogateMustBeHeld) {
   const Study study = study_of_trunk();
   const Target in_lung{.center_room_mm = study.planned_room_from_patient * Vector3d(35.0, -15.0, 0.0)};
   const Volume<std::uint8_t> spine = chosen(study, is_spine).mask;
-  EXPECT_THAT(region_doubts(study, std::vector{chosen(study, is_spine)}, kMarginMm, in_lung, spine), IsEmpty());
+  EXPECT_THAT(region_doubts(planned_patient(study), std::vector{chosen(study, is_spine)}, kMarginMm, in_lung, spine),
+              IsEmpty());
   const Place elsewhere = [](const Vector3d& at) { return is_near_axis(at, {0.0, -50.0, 0.0}, 15.0); };
-  EXPECT_THAT(region_doubts(study, std::vector{chosen(study, elsewhere)}, kMarginMm, in_lung, spine),
+  EXPECT_THAT(region_doubts(planned_patient(study), std::vector{chosen(study, elsewhere)}, kMarginMm, in_lung, spine),
               Contains(HasSubstr("holds 0 % of the bones that carry the target (the site file)")));
 }
 

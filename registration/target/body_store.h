@@ -5,20 +5,19 @@
 
 #include "bodies/body_map.h"
 #include "bodies/soft_masks.h"
-#include "io/study/study.h"
 
 namespace isoshift {
 
 // Keeps the bodies of the last CT.
 class BodyStore {
  public:
-  std::shared_ptr<const BodyMap> map(const std::shared_ptr<const CtSeries>& ct);
+  std::shared_ptr<const BodyMap> map(const std::shared_ptr<const Volume<float>>& ct_hu);
 
   // What moves with these bodies.
-  std::shared_ptr<const SoftMasks> masks(const std::shared_ptr<const CtSeries>& ct);
+  std::shared_ptr<const SoftMasks> masks(const std::shared_ptr<const Volume<float>>& ct_hu);
 
  private:
-  std::shared_ptr<const CtSeries> ct_;
+  std::shared_ptr<const Volume<float>> ct_hu_;
   std::shared_ptr<const BodyMap> map_;
   std::shared_ptr<const SoftMasks> masks_;
 };

@@ -1,4 +1,4 @@
-#include "workflow/register/region_check.h"
+#include "registration/target/region_check.h"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -9,7 +9,7 @@
 #include "bodies/body_map.h"
 #include "bodies/lattice.h"
 #include "geometry/mask.h"
-#include "workflow/register/near_target.h"
+#include "registration/target/near_target.h"
 
 namespace isoshift {
 namespace {
@@ -55,9 +55,9 @@ struct HeldBone {
   }
 };
 
-HeldBone bone_held_by(const Volume<std::uint8_t>& mask, const Study& study) {
-  const Volume<float>& ct = study.ct->hu;
-  HeldBone held{.from_isocenter_mm = distance_mm(mask, study.isocenter_patient_mm)};
+HeldBone bone_held_by(const Volume<std::uint8_t>& mask, const PlannedPatient& patient) {
+  const Volume<float>& ct = *patient.ct_hu;
+  HeldBone held{.from_isocenter_mm = distance_mm(mask, patient.isocenter_patient_mm())};
   for (int k = 0; k < ct.size.z(); ++k) {
     const std::size_t voxels = held.voxels, of_bone = held.of_bone;
     for (int j = 0; j < ct.size.y(); ++j)
@@ -73,10 +73,10 @@ HeldBone bone_held_by(const Volume<std::uint8_t>& mask, const Study& study) {
 }
 
 // Bone near the target's center or surface, as a mask.
-Volume<std::uint8_t> bone_near(const Study& study, const Target& target) {
-  const Volume<float>& ct = study.ct->hu;
+Volume<std::uint8_t> bone_near(const PlannedPatient& patient, const Target& target) {
+  const Volume<float>& ct = *patient.ct_hu;
   Volume<std::uint8_t> bone(ct.size, ct.patient_from_voxel);
-  for (const Eigen::Vector3d& point : points_patient_mm(study, target))
+  for (const Eigen::Vector3d& point : points_patient_mm(patient, target))
     for_voxels_near(ct, point, [&](int i, int j, int k) {
       if (is_bone(ct.at(i, j, k))) bone.at(i, j, k) = 1;
     });
@@ -114,9 +114,9 @@ bool is_in_body(const Volume<std::uint8_t>& mask, const Volume<float>& ct_hu) {
   return is_most(inside);
 }
 
-std::optional<std::string> volume_doubt(const Study& study, const ChosenVolume& volume) {
-  const HeldBone held = bone_held_by(volume.mask, study);
-  if (!is_in_body(volume.mask, study.ct->hu))
+std::optional<std::string> volume_doubt(const PlannedPatient& patient, const ChosenVolume& volume) {
+  const HeldBone held = bone_held_by(volume.mask, patient);
+  if (!is_in_body(volume.mask, *patient.ct_hu))
     return fmt::format(
         "{} lies outside of the body for the most part ({}): its contours may be of another CT, flipped "
         "or turned",
@@ -128,22 +128,24 @@ std::optional<std::string> volume_doubt(const Study& study, const ChosenVolume& 
       volume.words, held.in_words());
 }
 
-std::vector<std::string> region_doubts(const Study& study, std::span<const ChosenVolume> chosen, double margin_mm,
-                                       const Target& target, const std::optional<Volume<std::uint8_t>>& surrogate) {
+std::vector<std::string> region_doubts(const PlannedPatient& patient, std::span<const ChosenVolume> chosen,
+                                       double margin_mm, const Target& target,
+                                       const std::optional<Volume<std::uint8_t>>& surrogate) {
   std::vector<std::string> doubts, words;
   std::optional<Volume<std::uint8_t>> compared;
   for (const ChosenVolume& volume : chosen) {
-    if (auto doubt = volume.is_drawn ? volume_doubt(study, volume) : std::nullopt) doubts.push_back(std::move(*doubt));
+    if (auto doubt = volume.is_drawn && !volume.keeps_pixels ? volume_doubt(patient, volume) : std::nullopt)
+      doubts.push_back(std::move(*doubt));
     if (volume.is_excluded) continue;
-    words.push_back(fmt::format("{} ({})", volume.words, bone_held_by(volume.mask, study).in_words()));
+    words.push_back(fmt::format("{} ({})", volume.words, bone_held_by(volume.mask, patient).in_words()));
     if (compared)
       std::ranges::transform(compared->voxels, volume.mask.voxels, compared->voxels.begin(), std::ranges::max);
     else
       compared = volume.mask;
   }
   if (!compared) return doubts;
-  const Volume<float>& ct = study.ct->hu;
-  const Volume<std::uint8_t> bone = surrogate ? bone_in(*surrogate, ct) : bone_near(study, target);
+  const Volume<float>& ct = *patient.ct_hu;
+  const Volume<std::uint8_t> bone = surrogate ? bone_in(*surrogate, ct) : bone_near(patient, target);
   const Volume<std::uint8_t> grown = dilated(*compared, margin_mm);
   double of_target_mm3 = 0.0, held_mm3 = 0.0;
   const double voxel_mm3 = ct.spacing_mm().prod();

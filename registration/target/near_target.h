@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "geometry/volume.h"
-#include "io/study/study.h"
 #include "registration/bodies/carriers.h"
+#include "registration/target/planned_patient.h"
 #include "setup/target.h"
 
 namespace isoshift {
@@ -15,7 +15,7 @@ namespace isoshift {
 inline constexpr double kLeastBoneMm3 = 100.0;  // a small piece of rib, or a ball
 
 // The target's center and surface, as planned.
-std::vector<Eigen::Vector3d> points_patient_mm(const Study& study, const Target& target);
+std::vector<Eigen::Vector3d> points_patient_mm(const PlannedPatient& patient, const Target& target);
 
 // Calls work(i, j, k) for the voxels within 20 mm of a place.
 template <class T, class Work>
