@@ -50,7 +50,10 @@ void run_drr(const DrrOptions& options, Console& console) {
   print_warnings(notes.warnings, console);
 
   std::string listing = fmt::format("rendered by {} on {}", to_string(renderer->kind()), renderer->device());
-  for (const auto& [name, value] : options.rendering.settings()) listing += fmt::format(", {} {}", name, value);
+  for (auto [name, value] : options.rendering.settings()) {
+    std::ranges::replace(name, '_', ' ');
+    listing += fmt::format(", {} {}", name, value);
+  }
   listing += fmt::format("; attenuation {}, threshold {:.0f} HU\n", options.rendering.attenuation_name(),
                          options.rendering.threshold_hu);
   const std::string series_instance_uid = new_uid();

@@ -81,7 +81,7 @@ TEST_F(BatchCommandTest, RegistersEverySessionOnceAndGoesOn) {
 
   const CommandOutcome other = batch({"--dof", "translation"});
   EXPECT_EQ(other.exit_status, 1);
-  EXPECT_THAT(other.err, HasSubstr("holds a batch with other options: --preset=fast"));
+  EXPECT_THAT(other.err, HasSubstr("holds a batch that was begun with other options: --preset=fast"));
 }
 
 TEST_F(BatchCommandTest, ItsPageSortsFiltersAndLinks) {
@@ -403,6 +403,13 @@ TEST_F(ManifestTest, TablesAndJsonLinesSayTheSame) {
     EXPECT_EQ(cases[0].anatomy, "head");
     EXPECT_EQ(cases[0].parts.doubts, std::vector<std::string>{"moved"});
   }
+}
+
+TEST_F(BatchCommandTest, WhereNothingMakesACaseTheErrorSaysWhy) {
+  for (const char* patient : {"1", "2"}) fs::remove_all(exported() / patient / "CT");
+  const CommandOutcome outcome = batch();
+  EXPECT_EQ(outcome.exit_status, 1);
+  EXPECT_THAT(outcome.err, testing::AllOf(HasSubstr("holds no case"), HasSubstr("more X-rays belong to no case: ")));
 }
 
 TEST_F(ManifestTest, MistakesAreNamed) {

@@ -36,10 +36,11 @@ BatchFolder::BatchFolder(fs::path path, const std::vector<std::string>& options)
   if (fs::exists(file)) {
     const auto before = read_json_file(file).json.value("options", std::vector<std::string>());
     if (before != options)
-      throw Error(
-          fmt::format("{}: holds a batch with other options: {}\n       Name another output folder, or give the "
-                      "same options to go on",
-                      path_.string(), before.empty() ? "none" : fmt::format("{}", fmt::join(before, " "))));
+      throw Error(fmt::format(
+          "{}: holds a batch that was begun {}\n       Name another output folder, or give the "
+          "same options to go on",
+          path_.string(),
+          before.empty() ? "without options" : fmt::format("with other options: {}", fmt::join(before, " "))));
     return;
   }
   if (fs::exists(path_) && (!fs::is_directory(path_) || holds_something(path_)))

@@ -194,6 +194,7 @@ std::vector<BatchCase> scan_cases(const fs::path& folder, bool other_xrays, Note
   for (const std::string& reason : files.unreadable) notes.warnings.push_back(reason);
   std::ranges::move(drrs_left_aside(files), std::back_inserter(notes.left_aside));
   std::vector<BatchCase> cases;
+  std::string why_none;  // in the words of the first X-rays that belong to no case
   for (const SessionFiles& session : sessions_of(files, other_xrays)) {
     for (const std::string& remark : session.remarks)
       notes.warnings.push_back(fmt::format("case {}: {}", session.name, remark));
@@ -211,16 +212,17 @@ std::vector<BatchCase> scan_cases(const fs::path& folder, bool other_xrays, Note
       found.xrays_sha256 = xrays_sha256_of(found);
       for (const StudyFiles::Image& image : session.images) found.xray_uids.insert(image.sop_instance_uid);
     } catch (const Error& error) {
-      notes.warnings.push_back(
-          fmt::format("{} and {} more X-rays belong to no case: {}\n       Or name their files in a manifest; --scan "
-                      "writes one that you can edit",
-                      session.images.front().file.string(), session.images.size() - 1, error.what()));
+      const std::string why =
+          fmt::format("{} and {} more X-rays belong to no case: {}", session.images.front().file.string(),
+                      session.images.size() - 1, error.what());
+      if (why_none.empty()) why_none = why;
+      notes.warnings.push_back(why + "\n       Or name their files in a manifest; --scan writes one that you can edit");
     }
   }
+  if (why_none.empty() && !files.other_formats.empty()) why_none = files.other_formats.front();
   if (cases.empty())
     throw Error(fmt::format("{}: holds no case; a case is X-rays with their CT and their plan{}{}", folder.string(),
-                            files.other_formats.empty() ? "" : ".\n       ",
-                            files.other_formats.empty() ? "" : files.other_formats.front()));
+                            why_none.empty() ? "" : ".\n       ", why_none));
   return cases;
 }
 
