@@ -28,7 +28,7 @@ constexpr const char* kReadMe =
   watch    registers the X-rays that arrive at source, and holds the results
   serve    the room's screen, where results are looked at and released: https://localhost:{screen}
 
-Start each of the four in a terminal of its own, in this folder (Debian: apt install orthanc dcmtk):
+Start each of the four in a terminal of its own, in this folder (Debian: apt install orthanc dcmtk curl):
 
   /usr/sbin/Orthanc source.json
   /usr/sbin/Orthanc record.json
