@@ -1,6 +1,6 @@
 #pragma once
-// Every limit beyond which a measurement speaks against a result (quality/findings.h), with its unit and its source.
-// docs/algorithms.md says what is measured, docs/evaluation.md on what.
+// Every limit beyond which a measurement speaks against a registration (quality/findings.h), with its unit and its
+// source. docs/algorithms.md says what is measured, docs/evaluation.md on what.
 
 #include "geometry/rotation.h"
 
