@@ -70,8 +70,8 @@ class Numbers {
 
  private:
   const Measure& at(std::size_t n) const {
-    static const Measure kNone{.value = std::numeric_limits<double>::quiet_NaN(), .unit = ""};
-    return n < finding_.measures.size() ? finding_.measures[n] : kNone;
+    static const Measure none{.value = std::numeric_limits<double>::quiet_NaN(), .unit = ""};
+    return n < finding_.measures.size() ? finding_.measures[n] : none;
   }
   const Finding& finding_;
 };
