@@ -21,8 +21,9 @@ int main(int argc, char** argv) try {
   request.parts.study = argv[1];
   const Study study = load_study(request, notes, {});
   const Volume<float>& ct = study.ct->hu;
-  TargetProblem problem{.patient = {.ct_hu = {study.ct, &ct}, .room_from_patient = study.planned_room_from_patient},
-                        .options = preset("setup")};
+  TargetProblem problem;
+  problem.patient = {.ct_hu = {study.ct, &ct}, .room_from_patient = study.planned_room_from_patient};
+  problem.options = preset("setup");
   problem.target = isocenter_surroundings();
   BodyStore bodies;
   problem.surrogate = surrogate_near(problem.patient, problem.target, bodies);
