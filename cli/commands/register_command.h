@@ -4,7 +4,7 @@
 #include "cli/console.h"
 #include "workflow/register/register_study.h"
 
-namespace CLI {
+namespace CLI {  // NOLINT(readability-identifier-naming): a name of CLI11
 class App;
 }
 
