@@ -27,7 +27,11 @@ int main(int argc, char** argv) try {
   problem.target = isocenter_surroundings();
   BodyStore bodies;
   problem.surrogate = surrogate_near(problem.patient, problem.target, bodies);
-  for (const std::string& doubt : study.doubts) problem.findings.push_back({.check = Check::kFiles, .words = doubt});
+  for (const std::string& doubt : study.doubts) {
+    Finding& finding = problem.findings.emplace_back();
+    finding.check = Check::kFiles;
+    finding.words = doubt;
+  }
   const RendererPyramid renderers(problem.rendering.kind, ct, problem.rendering.model, problem.rendering.beams);
   const TargetRegistration registration(problem, renderers, ct, bodies);
   const RegistrationResult found = registration.from(study.planned_room_from_patient, prepared(study.xrays));
